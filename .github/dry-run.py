@@ -1,14 +1,14 @@
 """Runs the steps of the hosted workflows on this machine, as far as they go without accounts.
 
     python3 -m pip install pyyaml
-    python3 .github/dry-run.py release            # or test, pages, advisories; with names of jobs behind it: these alone
+    python3 .github/dry-run.py release            # or test, pages, advisories; with names of jobs after it: these alone
     python3 .github/dry-run.py --dev release      # without optimisation: a fraction of the time
     python3 .github/dry-run.py --list
 
 A job runs for the entry of its matrix that is this platform, in a clone of the committed state. Commands run as
-they stand; `cargo publish` and other steps that publish are made dry. Of the actions, maturin's runs maturin from
+they stand; `cargo publish` and other steps that publish are made dry. For the actions, maturin's runs maturin from
 PyPI, artifacts are folders, check-out and tools are what is here already; what is left (deployments, tokens) is
-told by name. Jobs that need artifacts need the jobs that make them. It ends with a count, and with an error where a step has failed.
+given by name. Jobs that need artifacts need the jobs that make them. It ends with a count, and with an error where a step has failed.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ OUTCOMES = ("passed", "failed", "not here")
 
 
 def matrix_of(job: dict[str, Any]) -> dict[str, str] | None:
-    """The entry for this platform; none where there is none."""
+    """The entry for this platform; none if there is none."""
     matrix = job.get("strategy", {}).get("matrix")
     if not matrix:
         return {}
@@ -67,7 +67,7 @@ def replaced(text: str, others: dict[str, str]) -> str:
 
 
 def command_of(step: dict[str, Any], matrix: dict[str, str], artifacts: Path, tools: Path) -> str | None:
-    """What a step runs here; none where it needs the host."""
+    """What a step runs here; none if it needs the host."""
     if "run" in step:
         return replaced(filled(step["run"], matrix), DRY)
     action, given = step["uses"].split("@")[0], {k: filled(str(v), matrix) for k, v in step.get("with", {}).items()}

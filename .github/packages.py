@@ -3,8 +3,8 @@
     python3 .github/packages.py target/package/*.crate python/dist/*      # both licence texts in each
     python3 .github/packages.py --install target/package/*.crate          # built of the packages alone, then tried
 
-A wheel or source distribution is installed into an environment of its own. Crates are unpacked and stand in for those
-of crates.io, which are not there yet. Needs Python's library alone; `--profile dev` builds faster.
+A wheel or source distribution is installed into an environment of its own. Crates are unpacked and replace those
+of crates.io, which are not available yet. Needs Python's library alone; `--profile dev` builds faster.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from pathlib import Path
 LICENCES = ("LICENSE-MIT", "LICENSE-APACHE")
 #: The crate of the program.
 PROGRAM = "hoid-cli"
-#: What a user does first. Its output must begin with the verdict.
+#: What a user does first. Its output must start with the verdict.
 TRIAL = "import pyhoid; print(pyhoid.identify(pyhoid.simulate('C1', seed=1)))"
 
 
@@ -37,7 +37,7 @@ def contents(package: Path) -> dict[str, int]:
 
 
 def licences_missing(package: Path) -> list[str]:
-    """Texts that are not there, or are not whole: a link in place of a text is a few bytes."""
+    """Texts that do not exist, or are not whole: a link in place of a text is a few bytes."""
     files = contents(package)
     return [name for name in LICENCES if not any(Path(file).name == name and size > 900 for file, size in files.items())]
 

@@ -1,4 +1,4 @@
-//! The stack in WebAssembly, which is 1 MB otherwise: a filter that begins takes most of that.
+//! The stack in WebAssembly, which is 1 MB otherwise: a filter that starts takes most of that.
 
 #![allow(clippy::print_stdout)]
 

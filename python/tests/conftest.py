@@ -16,7 +16,7 @@ import pyhoid
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 
-#: Modules with the longest tests. They begin first: at the end a processor would wait for them.
+#: Modules with the longest tests. They start first: at the end a processor would wait for them.
 LONGEST = ("test_stubs.py", "test_book.py", "test_pages.py")
 
 

@@ -1,4 +1,4 @@
-"""Every code block of README and book runs, as it stands, and prints what the page says.
+"""Every code block of README and book runs, unchanged, and prints what the page states.
 
 How blocks are marked: `book/pages.py`. What `sh` and `cargo` are: `book/reader.py`.
 """
@@ -15,7 +15,7 @@ import pytest
 from book.pages import ROOT, blocks, name, pages
 from book.reader import Reader
 
-#: So many blocks may be left out, each with its reason.
+#: A given number of blocks may be left out, each with its reason.
 EXCEPTIONS = 2
 RUN = {"sh", "python", "toml", "text", "json"}
 PAGES = [page for page in pages() if any(block.language in RUN for block in blocks(page))]

@@ -169,7 +169,7 @@ def test_track(
     own = json.loads(trace.to_json())
     for key in ("kind", "verdict", "last", "updated_from", "rows", "faults", "rms_relative_error"):
         assert own[key] == found[key], key
-    # `adaptive` begins without a fit.
+    # `adaptive` starts without a fit.
     started = None if trace.start is None else trace.start.orders
     assert (found["start"] and found["start"]["orders"]) == started
     assert (started is None) == (keywords == {})

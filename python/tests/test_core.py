@@ -1,4 +1,4 @@
-"""What a fit, a trace and a tracker are, beyond the digits."""
+"""Properties of fits, traces and trackers beyond their digits."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def test_a_second_run_chooses_the_start_covariance(c4: pyhoid.Record) -> None:
         pyhoid.track(c4, "rpem", nk=29, nd=1, covariance=0.1, validate=second)
     with pytest.raises(pyhoid.DataError, match="validate: expected"):
         pyhoid.track(c4, "rpem", nk=29, nd=1, validate="second.csv")  # type: ignore[arg-type]
-    # The recursion of the reference text has no guard against windup.
+    # The recursion of the thesis has no guard against windup.
     of_rls: Any = {"nk": 29, "memory": 256, "covariance": 0.1}
     off = pyhoid.track(c4, "rls", windup_guard="off", every=10, **of_rls)
     np.testing.assert_array_equal(pyhoid.track(c4, "rls", every=10, **of_rls)["a1"], off["a1"])
@@ -227,7 +227,7 @@ def test_a_tracker_goes_on_out_of_a_pickle(c4: pyhoid.Record) -> None:
         {"method": "rpem", "nd": (1, 2)},
     ):
         tracker = pyhoid.Tracker(sample_time=0.01, nk=29, **keywords)
-        # In the warm-up as well as behind it.
+        # In the warm-up as well as after it.
         for first, last in ((0, 1500), (1500, 4000), (4000, 5000)):
             copy = pickle.loads(pickle.dumps(tracker))
             expected = tracker.update(c4.e[first:last], c4.u[first:last])

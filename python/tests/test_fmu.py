@@ -57,7 +57,7 @@ walk_per_root_s = 0.02
 
 @pytest.fixture(scope="module")
 def library(cli: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The shared library of the same sources; `cargo xtask test` builds it beside the program."""
+    """The shared library of the same sources; `cargo xtask test` builds it next to the program."""
     folder = tmp_path_factory.mktemp("library")
     try:
         return stripped(Tools(Path(cli.binary), folder).shared_library(), folder)

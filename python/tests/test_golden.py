@@ -27,7 +27,7 @@ import tomllib
 pytestmark = [
     # The inputs are made once.
     pytest.mark.xdist_group("golden"),
-    # What is wrong with an input is told as a warning when it is read.
+    # What is wrong with an input is reported as a warning when it is read.
     pytest.mark.filterwarnings("ignore::UserWarning"),
 ]
 
@@ -152,7 +152,7 @@ def plain(value: Any) -> Any:
     return repr(value)
 
 
-#: What is kept of a result, beside its type.
+#: What is kept of a result, next to its type.
 KEPT = (
     "structure",
     "form",

@@ -1,4 +1,4 @@
-"""What people hand over: each works, or the message says what is wrong."""
+"""What people hand over: each works, or the message reports what is wrong."""
 
 from __future__ import annotations
 
@@ -195,7 +195,7 @@ def test_arrays_that_nobody_can_change_are_not_copied() -> None:
     finally:
         tracemalloc.stop()
     # The interpreter does not see what the module itself allocates. The largest resident size of a
-    # separate process tells.
+    # separate process reports.
     program = (
         "import resource, numpy, pyhoid\n"
         "e, u = (numpy.random.default_rng(k).normal(size=4_000_000) for k in (0, 1))\n"

@@ -12,7 +12,7 @@ import pyhoid
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A target of period 20 s that begins behind 3 s and ends before 43 s."""
+    """A target of period 20 s that starts after 3 s and ends before 43 s."""
     sample = np.arange(2640)
     t = sample / 60
     lines = [np.sin(2 * np.pi * h * t / 20 + h) for h in (2, 3, 5, 8, 12, 19)]

@@ -17,7 +17,7 @@ import pyhoid.lsl
 import xdf
 
 pylsl = pytest.importorskip("pylsl")
-# One at a time: each finds its streams by asking whoever is there.
+# One at a time: each finds its streams by asking the caller that is there.
 pytestmark = pytest.mark.xdist_group("lsl")
 
 ELEMENT = "90/(s(s+6))"

@@ -44,7 +44,7 @@ def as_kept(notebook: Any) -> Any:
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
 def test_a_notebook_runs(file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # Pictures stand in the notebook, as where a person runs it.
+    # Pictures are in the notebook, as where a person runs it.
     monkeypatch.setenv("MPLBACKEND", "module://matplotlib_inline.backend_inline")
     kept = nbformat.read(file, as_version=4)
     notebook = nbformat.read(file, as_version=4)

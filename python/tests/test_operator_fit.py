@@ -81,7 +81,7 @@ def test_what_a_fit_holds(found: pyhoid.OperatorFit) -> None:
     shape = found.loop_shape
     assert shape is not None and shape["stable"] is True
     lowest = shape["crossovers"][0]
-    # The shape is that of the form in front, the crossover the mean over forms.
+    # The shape is that of the best form, the crossover the mean over forms.
     assert abs(lowest[0].value - crossover.value) < 2 * (crossover.standard_error or 0.0)
     assert lowest[1].standard_error > 0
     assert shape["gain_margin_db"].value > 0 and shape["gain_margin_db"].standard_error > 0
@@ -115,7 +115,7 @@ def test_the_polynomials_are_the_same_model(found: pyhoid.OperatorFit) -> None:
     crossover = found.open_loop and found.open_loop["crossover_rad_s"]
     assert crossover
     response = found.fit.frequency_response([crossover.value]).response[0]
-    # The crossover is the mean over forms, the polynomials are of the form in front.
+    # The crossover is the mean over forms, the polynomials are of the best form.
     front = next(row["weight"] for row in found.forms if row["form"] == found.form)
     off = 1e-3 if front == 1.0 else 2 * (crossover.standard_error or 0.0) / crossover.value
     assert abs(response) / crossover.value == pytest.approx(1.0, rel=off)
@@ -165,7 +165,7 @@ def test_options(runs: list[pyhoid.Record]) -> None:
         one, form="lead-lag", neuromuscular=False, excitation="none", nd=2, delay=(0.1, 0.4)
     )
     assert "omega_nm" not in without.parameters and 0.1 <= without.parameters.tau_e.value <= 0.4
-    # An excitation that was named and is not there is said to be missed.
+    # An excitation that was named and is missing is reported to be missed.
     missed = pyhoid.identify_operator(one, excitation="nothing", **FEW)
     assert missed.lines is None and missed.no_lines
 

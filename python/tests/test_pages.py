@@ -98,7 +98,7 @@ def test_the_reproduction(cli: Any, tmp_path: Path) -> None:
 
 @pytest.fixture
 def stalled(c1: pyhoid.Record, tmp_path: Path) -> Path:
-    """A run whose recorder stood still for half a second."""
+    """A run whose recorder stayed constant for half a second."""
     e, u = np.array(c1.e), np.array(c1.u)
     e[3000:3050], u[3000:3050] = e[3000], u[3000]
     path = tmp_path / "stalled.csv"
@@ -117,7 +117,7 @@ def test_what_is_inside_of_a_file(stalled: Path, cli: Any) -> None:
 
 
 def test_segments_between_faults(stalled: Path, cli: Any) -> None:
-    with pytest.warns(UserWarning, match="hold their values|stand still|stalled"):
+    with pytest.warns(UserWarning, match="hold their values|stay constant|stalled"):
         segments = pyhoid.read_segments(stalled, ["stalled"])
     assert len(segments) == 2 and sum(map(len, segments)) < 8192
     fit = pyhoid.identify(segments, "bj", nk=29, nd=1)

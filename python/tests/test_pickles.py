@@ -1,4 +1,4 @@
-"""Results that travel: pickle, joblib's way of calling, damaged pickles."""
+"""Results in other processes: pickle, calls as by joblib, damaged pickles."""
 
 from __future__ import annotations
 

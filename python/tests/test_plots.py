@@ -99,7 +99,7 @@ def test_a_trace_of_a_person(c4: pyhoid.Record, tmp_path: Path) -> None:
     labels = [ax.get_ylabel() for ax in axes]
     assert len(axes) == len(trace.response_names) == 4
     assert "at 2.5 rad/s (dB)" in labels[0] and "rad/s" in labels[2] and "deg" in labels[3]
-    # A line for each change that was declared, beside those of the trace.
+    # A line for each change that was declared, next to those of the trace.
     assert len(trace.changes) >= 1 and all(
         len(ax.lines) == 1 + len(trace.changes) for ax in axes
     )
@@ -111,7 +111,7 @@ def test_boxes(tmp_path: Path) -> None:
     samples[1, :3] = np.nan
     ax = plots.box_plots({"ARX": samples[0], "BJ": samples[1]}, truth=0.09, label="K_e")
     assert [text.get_text() for text in ax.get_xticklabels()] == ["ARX", "BJ\n(3 without value)"]
-    assert ax.get_ylabel() == "$K_e$", "a gain has a unit only where its record says so"
+    assert ax.get_ylabel() == "$K_e$", "a gain has a unit only where its record reports it"
     drawn(ax, tmp_path)
 
 

@@ -1,4 +1,4 @@
-"""Rates above 200 Hz are filtered and decimated to about 100 Hz, and the result says so."""
+"""Rates above 200 Hz are filtered and decimated to about 100 Hz, and the result reports it."""
 
 from __future__ import annotations
 

@@ -107,7 +107,7 @@ def test_an_occupied_directory_is_not_overwritten(whole: pyhoid.Results) -> None
 def test_an_interrupt_stops_within_a_second_and_nothing_is_lost(tmp_path: Path) -> None:
     program = (
         "import pyhoid, sys\n"
-        "print('begun', flush=True)\n"
+        "print('started', flush=True)\n"
         "plan = open(sys.argv[1]).read()\n"
         "show = lambda done, total: print(done, flush=True)\n"
         "pyhoid.study(plan, sys.argv[2], resume=True, progress=show)\n"

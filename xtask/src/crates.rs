@@ -1,9 +1,8 @@
-//! What the crates of the workspace may bring with them, with all features, by `cargo metadata`: licences, crates that
-//! are not wanted, one version of each, and not more of them than there are reasons for.
+//! Rules for the dependencies of the workspace, with all features, by `cargo metadata`: licences, crates that are not
+//! wanted, one version of each, and not more of them than there are reasons for.
 //!
-//! An expression of licences is one of SPDX (Annex D: `OR` binds less than `AND`, that less than
-//! `WITH`), with the `/` of older manifests for `OR`. Advisories need the network and are looked at
-//! by the hosted workflows.
+//! An expression of licences is one of SPDX (Annex D: `OR` binds less than `AND`, that less than `WITH`), with the `/`
+//! of older manifests for `OR`. Advisories need the network and are examined by the hosted workflows.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -26,7 +25,7 @@ const ALLOWED: [&str; 11] = [
     "Zlib",
 ];
 
-/// Crates that are not wanted, by name or by the beginning of a name that ends with `*`, and why.
+/// Crates that are not wanted, by name or by the start of a name that ends with `*`, and why.
 const BANNED: [(&str, &str); 16] = [
     (
         "*-sys",
@@ -86,7 +85,7 @@ pub fn check() -> Result<(), String> {
     let mut metadata = cargo_command();
     metadata.args(["metadata", "--format-version", "1", "--locked", "--all-features"]);
     let metadata: Value = serde_json::from_str(&output(&mut metadata)?)
-        .map_err(|error| format!("cargo metadata gives no JSON: {error}"))?;
+        .map_err(|error| format!("the output of cargo metadata is not JSON: {error}"))?;
     let packages = packages(&metadata);
     if packages.is_empty() {
         return Err(String::from("cargo metadata names no packages"));
@@ -115,10 +114,7 @@ pub fn check() -> Result<(), String> {
         );
         return Ok(());
     }
-    Err(format!(
-        "{}\n(the rules stand in xtask/src/crates.rs)",
-        wrong.join("\n")
-    ))
+    Err(format!("{}\n(the rules are in xtask/src/crates.rs)", wrong.join("\n")))
 }
 
 /// A crate that is not of the workspace.
@@ -136,7 +132,7 @@ fn packages(metadata: &Value) -> Vec<Package> {
             name: text(&value["name"])?,
             version: text(&value["version"])?,
             licence: text(&value["license"]),
-            // Those of the workspace have none.
+            // The entries of the workspace have none.
             source: text(&value["source"])?,
         })
     };
@@ -144,7 +140,7 @@ fn packages(metadata: &Value) -> Vec<Package> {
     all.into_iter().flatten().filter_map(package).collect()
 }
 
-/// What is wrong with where a crate comes from and its licence.
+/// Problems with where a crate comes from and its licence.
 fn licence_of(package: &Package) -> Option<String> {
     let Package {
         name, version, source, ..
@@ -163,11 +159,13 @@ fn licence_of(package: &Package) -> Option<String> {
             "{name} {version} is under {licence}, expected {}: take another crate",
             ALLOWED.join(", ")
         )),
-        None => Some(format!("{name} {version}: {licence:?} is no expression of licences")),
+        None => Some(format!(
+            "{name} {version}: {licence:?} is not an expression of licences"
+        )),
     }
 }
 
-/// Whether an expression lets hoid hand the crate on; none where it cannot be read.
+/// Whether an expression lets hoid hand the crate on; none if it cannot be read.
 fn allows(expression: &str) -> Option<bool> {
     let spaced = expression.replace('/', " OR ").replace('(', " ( ").replace(')', " ) ");
     let words: Vec<&str> = spaced.split_whitespace().collect();
@@ -259,7 +257,7 @@ fn several(packages: &[Package]) -> Vec<String> {
         .map(|(name, found)| {
             let found: Vec<&str> = found.iter().copied().collect();
             format!(
-                "{name} is here in {} versions ({}), expected {}: cargo tree --duplicates says who asks for them",
+                "{name} is here in {} versions ({}), expected {}: cargo tree --duplicates reports who asks for them",
                 found.len(),
                 found.join(", "),
                 stated(name)

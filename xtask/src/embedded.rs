@@ -1,7 +1,7 @@
-//! The kernel on bare processors: built for Cortex-M4F and RISC-V, run under QEMU, and its digits beside those of
-//! the host and of `hoid track`.
+//! The kernel on bare processors: built for Cortex-M4F and RISC-V, run under QEMU, and its digits next to those of the
+//! host and of `hoid track`.
 //!
-//! What is not installed is said and left out, with what installs it.
+//! Missing programs are reported and left out, with the command that installs them.
 
 use std::{
     env, fs,
@@ -116,7 +116,7 @@ fn shorten(file: &Path) -> Result<(), String> {
     fs::write(file, kept).map_err(said)
 }
 
-/// The named columns of a table whose comments begin with `#`.
+/// The named columns of a table whose comments start with `#`.
 fn columns(table: &str, names: &[&str]) -> Result<Vec<Vec<String>>, String> {
     let mut lines = table.lines().filter(|line| !line.starts_with('#'));
     let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
@@ -135,7 +135,7 @@ fn columns(table: &str, names: &[&str]) -> Result<Vec<Vec<String>>, String> {
     Ok(lines.map(row).collect())
 }
 
-/// Each line that was told must be one of the trace, to the last digit.
+/// Each line that was reported must be one of the trace, to the last digit.
 fn compared(place: &str, told: &str, track: &str) -> Result<(), String> {
     let table: Vec<&str> = told.lines().filter(|line| !line.starts_with('#')).collect();
     let names: Vec<&str> = table.first().copied().unwrap_or_default().split(',').collect();

@@ -18,7 +18,7 @@ use std::{
 
 use crate::process::{AS_TESTS, SHIPPED, cargo, output, run};
 
-/// What a program that links the static library links besides.
+/// System libraries that a program needs with the static library.
 const SYSTEM_LIBRARIES: &str = if cfg!(target_os = "linux") {
     "-lpthread -ldl -lm -lgcc_s"
 } else {
@@ -234,7 +234,7 @@ fn tried(program: &Path, libraries: &Path) -> Result<(), String> {
     }
 }
 
-/// The example in C by what pkg-config says, with the shared and with the static library.
+/// The example in C by what pkg-config reports, with the shared and with the static library.
 fn found_by_pkg_config(out: &Path) -> Result<(), String> {
     if !(is_here("pkg-config") && is_here("cc")) {
         return Ok(());

@@ -1,8 +1,8 @@
-//! The page of `hoid lab`: that the built file is what its sources build, the page in a browser, the page that needs
-//! no program behind it, and the studies that need a browser: a long session (`hour.mjs`), operators in real time
+//! The page of `hoid lab`: that the built file is what its sources build, the page in a browser, the page that needs no
+//! program after it, and the studies that need a browser: a long session (`hour.mjs`), operators in real time
 //! (`real.mjs`).
 //!
-//! All need npm, what looks at a page a browser; what is not there is said and left out.
+//! All need npm, what looks at a page a browser; missing items are reported and left out.
 
 use std::{
     env, fs,
@@ -32,7 +32,7 @@ pub fn lab() -> Result<(), String> {
     in_browser("dev", "hour.mjs", &["1".to_owned()])
 }
 
-/// The page that needs no program behind it: one file, with an experiment and the tracker in it.
+/// The page that needs no program after it: one file, with an experiment and the tracker in it.
 pub fn alone(arguments: &[String]) -> Result<(), String> {
     let (mut config, mut out) = (None, None);
     let mut rest = arguments.iter();
@@ -56,12 +56,12 @@ pub fn alone(arguments: &[String]) -> Result<(), String> {
     Ok(())
 }
 
-/// Builds that page with the kernel of a profile; where it is, nothing where Rust cannot build for WebAssembly here.
+/// Builds that page with the kernel of a profile; where it is, nothing if Rust cannot build for WebAssembly here.
 fn page_alone(profile: &str, config: Option<&Path>, out: &Path) -> Result<Option<PathBuf>, String> {
     let Some(kernel) = webassembly(profile)? else {
         return Ok(None);
     };
-    // Of the features of the tests, as they have compiled it.
+    // For the features of the tests, as they have compiled it.
     cargo(&["build", "--workspace", "--example", "tables"], &[])?;
     let program = target_directory().join("debug/examples");
     let told = output(Command::new(program.join(format!("tables{}", env::consts::EXE_SUFFIX))).args(config))?;
@@ -89,7 +89,7 @@ pub fn study(script: &str, arguments: &[String]) -> Result<(), String> {
     Ok(())
 }
 
-/// Installs what the page is built and driven with; false where there is no npm, which is said.
+/// Installs what the page is built and driven with; false if there is no npm, which is reported.
 fn npm_is_there() -> Result<bool, String> {
     let there = npm(&["--version"]).stdout(Stdio::null()).stderr(Stdio::null()).status();
     if !there.is_ok_and(|status| status.success()) {

@@ -6,11 +6,12 @@
 //! | `cargo xtask python [ARGUMENT...]` | the tests of the Python package alone, arguments for pytest |
 //! | `cargo xtask check` | formatting, crates that are used, lints, documentation of the crates and the book, as continuous integration does |
 //! | `cargo xtask crates` | licences, bans and versions of the crates that are used, alone (module `crates`) |
+//! | `cargo xtask words [--book]` | the words that prose does not use, in sources, or in the book, alone (module `words`) |
 //! | `cargo xtask book` | the book in `docs/`, into `docs/book/` (needs mdbook) |
 //! | `cargo xtask lab` | that the page of `hoid lab` is what its sources build, and the page in a browser (module `lab`) |
-//! | `cargo xtask lab-page [--config FILE] [--out FILE]` | the page of `hoid lab` as one file that needs no program behind it, into `target/lab-page/` |
+//! | `cargo xtask lab-page [--config FILE] [--out FILE]` | the page of `hoid lab` as one file that needs no program after it, into `target/lab-page/` |
 //! | `cargo xtask embedded [--all]` | the kernel on bare processors, with the digits of the host (module `embedded`) |
-//! | `cargo xtask ffi [--dev] [--out DIR]` | the libraries for C with header, pkg-config file, CMake package and examples, into `target/ffi/`; `--header` makes the header anew, `--check` builds the examples by them (module `ffi`) |
+//! | `cargo xtask ffi [--dev] [--out DIR]` | the libraries for C with header, pkg-config file, CMake package and examples, into `target/ffi/`; `--header` makes the header again, `--check` builds the examples by them (module `ffi`) |
 //! | `cargo xtask miri [ARGUMENT...]` | the boundary to C under Miri, arguments for its tests (module `miri`) |
 //! | `cargo xtask places [--dry or --dev]` | one run through every place in which hoid runs, as the table of the page "In your simulator" (module `places`) |
 //! | `cargo xtask bench [OPTION...]` | the tasks of `research/notes/speed-peers.md` beside the peers that are installed, or how cost grows (module `bench`) |
@@ -19,8 +20,8 @@
 //! Little but the standard library: a chore must start at once on a fresh machine.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
+mod background;
 mod bench;
-mod beside;
 mod counts;
 mod crates;
 mod embedded;
@@ -32,17 +33,18 @@ mod places;
 mod process;
 mod processors;
 mod python;
+mod words;
 
 use std::{
     env,
     process::{Command, ExitCode},
 };
 
-use beside::Beside;
+use background::Background;
 use counts::Counts;
 use process::{SHIPPED, cargo, cargo_command, each_line, run};
 
-const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | crates | book | lab | lab-page [OPTION...] | embedded [--all] | ffi [OPTION...] | miri [ARGUMENT...] | places [--dry | --dev] | bench [OPTION...] | slow NAME [ARGUMENT...]";
+const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | crates | words [--book] | book | lab | lab-page [OPTION...] | embedded [--all] | ffi [OPTION...] | miri [ARGUMENT...] | places [--dry | --dev] | bench [OPTION...] | slow NAME [ARGUMENT...]";
 
 fn main() -> ExitCode {
     let mut arguments = env::args().skip(1);
@@ -53,6 +55,8 @@ fn main() -> ExitCode {
         Some(python::BUILD) => python::build(),
         Some("check") => check(),
         Some("crates") => crates::check(),
+        Some("words") if arguments.next().as_deref() == Some("--book") => words::check_book(),
+        Some("words") => words::check(),
         Some("book") => book(),
         Some("bench") => bench::bench(&arguments.collect::<Vec<_>>()),
         Some("lab") => lab::lab(),
@@ -82,18 +86,18 @@ fn test(arguments: &[String]) -> Result<(), String> {
     let shown = format!("{command:?}");
     let mut total = Counts::default();
     let status = if arguments.is_empty() {
-        let required = Beside::begin(python::REQUIRE)?;
+        let required = Background::begin(python::REQUIRE)?;
         cargo(&["test", "--workspace", "--no-run"], &[])?;
         let mut required = Some(required.end());
         let mut built = Ok(None);
         let status = each_line(&mut command, |line| {
             // Not before the first test runs: until then cargo keeps other builds waiting, and they it.
             if let Some(required) = required.take() {
-                built = required.and_then(|()| Beside::begin(python::BUILD).map(Some));
+                built = required.and_then(|()| Background::begin(python::BUILD).map(Some));
             }
             total.add(line);
         })?;
-        built?.map_or(Ok(()), Beside::end)?;
+        built?.map_or(Ok(()), Background::end)?;
         total.join(&python::pytest(&[])?);
         status
     } else {
@@ -116,7 +120,8 @@ struct Slow {
     example: &'static str,
     /// The package whose program it runs.
     program: Option<&'static str>,
-    /// `release`; `dev` where sums that overflow are looked for, as in the tests; what is shipped where its times are told.
+    /// `release`; `dev` where sums that overflow are searched for, as in the tests; what is shipped where its times are
+    /// reported.
     profile: &'static str,
 }
 
@@ -199,6 +204,7 @@ fn slow(arguments: &[String]) -> Result<(), String> {
 fn check() -> Result<(), String> {
     cargo(&["fmt", "--all", "--check"], &[])?;
     crates::check()?;
+    words::check()?;
     cargo(&["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"], &[])?;
     cargo(&["doc", "--workspace", "--no-deps"], &[("RUSTDOCFLAGS", "-D warnings")])?;
     book()

@@ -1,8 +1,8 @@
 //! The boundary to C under Miri, an interpreter that knows of every read and write whether the memory is there,
-//! initialised and not lent to somebody else, and of every allocation whether it was freed.
+//! initialised and not lent to someone else, and of every allocation whether it was freed.
 //!
-//! It runs the tests of `hoid-ffi` in which pointers are believed, with few samples (`cfg(miri)`). It is a
-//! part of the nightly toolchain: where that has none, this says so with what installs it.
+//! It runs the tests of `hoid-ffi` in which pointers are trusted, with few samples (`cfg(miri)`). It is a part of the
+//! nightly toolchain: where that has none, this reports it with what installs it.
 
 use std::process::Command;
 
@@ -31,7 +31,7 @@ pub fn miri(arguments: &[String]) -> Result<(), String> {
         .env("MIRIFLAGS", flags))
 }
 
-/// What installs what is not here; none where all is.
+/// Command that installs missing programs; none if all are installed.
 fn lacking() -> Option<&'static str> {
     const INSTALL: &str = "rustup toolchain install nightly --profile minimal --component miri --component rust-src";
     let told = |arguments: &[&str]| output(Command::new("rustup").args(arguments)).unwrap_or_default();

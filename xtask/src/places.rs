@@ -1,8 +1,8 @@
-//! Everywhere hoid runs: one run through each place, its digits beside those of `hoid track`, the time of a sample
-//! and what is shipped, as a table between the markers of the page "In your simulator".
+//! Everywhere hoid runs: one run through each place, its digits next to those of `hoid track`, the time of a sample and
+//! what is shipped, as a table between the markers of the page "In your simulator".
 //!
-//! The places stand in `python/tests/places`, which the tests run too (`test_places.py`); here is what they
-//! need, built by the profile of what is shipped. What is not installed is a row of the table that says so.
+//! The places are in `python/tests/places`, which the tests run too (`test_places.py`); here are their requirements,
+//! built by the profile of shipped programs. What is not installed is a row of the table that reports it.
 
 use std::{env, process::Command};
 

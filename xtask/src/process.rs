@@ -1,4 +1,4 @@
-//! Commands that the chores run: their output, and what they say when they fail.
+//! Commands that the chores run: their output, and what they report when they fail.
 
 use std::{
     env,
@@ -49,10 +49,10 @@ pub fn output(command: &mut Command) -> Result<String, String> {
     }
 }
 
-/// The profile of what is shipped: programs, libraries, wheels.
+/// The profile of shipped programs: programs, libraries, wheels.
 pub const SHIPPED: &str = "shipped";
 
-/// What chores beside the tests build: of the same features as the tests, so that nothing is compiled twice. Not
+/// Arguments of the builds for chores: of the same features as the tests, so that nothing is compiled twice. Not
 /// `--lib`: the module of Python is compiled by maturin, under settings of its own. The test brings the libraries for
 /// C, into the folder `deps`.
 pub const AS_TESTS: [&str; 6] = ["build", "--workspace", "--bins", "--examples", "--test", "symbols"];
@@ -63,7 +63,7 @@ pub fn target_directory() -> PathBuf {
     env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), |named| root.join(named))
 }
 
-/// The targets that Rust can build for here; none where rustup is not at hand.
+/// The targets that Rust can build for here; none if rustup is not at hand.
 pub fn installed_targets() -> Vec<String> {
     let told = output(Command::new("rustup").args(["target", "list", "--installed"])).unwrap_or_default();
     told.lines().map(str::to_owned).collect()

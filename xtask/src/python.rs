@@ -4,7 +4,7 @@
 //! have compiled is not compiled again; the test requirements come from PyPI. `HOID_PYTHON` names
 //! another interpreter than `python3`.
 //!
-//! `cargo xtask test` does the first two steps beside those of Rust (module `beside`): what they need is not what
+//! `cargo xtask test` does the first two steps next to those of Rust (module `beside`): what they need is not what
 //! compiles and tests Rust, and both leave a processor idle at times.
 
 use std::{
@@ -19,7 +19,7 @@ use crate::{
     processors::{BUILT, other_processors},
 };
 
-/// Names of the chores that `cargo xtask test` begins beside itself.
+/// Names of the chores that `cargo xtask test` starts next to itself.
 pub const REQUIRE: &str = "python-require";
 pub const BUILD: &str = "python-build";
 
@@ -106,7 +106,7 @@ impl Wheel {
     }
 }
 
-/// A fresh environment with the package in it; its interpreter. For that of the tests the workspace is built before.
+/// A fresh environment with the package in it; its interpreter. The tests need the workspace to be built before.
 pub fn environment(wheel: Wheel) -> Result<PathBuf, String> {
     begin(wheel)?;
     install(wheel)?;

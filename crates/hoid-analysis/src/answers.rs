@@ -1,12 +1,12 @@
-//! What each answer of a result is worth: the response, crossover and phase margin, each parameter.
+//! Reliability of each answer of a result: the response, crossover and phase margin, each parameter.
 //!
-//! What speaks against the data or against the fit speaks against all answers. Beside it an answer can be open by
-//! itself: a parameter that the data do not determine, a crossover whose interval holds zero. The level of the
-//! whole is that of the answers that were asked for: a result whose delay is open is trustworthy in what it says of
-//! the crossover, and not determined for who asks for the delay. By default it is that of the response, and a loop that is
-//! open is a doubt.
+//! A finding against the data or the fit counts against all answers. In addition, an answer can be undetermined by
+//! itself: a parameter that the data do not determine, a crossover whose interval holds zero. The level of the whole is
+//! that of the answers that were requested: a result whose delay is open is trustworthy in its report on the crossover,
+//! and not determined for a request for the delay. By default it is that of the response, and a loop that is open is a
+//! doubt.
 
-use hoid_ident::{Fit, GreyBoxFit, SigmoidFit, family::FamilyFit, judgement::is_open};
+use hoid_ident::{Fit, GreyBoxFit, SigmoidFit, diagnostics::is_open, family::FamilyFit};
 use hoid_model::{ContinuousTransferFunction, Finding, Verdict, operator_family::PARAMETERS, uncertainty::Estimate};
 
 use crate::AnalysisError;
@@ -15,12 +15,12 @@ use crate::AnalysisError;
 pub const RESPONSE: &str = "response";
 /// Crossover frequency and phase margin of the loop.
 pub const LOOP: [&str; 2] = ["crossover", "phase_margin"];
-/// Kind of what makes an answer open by itself.
+/// Kind of the finding that makes a single answer undetermined.
 const OPEN: &str = "open-answer";
 /// Errors of the crossover, as a part of it, and of the margin in deg, beyond which they are open.
 const LARGEST_ERRORS: [f64; 2] = [0.5, 30.0];
 
-/// An answer, and what makes it open by itself.
+/// An answer, and the reason why it is undetermined.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Answered {
     /// `response`, `crossover`, `phase_margin`, or the name of a parameter.
@@ -29,16 +29,16 @@ pub struct Answered {
     pub open: Option<Finding>,
 }
 
-/// A fit that tells what is known of each of its answers.
+/// A fit that shows the prior knowledge of each of its answers.
 pub trait Answers {
     /// All of them, with this controlled element.
     fn answers(&self, element: Option<&ContinuousTransferFunction>) -> Vec<Answered>;
 }
 
-/// The names of answers that are asked for.
+/// The names of answers that are requested.
 ///
 /// # Errors
-/// [`AnalysisError::Options`] for a name of none.
+/// [`AnalysisError::Options`] for an unknown name.
 pub fn asked_for(names: &[String]) -> Result<Vec<String>, AnalysisError> {
     let known = || {
         let parameters = PARAMETERS.iter().map(|(name, _)| *name);
@@ -60,7 +60,7 @@ pub fn asked_for(names: &[String]) -> Result<Vec<String>, AnalysisError> {
     names.iter().map(one).collect()
 }
 
-/// The verdict on what was asked for, from what is known of the fit and what its answers say; by default of the
+/// The verdict on the request, from the prior knowledge of the fit and what its answers show; by default of the
 /// response, with doubts of the loop.
 pub fn judged(verdict: Verdict, answers: &[Answered], asked: &[String]) -> Verdict {
     let of = |name: &str| answers.iter().find(|answer| answer.name == name);
@@ -68,7 +68,7 @@ pub fn judged(verdict: Verdict, answers: &[Answered], asked: &[String]) -> Verdi
         let is_told = |finding: &Finding| matches!(finding.kind, "no-crossover" | "unstable-loop");
         let wanted = LOOP.iter().filter(|_| !verdict.findings().iter().any(is_told));
         let of_loop = wanted.filter_map(|name| of(name)?.open.clone());
-        of_loop.map(|finding| Finding::doubt(OPEN, finding.words)).collect()
+        of_loop.map(|finding| Finding::doubt(OPEN, finding.message)).collect()
     } else {
         let wanted = asked.iter().filter_map(|name| match of(name) {
             Some(answer) => answer.open.clone(),
@@ -76,17 +76,18 @@ pub fn judged(verdict: Verdict, answers: &[Answered], asked: &[String]) -> Verdi
         });
         wanted.collect()
     };
-    verdict.and(open)
+    verdict.append(open)
 }
 
-/// The verdict on one answer: what is known of the fit as a whole, and what makes this one open.
+/// The verdict on one answer: the prior knowledge of the fit as a whole, and the reason why this
+/// one is undetermined.
 pub fn of_answer(verdict: &Verdict, answer: &Answered) -> Verdict {
     let whole = verdict.findings().iter().filter(|finding| finding.kind != OPEN);
     Verdict::of(whole.chain(&answer.open).cloned().collect())
 }
 
-fn open(words: String) -> Finding {
-    Finding::undetermined(OPEN, words)
+fn open(message: String) -> Finding {
+    Finding::undetermined(OPEN, message)
 }
 
 fn answered(name: &str, why: Option<String>) -> Answered {
@@ -156,12 +157,12 @@ impl Answers for SigmoidFit {
     }
 }
 
-/// Of polynomials: the response, and the operator that they stand for.
+/// For polynomials: the response, and the operator that they represent.
 pub(crate) fn of_operator(fit: &Fit) -> Vec<Answered> {
     let mut all = vec![answered(RESPONSE, None)];
     if let Ok(operator) = fit.operator() {
         all.extend(operator.rows().iter().map(|(name, _, estimate)| {
-            let why = is_open(estimate).then(|| format!("{name} ({estimate}) is not told from zero"));
+            let why = is_open(estimate).then(|| format!("{name} ({estimate}) is not distinguished from zero"));
             answered(name, why)
         }));
     }
@@ -188,7 +189,8 @@ mod tests {
         assert_eq!(level(&["response"]), VerdictLevel::Trustworthy);
         assert_eq!(level(&["response", "tau_e"]), VerdictLevel::NotDetermined);
         assert_eq!(level(&["T_I"]), VerdictLevel::NotDetermined);
-        // What speaks against the whole speaks against each, and an answer that is open against itself alone.
+        // A finding against the whole result counts against each answer; an undetermined answer counts only against
+        // itself.
         let whole = Verdict::of(vec![Finding::doubt("leverage", "few samples")]);
         let asked = judged(whole, &answers, &["tau_e".to_owned()]);
         assert_eq!(of_answer(&asked, &answers[0]).level, VerdictLevel::Doubtful);

@@ -1,7 +1,7 @@
 //! Runs that are given twice.
 //!
-//! Errors come from the scatter between runs: a run that stands for two has none, and the errors of a
-//! result would be too small by up to the square root of two.
+//! Errors come from the scatter between runs: a run that represents two has none, and the errors of a result would be
+//! too small by up to the square root of two.
 
 use hoid_model::Record;
 

@@ -23,13 +23,13 @@ pub struct Describing {
     pub options: DescriptionOptions,
     /// Offsets of channels by their names, which were not taken out in reading.
     pub offsets: BTreeMap<String, Offset>,
-    /// What is done about faults of the recordings.
+    /// Treatment of faults of the recordings.
     pub faults: FaultHandling,
     /// Whether a high rate is lowered.
     pub rate: Decimation,
 }
 
-/// What was described.
+/// The described response.
 #[derive(Debug, Clone)]
 pub struct Described {
     /// The describing function; its verdict knows what was wrong with the recordings.

@@ -1,4 +1,4 @@
-//! The describing function of recordings, beside a fit: at the lines of the excitation, over whole periods.
+//! The describing function of recordings, next to a fit: at the lines of the excitation, over whole periods.
 
 use hoid_ident::{
     IdentError,
@@ -17,17 +17,17 @@ use crate::{
 /// Which channel holds the recorded disturbance or target.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Excitation {
-    /// The first of the usual names whose power stands in lines.
+    /// The first of the common names whose power is in lines.
     #[default]
     Found,
     /// None: no fit at lines.
     Nothing,
-    /// This channel: where it has no lines the result says so.
+    /// This channel: where it has no lines the result reports it.
     Named(String),
 }
 
 impl Excitation {
-    /// As users write it: a channel or `none`; found by itself where nothing is said.
+    /// As users write it: a channel or `none`; found automatically if not specified.
     pub fn of_text(text: Option<&str>) -> Self {
         match text {
             None => Self::Found,
@@ -46,8 +46,9 @@ impl Excitation {
 }
 
 impl Recordings {
-    /// The describing function of the recordings as they are used. Where an offset has cost rows, so that less
-    /// than whole periods are left, they are read without it: it is a phase of what is periodic. `None` where no excitation is wanted.
+    /// The describing function of the recordings as they are used. Where an offset has cost rows, so that less than
+    /// whole periods are left, they are read without it: it is a phase of what is periodic. `None` if no excitation is
+    /// wanted.
     ///
     /// # Errors
     /// [`AnalysisError`], where there are no lines, or the files cannot be read again.
@@ -82,7 +83,7 @@ impl Recordings {
         let again = repaired_alike(again.records, handling)?;
         let late = again.first().map_or(Ok(0.0), |r| late_samples(r, &offsets))?;
         let ts_s = again.first().map_or(1.0, |r| r.sample_time().s());
-        // At the rate of what is fitted beside it.
+        // At the rate of what is fitted next to it.
         let used_s = self.records.first().map_or(ts_s, |r| r.sample_time().s());
         let factor = (used_s / ts_s).round().max(1.0) as usize;
         let unmoved = again
@@ -93,8 +94,8 @@ impl Recordings {
     }
 }
 
-/// What a fit beside the lines is told of them: what was looked for by name is missed, what was looked for by
-/// itself is not.
+/// The excitation for a fit that also uses the lines: a missing channel is an error if the user named it, and not
+/// otherwise.
 pub(crate) fn of_lines(
     described: &Result<Option<Description>, AnalysisError>,
     excitation: &Excitation,

@@ -22,29 +22,29 @@ pub enum AnalysisError {
         /// The other.
         second: String,
     },
-    /// A file without the columns that were asked for, in which they are found under other names.
+    /// A file without the columns that were requested, in which they are found under other names.
     #[error(transparent)]
     OtherColumns(Box<OtherColumns>),
-    /// An offset of a channel that is not there.
-    #[error("--offset: there is no channel {name:?}; the record has {known}, and e and u stand for input and output")]
+    /// An offset of a channel that does not exist.
+    #[error("--offset: there is no channel {name:?}; the record has {known}, and e and u represent input and output")]
     NoSuchChannel {
-        /// What was asked for.
+        /// The request.
         name: String,
-        /// What there is.
+        /// The available items.
         known: String,
     },
     /// Options that contradict each other or the model.
     #[error("{reason}")]
     Options {
-        /// What was found, what was expected, what to do.
+        /// The findings, the expected value, what to do.
         reason: String,
     },
-    /// A text that is no result.
+    /// A text that is not a result.
     #[error(
-        "this is no result of a fit: {found}; expected what to_json of this version wrote, or identify --json printed"
+        "this is not a result of a fit: {found}; expected what to_json of this version wrote, or identify --json printed"
     )]
     NotAResult {
-        /// What was found.
+        /// The findings.
         found: String,
     },
     /// An option that does not fit the estimator, or has no such value.
@@ -52,7 +52,7 @@ pub enum AnalysisError {
     Option {
         /// Its name in the registry.
         name: &'static str,
-        /// What was found, what was expected, what to do.
+        /// The findings, the expected value, what to do.
         reason: String,
     },
     /// An option of other estimators.
@@ -62,7 +62,7 @@ pub enum AnalysisError {
         name: &'static str,
         /// The estimators that have it.
         of: Vec<&'static str>,
-        /// What to give in its place.
+        /// The alternative.
         instead: &'static str,
     },
     /// There is no recording.
@@ -89,7 +89,7 @@ impl From<IdentError> for AnalysisError {
 }
 
 impl AnalysisError {
-    /// Why a file is not read, with what to ask for where it has other columns than were asked for.
+    /// Why a file is not read, with what to ask for where it has other columns than were requested.
     pub fn of_reading(error: IoError, path: &Path, options: &ReadOptions) -> Self {
         match other_columns(&error, path, options) {
             Some(others) => Self::OtherColumns(Box::new(others)),

@@ -12,10 +12,10 @@ use crate::{
 };
 
 impl Reading {
-    /// Reads the files; each file that was read is told, with what a user should know of it.
+    /// Reads the files; each file that was read is reported, with what a user should know of it.
     ///
     /// # Errors
-    /// Those of reading; [`AnalysisError::OtherColumns`] for a file in which error and control have other names.
+    /// The errors of reading; [`AnalysisError::OtherColumns`] for a file in which error and control have other names.
     pub fn files(
         &self,
         paths: &[PathBuf],
@@ -41,7 +41,7 @@ impl Reading {
         Ok(all)
     }
 
-    /// Reads one file: the record in it, or the records between what is left out.
+    /// Reads one file: the record in it, or the records between the parts left out.
     ///
     /// # Errors
     /// As [`Reading::files`].

@@ -1,5 +1,5 @@
-//! What was found in a recording, in one form: faults that were looked for, and trouble of channels and their
-//! time. JSON and Python show this list.
+//! Findings in a recording, in one form: faults that were searched for, and trouble of channels and their time. JSON
+//! and Python show this list.
 
 use hoid_io::QualityIssue;
 use hoid_model::Fault;
@@ -10,14 +10,14 @@ use crate::recordings::Account;
 /// Something that was found in a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FoundFault {
-    /// What it is, by its name.
+    /// Its definition, by its name.
     pub kind: &'static str,
     /// The channel; empty for all channels and for the time.
     pub channel: String,
-    /// Time of its first sample, s; none where there is no time.
+    /// Time of its first sample, s; none if there is no time.
     #[serde(rename = "from")]
     pub from_s: Option<f64>,
-    /// Time of the sample behind its last, s.
+    /// Time of the sample after its last, s.
     #[serde(rename = "to")]
     pub to_s: Option<f64>,
     /// How many samples.
@@ -26,7 +26,7 @@ pub struct FoundFault {
     pub size: f64,
     /// The size in robust standard deviations, where the kind has a statistic.
     pub deviations: Option<f64>,
-    /// What was done.
+    /// The actions taken.
     pub action: &'static str,
     /// A sentence without a full stop.
     pub words: String,

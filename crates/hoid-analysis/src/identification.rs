@@ -8,19 +8,19 @@ use crate::description::Excitation;
 /// How a model is identified from recordings: by default the operator of a person.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identification<E = FamilyEstimator> {
-    /// What is fitted, and how. Its excitation and period are those below.
+    /// The fitted model, and how. Its excitation and period are those below.
     pub estimator: E,
     /// The channel of the recorded disturbance or target.
     pub excitation: Excitation,
     /// Its period, s; found from its lines where it is not given.
     pub period_s: Option<f64>,
-    /// What is done about faults of the recordings.
+    /// Treatment of faults of the recordings.
     pub faults: FaultHandling,
     /// Whether a high rate is lowered.
     pub rate: Decimation,
-    /// What the person controls: adds the loop to the verdict.
+    /// The controlled element: adds the loop to the verdict.
     pub controlled_element: Option<ContinuousTransferFunction>,
-    /// What the verdict is about ([`crate::Answers`]); by default the response and the loop.
+    /// Subject of the verdict ([`crate::Answers`]); by default the response and the loop.
     pub answers: Vec<String>,
 }
 

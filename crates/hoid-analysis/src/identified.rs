@@ -1,8 +1,8 @@
-//! From recordings to a result of any batch estimator: what is done, in its order, and what is found.
+//! From recordings to a result of any batch estimator: what is done, in its order, and the findings.
 
 use std::fmt;
 
-use hoid_ident::{Fit, family::FamilyFit, frequency::Description, judgement::response, validation::GoodnessOfFit};
+use hoid_ident::{Fit, diagnostics::response, family::FamilyFit, frequency::Description, validation::GoodnessOfFit};
 use hoid_model::{ContinuousTransferFunction, Decimation, Detrend, Record, Verdict, uncertainty::Estimate};
 use serde_json::{Map, Value};
 
@@ -17,21 +17,20 @@ use crate::{
     settings::Setting,
 };
 
-/// What was identified.
+/// The identified model.
 #[derive(Debug, Clone)]
 pub struct Identified<F = FamilyFit> {
     /// The result.
     pub fit: F,
-    /// What it is worth, of all that is known.
+    /// The verdict on it, of all that is known.
     pub verdict: Verdict,
-    /// The recordings as they were fitted, without their means where these were taken out, and what was done
-    /// to them.
+    /// The recordings as they were fitted, without their means where these were taken out, and the processing of them.
     pub data: Recordings,
-    /// The describing function that stands beside the fit.
+    /// The describing function that is next to the fit.
     pub described: Option<Description>,
     /// The settings that were used.
     pub settings: Vec<Setting>,
-    /// What the person controls, where it is known.
+    /// The controlled element, where it is known.
     pub controlled_element: Option<ContinuousTransferFunction>,
     /// The channel of the excitation, where there is one.
     pub excitation: Option<String>,
@@ -42,7 +41,7 @@ pub struct Identified<F = FamilyFit> {
     pub(crate) written: Option<Map<String, Value>>,
 }
 
-/// How well a model tells a recording that it was not fitted to.
+/// How well a model predicts a recording that it was not fitted to.
 #[derive(Debug, Clone)]
 pub struct Validated {
     /// The recording.
@@ -82,17 +81,17 @@ impl<E: BatchEstimator> Identification<E> {
         } = E::fit(self, &mut data)?;
         let verdict = data.judged(verdict);
         let response = (E::OF == Of::Person).then(|| response(&data.records)).flatten();
-        let verdict = verdict.behind(response.and_then(|found| found.finding()));
+        let verdict = verdict.prepend(response.and_then(|found| found.finding()));
         let verdict = answers::judged(verdict, &fit.answers(self.controlled_element.as_ref()), &self.answers);
         E::judged(&mut fit, &verdict);
         let reading = data.source.as_ref().map(|source| &source.reading);
         let by_default = Identification::of(self.estimator.by_default());
-        let usual_reading = reading.map(|_| Reading::default());
-        let mut usual = by_default.settings(data.records[0].sample_time());
-        usual.extend(shared_settings(&by_default, usual_reading.as_ref()));
-        let mut settings = Setting::against(used, &usual);
+        let default_reading = reading.map(|_| Reading::default());
+        let mut default = by_default.settings(data.records[0].sample_time());
+        default.extend(shared_settings(&by_default, default_reading.as_ref()));
+        let mut settings = Setting::against(used, &default);
         settings.extend(found);
-        settings.extend(Setting::against(shared_settings(self, reading), &usual));
+        settings.extend(Setting::against(shared_settings(self, reading), &default));
         Ok(Identified {
             fit,
             verdict,
@@ -110,7 +109,7 @@ impl<E: BatchEstimator> Identification<E> {
 }
 
 impl<F: Answers> Identified<F> {
-    /// What each answer is worth.
+    /// Reliability of each answer.
     pub fn answers(&self) -> Vec<(String, Verdict)> {
         let all = self.fit.answers(self.controlled_element.as_ref());
         let one = |answer: Answered| (of_answer(&self.verdict, &answer), answer.name);
@@ -125,7 +124,7 @@ impl Identified {
     /// VAF and NRMSE over the recordings, each by its own operator.
     ///
     /// # Errors
-    /// Those of a prediction.
+    /// The errors of a prediction.
     pub fn quality(&self) -> Result<GoodnessOfFit, AnalysisError> {
         let each = self.data.records.iter().enumerate();
         let validations = each.map(|(k, record)| self.fit.operator(k).polynomial_fit.validate(record));
@@ -178,7 +177,7 @@ impl fmt::Display for Identified {
 }
 
 impl<F> Identified<F> {
-    /// How well a model of the fit tells another recording of the person, prepared as those that were fitted.
+    /// How well a model of the fit predicts another recording of the person, prepared as those that were fitted.
     ///
     /// # Errors
     /// [`AnalysisError`] where there is none, of another rate, or too short.

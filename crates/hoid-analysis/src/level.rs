@@ -33,8 +33,8 @@ pub(crate) fn levels_into(
 pub(crate) struct Level {
     /// The records with it, where it was taken out.
     as_read: Option<Vec<Record>>,
-    /// What was found of it beside the means.
-    beside_means: Vec<f64>,
+    /// Findings about it next to the means.
+    separate_means: Vec<f64>,
 }
 
 impl Level {
@@ -46,7 +46,7 @@ impl Level {
         });
         Self {
             as_read,
-            beside_means: Vec::new(),
+            separate_means: Vec::new(),
         }
     }
 
@@ -55,12 +55,12 @@ impl Level {
         self.as_read.is_none()
     }
 
-    /// What was taken out.
+    /// The trend removed.
     pub(crate) fn detrend(&self) -> Detrend {
         if self.is_kept() { Detrend::None } else { Detrend::Mean }
     }
 
-    /// Takes out what a fit with the level as an unknown has found of it beside the means.
+    /// Takes out what a fit with the level as an unknown has found of it next to the means.
     pub(crate) fn refined(
         &mut self,
         data: &mut Recordings,
@@ -68,7 +68,7 @@ impl Level {
     ) -> Result<(), AnalysisError> {
         for record in data.records.iter_mut().filter(|_| self.as_read.is_some()) {
             let left = of(record)?.unwrap_or(0.0);
-            self.beside_means.push(left);
+            self.separate_means.push(left);
             let mut is_output = false;
             *record = record.clone().map_signals(|values| {
                 let by = if is_output { left } else { 0.0 };
@@ -79,14 +79,14 @@ impl Level {
         Ok(())
     }
 
-    /// Writes it into the accounts, and says so.
+    /// Writes it into the accounts, and reports it.
     pub(crate) fn told(
         &self,
         data: &mut Recordings,
         of: impl Fn(usize, &Record) -> Option<Estimate>,
     ) -> Option<Setting> {
         levels_into(&mut data.accounts, self.as_read.as_ref()?, |k, record| {
-            let beside = self.beside_means.get(k).copied().unwrap_or(0.0);
+            let beside = self.separate_means.get(k).copied().unwrap_or(0.0);
             of(k, record).map(|level| Estimate {
                 value: level.value + beside,
                 ..level
@@ -105,7 +105,7 @@ impl Recordings {
 }
 
 impl Setting {
-    /// What the settings say of an estimated level.
+    /// Statement of the settings about an estimated level.
     pub(crate) fn level() -> Self {
         Self::new("level", "one constant of u a record, estimated")
     }

@@ -1,9 +1,9 @@
-//! From recordings to a result and what it is worth, once for all who ask.
+//! From recordings to a result and its reliability, once for all who ask.
 //!
-//! An estimator takes each sample at its word, and its error bars are those of its model. What a result
-//! is worth follows from more: what was wrong with the recording and what was done about it, what a second
-//! fit without suspicious samples says, whether anybody could have held the loop. These rules stand here
-//! and nowhere else; command line, groups and Python parse options and show results.
+//! An estimator takes each sample at its word, and its error bars are those of its model. What a result is worth
+//! follows from more: what was wrong with the recording and the actions taken about it, what a second fit without
+//! suspicious samples shows, whether anyone could have held the loop. These rules are here and nowhere else; command
+//! line, groups and Python parse options and show results.
 //!
 //! ```text
 //! files -- Reading --> Recordings -- Identification { options }.run --> Identified { fit, verdict, data, settings }
@@ -11,20 +11,20 @@
 //!
 //! | step of [`Identification::run`] | rules |
 //! |---|---|
-//! | a file is looked at, before anything is chosen | `look` |
-//! | files are read (before it) | `files`, `reading`; kept with what was done to them in `recordings` |
+//! | a file is examined, before anything is chosen | `look` |
+//! | files are read (before it) | `files`, `reading`; kept with the processing of them in `recordings` |
 //! | runs that are given twice are refused | `copies` |
-//! | faults are looked for and mended, channels are judged | `repair`, `quality` |
+//! | faults are searched for and repaired, channels are judged | `repair`, `quality` |
 //! | a high rate is lowered | `rate` |
 //! | the describing function, where the excitation is recorded | `description`, `offset` |
 //! | the fit, a second opinion, the loop, the settings of the estimator | `estimators`: a file each |
-//! | what the recordings say | `identified`, `recordings` |
-//! | what each answer is worth, and the verdict on those that were asked for | `answers` |
+//! | what the recordings show | `identified`, `recordings` |
+//! | what each answer is worth, and the verdict on those that were requested | `answers` |
 //! | a describing function, from recordings to its verdict | `describing` |
 //! | a recursion over a recording, from it to the verdict | `tracking` |
 //! | the level of u, the settings that all share | `level`, `settings` |
 //!
-//! Options come as fields, or by their names from texts: `options`. What there is stands in [`registry`].
+//! Options come as fields, or by their names from texts: `options`. What there is is in [`registry`].
 //!
 //! ```
 //! use hoid_analysis::{Identification, Recordings};
@@ -74,13 +74,13 @@ pub use estimators::{BatchEstimator, Fitted, PolynomialFit, Polynomials};
 pub use found::FoundFault;
 pub use identification::Identification;
 pub use identified::{Identified, Validated, identify};
-pub use look::{Advice, Known, Lag, Look, OtherColumns, Periods, Role, Roles, Seen, typed};
+pub use look::{Advice, Lag, Look, LookOptions, OtherColumns, Periods, RecordSummary, Role, Roles, typed};
 pub use offset::{late_samples, without_offsets};
 pub use prior::prior_of_text;
 pub use quality::Of;
 pub use rate::kept_rate;
 pub use reading::Reading;
 pub use recordings::{Account, Recordings};
-pub use request::{Asked, Request};
+pub use request::{Request, ResolvedRequest};
 pub use settings::Setting;
 pub use tracking::{Tracked, Tracking, plan_of, relative_errors, settings_of_recursion};

@@ -1,5 +1,5 @@
-//! What batch estimators are called in the [registry](crate::registry); methods of instrumental variables have
-//! their own names.
+//! Names of the batch estimators in the [registry](crate::registry); methods of instrumental variables have their own
+//! names.
 
 /// The operator of a person.
 pub const OPERATOR: &str = "operator";

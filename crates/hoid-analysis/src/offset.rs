@@ -19,7 +19,7 @@ pub fn without_offsets(reading: &Reading) -> (Reading, BTreeMap<String, Offset>)
     (reading, offsets)
 }
 
-/// By how many samples the output is later than the input. The offset of another channel turns its own phase
+/// Number of samples by which the output is later than the input. The offset of another channel turns its own phase
 /// alone, which no average depends on.
 ///
 /// # Errors

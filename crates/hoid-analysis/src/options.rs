@@ -2,8 +2,8 @@
 //! them: the command line, plans and Python bring what they have into that form, and none of them has a list of
 //! its own.
 //!
-//! An estimator declares its options beside its fields. Here stand those of the analysis around it: the recorded
-//! excitation, the controlled element, what the verdict is about, and a prior that stands in a file.
+//! An estimator declares its options next to its fields. here are those of the analysis around it: the recorded
+//! excitation, the controlled element, what the verdict is about, and a prior that is in a file.
 
 use hoid_ident::{
     family::OperatorPrior,
@@ -60,7 +60,7 @@ pub(crate) fn excitation<E: 'static>() -> [AnalysisOption<E>; 2] {
     ]
 }
 
-/// What the person controls.
+/// The controlled element.
 pub(crate) fn controlled_element<E: 'static>() -> AnalysisOption<E> {
     let help = "Controlled element in s, as 90/(s(s+6)), or NUM/DEN by descending powers of s, as 90/1,6,0: adds \
                 crossover frequency and margins";
@@ -73,7 +73,7 @@ pub(crate) fn controlled_element<E: 'static>() -> AnalysisOption<E> {
     })
 }
 
-/// What the verdict is about.
+/// Subject of the verdict.
 pub(crate) fn answers<E: 'static>() -> AnalysisOption<E> {
     let help =
         "What the verdict is about: response, crossover, phase_margin, parameters by their names, as crossover,tau_e";

@@ -1,4 +1,4 @@
-//! What is known of a person before the data, as users write it.
+//! Prior knowledge of a person before the data, as users write it.
 
 use std::path::Path;
 

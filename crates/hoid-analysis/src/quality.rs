@@ -1,10 +1,10 @@
-//! What the quality of the channels says of any result.
+//! Information of the quality of the channels about any result.
 //!
 //! | finding | where | why |
 //! |---|---|---|
 //! | `stick-at-its-end` | u at an end of its range in more than 5 % of the rows | what the person would have done beyond it is lost: gains and margins are those of the stick |
 //! | `resting-stick` | u comes back to one value, exactly, in 10 % of the samples or more ([`Rest`]) | a dead zone, or control in pulses: a note, as the operator is the linear part of the response |
-//! | `coarse` | e in steps of more than .05, u of more than .15 of its deviation | rounding is no remnant: intervals and bands are too narrow |
+//! | `coarse` | e in steps of more than .05, u of more than .15 of its deviation | rounding is not a remnant: intervals and bands are too narrow |
 //! | `bridged` | a gap of more than .25 s on a straight line | the line counts as tracking |
 //!
 //! No error bar knows of these.
@@ -23,7 +23,7 @@ const COARSE: [f64; 2] = [0.05, 0.15];
 /// Longest gap that may be bridged by a straight line, s.
 const BRIDGED_S: f64 = 0.25;
 
-/// Whose record is judged.
+/// The person whose record is judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Of {
     /// A person, who answers what they see.
@@ -32,7 +32,7 @@ pub enum Of {
     System,
 }
 
-/// What the quality of the channels says of any result.
+/// Information of the quality of the channels about any result.
 pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) -> Vec<Finding> {
     let mut all = Vec::new();
     let issues = |kind: QualityIssueKind| account.quality_issues.iter().filter(move |issue| issue.kind == kind);
@@ -45,7 +45,7 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
         all.push(Finding::doubt(
             "stick-at-its-end",
             format!(
-                "{output} stands at an end of its range in {:.0} % of the rows: what the person would have done beyond it is lost, \
+                "{output} is at an end of its range in {:.0} % of the rows: what the person would have done beyond it is lost, \
                  and gain and margins are those of the stick",
                 100.0 * at_ends
             ),

@@ -7,11 +7,11 @@ use hoid_model::{Decimation, SampleTime};
 use crate::{AnalysisError, recordings::Recordings};
 
 impl Recordings {
-    /// The recordings at the rate at which they are used, with what was done; for an estimator that counts
-    /// samples only where a factor was named, and not where the rate was named in reading.
+    /// The recordings at the rate at which they are used, with the actions taken; for an estimator that counts samples
+    /// only where a factor was named, and not where the rate was named in reading.
     ///
     /// # Errors
-    /// Those of the decimation.
+    /// The errors of the decimation.
     pub fn at_rate(mut self, decimation: Decimation, counts_samples: bool) -> Result<Self, AnalysisError> {
         if self.settles_the_rate() {
             return Ok(self);
@@ -35,7 +35,7 @@ impl Recordings {
         source.is_some_and(|source| source.reading.settles_the_rate())
     }
 
-    /// By how much e was moved with its rate, for a hold that is longer than the one it was recorded behind, s.
+    /// Amount by which e was moved with its rate, for a hold that is longer than the one it was recorded behind, s.
     pub(crate) fn input_lead_s(&self) -> f64 {
         let mut steps = self.accounts.iter().flat_map(|account| &account.steps);
         let lead = steps.find_map(|step| match step {
@@ -45,7 +45,7 @@ impl Recordings {
         lead.unwrap_or(0.0)
     }
 
-    /// What to say where a high rate was kept because samples are counted.
+    /// Message for the case that a high rate was kept because samples are counted.
     pub fn kept_rate(&self, decimation: Decimation, counts_samples: bool) -> Option<String> {
         let settled = self.settles_the_rate();
         let record = self.records.first().filter(|_| !settled)?;
@@ -53,7 +53,7 @@ impl Recordings {
     }
 }
 
-/// What to say where a high rate is kept because samples are counted.
+/// Message for the case that a high rate is kept because samples are counted.
 pub fn kept_rate(sample_time: SampleTime, decimation: Decimation, counts_samples: bool) -> Option<String> {
     let factor = decimation.factor(sample_time);
     let kept = counts_samples && decimation == Decimation::Auto && factor > 1;

@@ -1,4 +1,4 @@
-//! How files are read, as a value that goes with what was read.
+//! How files are read, as a value that goes with the read data.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ pub struct Reading {
     pub options: ReadOptions,
     /// Units, scale, offset, rate, run-in, detrend.
     pub preparation: Preparation,
-    /// What is left out: the record is cut there.
+    /// The parts left out: the record is cut there.
     pub mask: Vec<QualityIssueKind>,
     /// Shortest segment between masked samples, s.
     pub shortest_s: f64,

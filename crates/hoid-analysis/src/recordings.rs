@@ -1,4 +1,4 @@
-//! Recordings on their way to an estimator, with the account of what was done to them.
+//! Recordings on their way to an estimator, with the account of the processing of them.
 
 use hoid_io::{QualityIssue, Step, quality_of_record};
 use hoid_model::{Fault, Finding, Record, Verdict, uncertainty::Estimate};
@@ -8,16 +8,16 @@ use crate::reading::Source;
 /// Kind of the note on a stick that rests.
 pub(crate) const RESTING: &str = "resting-stick";
 
-/// What was done to a record, and what is wrong with the sampling of its file.
+/// Processing applied to a record, and the problems of the sampling of its file.
 #[derive(Debug, Clone, Default)]
 pub struct Account {
-    /// What was done to the numbers, in this order.
+    /// Processing applied to the numbers, in this order.
     pub steps: Vec<Step>,
-    /// What is wrong with channels and their time as they were recorded.
+    /// Problems with channels and their time as they were recorded.
     pub quality_issues: Vec<QualityIssue>,
-    /// Faults that were looked for, and what was done about them.
+    /// Faults that were searched for, and the actions taken about them.
     pub faults: Vec<Fault>,
-    /// What they say of any result.
+    /// The report about any result.
     pub findings: Vec<Finding>,
     /// The constant of u that was estimated with the fit.
     pub level: Option<Estimate>,
@@ -26,11 +26,11 @@ pub struct Account {
 /// Records with their names and accounts, in the same order; a file that is cut gives several.
 #[derive(Debug, Clone, Default)]
 pub struct Recordings {
-    /// What each is called: its file, and the span where it is a part of it.
+    /// Name of each: its file, and the span where it is a part of it.
     pub names: Vec<String>,
     /// The records.
     pub records: Vec<Record>,
-    /// What was done to each.
+    /// Processing applied to each.
     pub accounts: Vec<Account>,
     /// Which of the recordings that were given each is a part of, counted from 0.
     pub origins: Vec<usize>,
@@ -39,8 +39,8 @@ pub struct Recordings {
 }
 
 impl Recordings {
-    /// Records that were not read from files here, called by their labels, else by their number. What is wrong with their
-    /// channels is looked for in them.
+    /// Records that were not read from files here, called by their labels, else by their number. Problems with their
+    /// channels is searched for in them.
     pub fn of_records(records: impl IntoIterator<Item = Record>) -> Self {
         let mut all = Self::default();
         for record in records {
@@ -81,8 +81,8 @@ impl Recordings {
         self.records.is_empty()
     }
 
-    /// What was found in all of them, for the verdict of a result of them. One person has one stick: that it rests is
-    /// said once.
+    /// Findings in all of them, for the verdict of a result of them. One person has one stick: that it rests is
+    /// reported once.
     pub fn findings(&self) -> Vec<Finding> {
         let several = self.names.len() > 1;
         let own = |account: &Account| account.findings.iter().filter(|f| f.kind == RESTING).count();
@@ -95,13 +95,13 @@ impl Recordings {
                 if of_stick && std::mem::replace(&mut said, true) {
                     continue;
                 }
-                let words = match (several, of_stick) {
-                    (true, true) => format!("{name} and {} more: {}", resting - 1, finding.words),
-                    (true, false) => format!("{name}: {}", finding.words),
-                    (false, _) => finding.words.clone(),
+                let message = match (several, of_stick) {
+                    (true, true) => format!("{name} and {} more: {}", resting - 1, finding.message),
+                    (true, false) => format!("{name}: {}", finding.message),
+                    (false, _) => finding.message.clone(),
                 };
                 all.push(Finding {
-                    words,
+                    message,
                     ..finding.clone()
                 });
             }
@@ -109,9 +109,13 @@ impl Recordings {
         all
     }
 
-    /// A verdict with what the recordings say: first, since a wrong recording is why a result is wrong.
+    /// A verdict with what the recordings show: first, since a wrong recording is why a result is wrong.
     pub fn judged(&self, verdict: Verdict) -> Verdict {
         let more = self.findings();
-        if more.is_empty() { verdict } else { verdict.behind(more) }
+        if more.is_empty() {
+            verdict
+        } else {
+            verdict.prepend(more)
+        }
     }
 }

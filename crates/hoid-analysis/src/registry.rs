@@ -1,7 +1,7 @@
-//! The registry of batch estimators: what each is called, what it is, and which options it takes.
+//! The registry of batch estimators: name, description and options of each.
 //!
-//! Flags and help of the command line, keys of plans, keywords of Python, the page of options and the names of
-//! printed settings are made from this list. An option stands in the file of its estimator
+//! Flags and help of the command line, keys of plans, keywords of Python, the page of options and the names of printed
+//! settings are made from this list. An option is in the file of its estimator
 //! ([`BatchOptions`](hoid_ident::settings::BatchOptions)), an estimator in a file of `estimators/`, and a new
 //! instrumental-variable method is here by being in [`IvMethod::ALL`](hoid_ident::IvMethod::ALL).
 
@@ -15,7 +15,7 @@ pub use crate::names::{CHANGE, OPERATOR, PEM, REMNANT};
 
 use crate::estimators::{BatchEstimator, Polynomials};
 
-/// What is known of each batch estimator.
+/// Known properties of each batch estimator.
 pub fn estimators() -> Vec<MethodSpec> {
     [
         FamilyEstimator::specs(),

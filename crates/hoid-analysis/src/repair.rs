@@ -1,6 +1,6 @@
-//! Faults of recordings, looked for and mended before anything else is done with them.
+//! Faults of recordings, detected and repaired before anything else is done with them.
 
-use hoid_ident::faults::{SLOWEST_S, mend};
+use hoid_ident::faults::{SLOWEST_S, repair};
 use hoid_model::{FaultHandling, Finding, ModelError, Record};
 
 use crate::{
@@ -10,12 +10,12 @@ use crate::{
     recordings::{Account, Recordings},
 };
 
-/// Most values of an input that steps.
+/// Largest number of values of an input that steps.
 const MOST_LEVELS: usize = 16;
 
 impl Recordings {
-    /// The recordings without their faults; one that is cut gives several. What was found and what it says
-    /// of any result stands in the account of the first of them.
+    /// The recordings without their faults; one that is cut gives several. Report of the findings and their effect on
+    /// any result is in the account of the first of them.
     ///
     /// # Errors
     /// [`AnalysisError::SameSamples`] for runs that are given twice.
@@ -29,14 +29,14 @@ impl Recordings {
         for (((name, record), account), origin) in one.zip(self.origins) {
             let steps = of == Of::System && steps_from_level_to_level(&record);
             let handling = match handling {
-                // A system that settles behind a step is no fault of its sensor: told, and nothing is cut.
+                // A system that settles after a step is not a fault of its sensor: reported, and nothing is cut.
                 FaultHandling::Bridge | FaultHandling::Cut if steps => FaultHandling::Report,
                 as_asked => as_asked,
             };
-            let mut found = mend(&record, handling)?;
+            let mut found = repair(&record, handling)?;
             if steps || (of == Of::System && record.sample_time().s() > SLOWEST_S) {
-                // No person's; of a furnace it is usual.
-                let note = |finding: Finding| Finding::note(finding.kind, finding.words);
+                // No person's; of a furnace it is typical.
+                let note = |finding: Finding| Finding::note(finding.kind, finding.message);
                 found.findings = found.findings.into_iter().map(note).collect();
             }
             let whole = found.segments.len() == 1 && found.segments[0].len() == record.len();
@@ -55,7 +55,7 @@ impl Recordings {
                 } else {
                     (format!("{name}{span}"), segment.labelled(label))
                 };
-                // What was found is told once.
+                // What was found is reported once.
                 all.push_part(origin, name, segment, std::mem::take(&mut account));
             }
         }
@@ -77,11 +77,11 @@ pub(crate) fn steps_from_level_to_level(record: &Record) -> bool {
     levels.len() > 1
 }
 
-/// The same records read another way, mended alike.
+/// The same records read another way, repaired alike.
 pub(crate) fn repaired_alike(records: Vec<Record>, handling: FaultHandling) -> Result<Vec<Record>, ModelError> {
     let mut all = Vec::with_capacity(records.len());
     for record in records {
-        all.extend(mend(&record, handling)?.segments);
+        all.extend(repair(&record, handling)?.segments);
     }
     Ok(all)
 }

@@ -1,4 +1,4 @@
-//! What is to be identified, as users ask for it: a structure, a method, and options by their names.
+//! Model to be identified, as users ask for it: a structure, a method, and options by their names.
 //!
 //! | structure | estimator |
 //! |---|---|
@@ -19,16 +19,16 @@ use crate::{
     registry::{CHANGE, OPERATOR, PEM, REMNANT, estimators},
 };
 
-/// What is to be identified, by names and texts.
+/// Model to be identified, by names and texts.
 #[derive(Debug, Clone, Default)]
 pub struct Request {
-    /// What is fitted.
+    /// The fitted model.
     pub structure: Option<String>,
     /// How: `pem`, or a method of instrumental variables.
     pub method: Option<String>,
     /// Options by their names in the registry.
     pub options: BTreeMap<String, String>,
-    /// What is done about faults of the recordings.
+    /// Treatment of faults of the recordings.
     pub faults: FaultHandling,
     /// Whether a high rate is lowered.
     pub rate: Decimation,
@@ -36,7 +36,7 @@ pub struct Request {
 
 /// An identification that can be run.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Asked {
+pub enum ResolvedRequest {
     /// The operator of a person, its form by evidence.
     Operator(Identification),
     /// A gain with a lead, and its remnant of order m.
@@ -51,15 +51,15 @@ pub enum Asked {
 macro_rules! each {
     ($asked:expr, $how:ident => $what:expr) => {
         match $asked {
-            Asked::Operator($how) => $what,
-            Asked::Remnant($how) => $what,
-            Asked::Change($how) => $what,
-            Asked::Polynomials($how) => $what,
+            ResolvedRequest::Operator($how) => $what,
+            ResolvedRequest::Remnant($how) => $what,
+            ResolvedRequest::Change($how) => $what,
+            ResolvedRequest::Polynomials($how) => $what,
         }
     };
 }
 
-impl Asked {
+impl ResolvedRequest {
     /// The estimator of a name in the registry, with its defaults; `None` for another name.
     pub fn of_estimator(name: &str, structure: Structure) -> Option<Self> {
         let polynomials = |structure: Structure, method: Option<IvMethod>| {
@@ -108,21 +108,21 @@ impl Asked {
         self.structure().is_none_or(Structure::has_input)
     }
 
-    /// Sets an option by its name; false where it is none of its own.
+    /// Sets an option by its name; false if it is none of its own.
     ///
     /// # Errors
-    /// [`AnalysisError`] for a text that is no value of it.
+    /// [`AnalysisError`] for a text that is not a value of it.
     pub fn set(&mut self, name: &str, text: &str) -> Result<bool, AnalysisError> {
         each!(self, how => how.set(name, text))
     }
 }
 
 impl Request {
-    /// What is asked for, and remarks on names of before and on what follows from an option.
+    /// The request, and remarks on earlier names and on what follows from an option.
     ///
     /// # Errors
     /// [`AnalysisError`] for options that contradict each other or have no such value.
-    pub fn asked(&self) -> Result<(Asked, Vec<String>), AnalysisError> {
+    pub fn resolve(&self) -> Result<(ResolvedRequest, Vec<String>), AnalysisError> {
         let mut notes = Vec::new();
         let mut asked = self.kind(&mut notes)?;
         let all = estimators();
@@ -159,8 +159,8 @@ impl Request {
         names.iter().any(|name| self.options.contains_key(*name))
     }
 
-    /// What is fitted, with its defaults.
-    fn kind(&self, notes: &mut Vec<String>) -> Result<Asked, AnalysisError> {
+    /// The fitted model, with its defaults.
+    fn kind(&self, notes: &mut Vec<String>) -> Result<ResolvedRequest, AnalysisError> {
         let options = |reason: String| AnalysisError::Options { reason };
         let typed = self
             .structure
@@ -196,7 +196,7 @@ impl Request {
         } else {
             self.operator(typed.as_deref(), notes)?
         };
-        Asked::of_estimator(estimator, polynomial.unwrap_or(Structure::BoxJenkins))
+        ResolvedRequest::of_estimator(estimator, polynomial.unwrap_or(Structure::BoxJenkins))
             .ok_or_else(|| options(unknown_method(estimator)))
     }
 

@@ -6,14 +6,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::reading::Reading;
 
-/// A setting and its value in words.
+/// A setting and its value as text.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Setting {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// The value that was used.
     pub value: String,
-    /// True where it is another than the default, so that somebody gave it.
+    /// True if it is another than the default, so that someone gave it.
     pub given: bool,
 }
 
@@ -33,12 +33,12 @@ impl Setting {
         Self { given, ..self }
     }
 
-    /// Settings, given where they say so or are not among those by default.
+    /// Marks settings as given if they differ from the defaults.
     pub fn against(all: Vec<Self>, by_default: &[Self]) -> Vec<Self> {
         let is_default = |one: &Self| {
             by_default
                 .iter()
-                .any(|usual| (&usual.name, &usual.value) == (&one.name, &one.value))
+                .any(|default| (&default.name, &default.value) == (&one.name, &one.value))
         };
         all.into_iter()
             .map(|one| {
@@ -91,7 +91,7 @@ impl Reading {
         list
     }
 
-    /// What was left out.
+    /// The parts left out.
     pub(crate) fn masked(&self) -> Option<Setting> {
         let kinds: Vec<&str> = self.mask.iter().map(|kind: &QualityIssueKind| kind.name()).collect();
         (!kinds.is_empty()).then(|| {

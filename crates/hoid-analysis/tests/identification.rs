@@ -1,4 +1,5 @@
-//! From recordings to a verdict: each rule with a recording that trips it, beside one that does not.
+//! From recordings to a verdict: each rule with a recording that trips it, next to one that does
+//! not.
 #![allow(clippy::unwrap_used)]
 
 use std::{collections::BTreeMap, fs, path::Path};
@@ -80,12 +81,12 @@ fn a_stick_at_its_end_is_told_of_files_and_of_records_alike() {
     let place = format!("{}/", directory.path().display());
     let words = |found: &hoid_analysis::Identified| -> Vec<String> {
         let all = found.fit.verdict.findings().iter();
-        all.map(|f| f.words.replace(&place, "").replace(".csv", "")).collect()
+        all.map(|f| f.message.replace(&place, "").replace(".csv", "")).collect()
     };
     assert_eq!(words(&of_records), words(&of_files));
     let first = &words(&of_files)[0];
     assert!(
-        first.starts_with("run 1: u stands at an end of its range in 28 % of the rows"),
+        first.starts_with("run 1: u is at an end of its range in 28 % of the rows"),
         "{first}"
     );
 }
@@ -100,7 +101,7 @@ fn runs_that_are_no_two_runs_are_refused() {
     assert!(words.starts_with("run 1 and again hold the same samples"), "{words}");
     let nothing = quick().run(Recordings::default()).unwrap_err();
     assert!(matches!(nothing, AnalysisError::NoRecordings));
-    // Nothing moves: the estimator says so.
+    // Nothing moves: the estimator reports it.
     let resting = quick().run(Recordings::of_records([recorded(1, |e, _| (e, 0.0))]));
     assert!(matches!(resting.unwrap_err(), AnalysisError::Ident(_)));
     let short = record.span(0.0, 0.5).unwrap();
@@ -157,15 +158,15 @@ fn faults_are_mended_or_kept() {
         let e = Channel::new("e", "", record.input().to_vec());
         Recordings::of_records([Record::new(record.sample_time(), e, Channel::new("u", "", u)).unwrap()])
     };
-    let mended = quick().run(spoilt()).unwrap();
-    assert_eq!(mended.data.accounts[0].faults.len(), 1);
+    let repaired = quick().run(spoilt()).unwrap();
+    assert_eq!(repaired.data.accounts[0].faults.len(), 1);
     let kept = Identification {
         faults: FaultHandling::Keep,
         ..quick()
     };
     let kept = kept.run(spoilt()).unwrap();
     assert!(kept.data.accounts[0].faults.is_empty());
-    assert!(kept.fit.loss > 3.0 * mended.fit.loss);
+    assert!(kept.fit.loss > 3.0 * repaired.fit.loss);
 }
 
 #[test]
@@ -209,7 +210,7 @@ fn an_offset_is_a_phase_of_what_is_periodic() {
     let wrong = late_samples(&record, &of("y", Offset::Samples(1.0))).unwrap_err();
     assert_eq!(
         wrong.to_string(),
-        "--offset: there is no channel \"y\"; the record has e, u, and e and u stand for input and output"
+        "--offset: there is no channel \"y\"; the record has e, u, and e and u represent input and output"
     );
     let mut reading = Reading::default();
     reading.preparation.offset = of("u", Offset::Samples(1.0));
@@ -270,8 +271,8 @@ fn another_run_of_the_person_judges_the_operator() {
 #[test]
 fn orders_of_polynomials_are_those_that_were_given_and_the_operators() {
     let ts = SampleTime::HUNDREDTH;
-    let usual = Polynomials::new(Structure::BoxJenkins).ranges(ts).unwrap();
-    assert_eq!((usual.nk, usual.nd, usual.nb), (6..=61, 1..=4, 2..=2));
+    let default = Polynomials::new(Structure::BoxJenkins).ranges(ts).unwrap();
+    assert_eq!((default.nk, default.nd, default.nb), (6..=61, 1..=4, 2..=2));
     let some = Polynomials {
         orders: [("nd".to_owned(), 2..=2)].into(),
         delay_s: Some((0.28, 0.28)),
@@ -294,7 +295,7 @@ fn every_estimator_hears_of_the_recordings() {
             .run(Recordings::of_records([record.clone()]))
             .unwrap();
         let first = found.verdict.reasons().next().unwrap_or_default().to_owned();
-        assert!(first.contains("stands at an end of its range"), "{first}");
+        assert!(first.contains("is at an end of its range"), "{first}");
     }
     let record = clipped(1);
     let polynomials = Polynomials {

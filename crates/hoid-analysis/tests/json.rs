@@ -3,7 +3,7 @@
 
 use hoid_analysis::{
     BatchEstimator, Identification, Identified, Polynomials, Recordings,
-    json::{Answer, BatchAnswer},
+    json::{BatchAnswer, BatchResult},
 };
 use hoid_ident::{GreyBox, SigmoidChange, family::FamilyEstimator};
 use hoid_model::{
@@ -78,7 +78,7 @@ fn the_kind_is_found_and_another_is_refused() {
         .run(Recordings::of_records([run(1)]))
         .unwrap();
     let text = found.to_json().unwrap();
-    assert!(matches!(Answer::from_json(&text), Ok(Answer::Operator(again)) if again == found));
+    assert!(matches!(BatchResult::from_json(&text), Ok(BatchResult::Operator(again)) if again == found));
     let words = Identified::<hoid_ident::SigmoidFit>::from_json(&text)
         .unwrap_err()
         .to_string();
@@ -90,7 +90,7 @@ fn the_kind_is_found_and_another_is_refused() {
         "{\"estimator\": \"operator\"}",
         "{\"estimator\": \"operator\", \"state\": \"\"}",
     ] {
-        let words = Answer::from_json(wrong).unwrap_err().to_string();
+        let words = BatchResult::from_json(wrong).unwrap_err().to_string();
         assert!(words.contains("no result of a fit"), "{words}");
     }
 }

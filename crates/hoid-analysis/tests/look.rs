@@ -1,9 +1,9 @@
-//! One look at a file, and what a reader is told by it.
+//! One look at a file, and what a reader is reported by it.
 #![allow(clippy::unwrap_used)]
 
 use std::{f64::consts::TAU, fs, path::PathBuf};
 
-use hoid_analysis::{AnalysisError, Known, Look, Reading};
+use hoid_analysis::{AnalysisError, Look, LookOptions, Reading};
 use tempfile::TempDir;
 
 /// A target of period 10 s from 2 s to 22 s of 25 s, an output y = u/s by a control that is recorded a sample late.
@@ -38,9 +38,9 @@ fn plain(t: f64, r: f64, y: f64, u: f64) -> String {
 #[test]
 fn a_file_is_seen_as_a_whole() {
     let (_directory, path) = written("Time (s),Target,y,Stick [V]", plain);
-    let known = Known {
+    let known = LookOptions {
         controlled_element: Some(("1/s".to_owned(), "1/s".parse().unwrap())),
-        ..Known::default()
+        ..LookOptions::default()
     };
     let look = Look::at(&path, &known).unwrap();
     assert_eq!(look.units(), [("Stick [V]", "V")]);
@@ -54,8 +54,8 @@ fn a_file_is_seen_as_a_whole() {
         "hoid identify 'my run.csv' --input Target-y --output 'Stick [V]' --from 2 --to 22 --offset u=1 \
          --excitation Target --controlled-element 1/s"
     );
-    // What is known is not looked for.
-    let known = Known {
+    // What is known is not searched for.
+    let known = LookOptions {
         excitation: Some("none".to_owned()),
         from_s: Some(5.0),
         offset_samples: Some(0.0),
@@ -79,21 +79,21 @@ fn a_file_that_makes_no_record_has_columns_all_the_same() {
             plain(t, r, y, u)
         }
     });
-    let look = Look::at(&path, &Known::default()).unwrap();
+    let look = Look::at(&path, &LookOptions::default()).unwrap();
     assert!(look.seen.as_ref().unwrap_err().to_string().contains("--fill"));
     assert_eq!(look.advice().unwrap().arguments(), ["--input", "r-y", "--output", "u"]);
     fs::write(&path, "a,b\n1,2\n").unwrap();
-    assert!(Look::at(&path, &Known::default()).unwrap().advice().is_none());
+    assert!(Look::at(&path, &LookOptions::default()).unwrap().advice().is_none());
     fs::write(&path, "").unwrap();
-    assert!(Look::at(&path, &Known::default()).is_err());
+    assert!(Look::at(&path, &LookOptions::default()).is_err());
 }
 
 #[test]
 fn a_reader_is_told_the_columns() {
     let (_directory, path) = written("t,r,y,u", plain);
     let refused = |reading: &Reading| reading.file(&path, |_, _| ()).unwrap_err();
-    let usual = Reading::default();
-    let AnalysisError::OtherColumns(others) = refused(&usual) else {
+    let default = Reading::default();
+    let AnalysisError::OtherColumns(others) = refused(&default) else {
         panic!("no other columns");
     };
     assert_eq!((others.input.as_deref(), others.output.as_str()), (Some("r-y"), "u"));

@@ -22,7 +22,7 @@ use full_disks::rounds;
 use interrupted::{Bench, GROUP, STUDY, TRACK, beside_this};
 
 fn main() -> ExitCode {
-    let number = |k: usize, usual: u64| std::env::args().nth(k).map_or(usual, |text| text.parse().unwrap());
+    let number = |k: usize, default: u64| std::env::args().nth(k).map_or(default, |text| text.parse().unwrap());
     let (count, mut draw) = (number(1, 200) as usize, Draw(number(2, 1)));
     let directory = tempfile::tempdir().unwrap();
     let bench = Bench::new(beside_this(), directory.path());

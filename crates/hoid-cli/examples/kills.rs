@@ -113,14 +113,14 @@ fn main() -> ExitCode {
     }
 }
 
-/// True where the process was still at work.
+/// True if the process was still at work.
 fn kill(mut child: Child, after: Duration) -> bool {
     thread::sleep(after);
     let _ = child.kill();
     !child.wait().unwrap().success()
 }
 
-/// Damages one file of a block; what was done, or none where there is no block yet.
+/// Damages one file of a block; the actions taken, or none if there is no block yet.
 fn damage(parts: &Path, draw: &mut Draw) -> Option<&'static str> {
     let mut all: Vec<PathBuf> = fs::read_dir(parts).ok()?.map(|entry| entry.unwrap().path()).collect();
     all.retain(|path| !path.file_name().unwrap().to_str().unwrap().starts_with('.') && path.is_file());

@@ -1,9 +1,9 @@
 //! How long `hoid stream` takes to answer a sample, and what happens when readers stop, either side begins again,
 //! clocks jump and datagrams are hostile. The numbers of `research/notes/latency.md`.
 //!
-//! `cargo xtask slow latency [--seconds N] [--seed N] [--program FILE] [--python FILE]`: each way and rate for 600 s, unless
-//! told otherwise. Over LabStreamingLayer where the interpreter has pyhoid and pylsl, as that of `cargo xtask places`. It
-//! fails when a sample is lost that is not counted, or one is lost though nobody stopped; never for a time.
+//! `cargo xtask slow latency [--seconds N] [--seed N] [--program FILE] [--python FILE]`: each way and rate for 600 s,
+//! by default. Over LabStreamingLayer where the interpreter has pyhoid and pylsl, as that of `cargo xtask places`. It
+//! fails when a sample is lost that is not counted, or one is lost though no one stopped; never for a time.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../tests/common/live/mod.rs"]
@@ -67,7 +67,7 @@ fn main() -> ExitCode {
             found.what, found.sent, found.answered, summary.missing, summary.dropped
         );
     }
-    println!("\n{lost} samples lost while nobody stopped.");
+    println!("\n{lost} samples lost while no one stopped.");
     if lost == 0 {
         ExitCode::SUCCESS
     } else {
@@ -110,7 +110,7 @@ fn profile() -> PathBuf {
     path.ancestors().nth(2).unwrap().to_owned()
 }
 
-/// The program that is built beside this example.
+/// The program that is built next to this example.
 fn beside_this() -> PathBuf {
     profile().join(format!("hoid{}", std::env::consts::EXE_SUFFIX))
 }

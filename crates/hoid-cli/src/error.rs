@@ -1,4 +1,4 @@
-//! What ends a command early, and with which exit code.
+//! Errors that end a command, and their exit codes.
 
 use hoid::analysis::{AnalysisError, registry::estimator_setting};
 use hoid::design::{compare::CompareError, experiment::DesignError};
@@ -12,27 +12,28 @@ use hoid::thesis::ThesisError;
 use thiserror::Error;
 
 use crate::{
-    args::{flag, in_words},
+    args::{as_text, flag},
     interrupt,
 };
 
 /// Everything that a command can run into.
 #[derive(Debug, Error)]
 pub enum CliError {
-    /// What was typed contradicts itself or cannot be read.
+    /// The arguments are contradictory or invalid.
     #[error("{0}")]
     Usage(String),
-    /// A file with other columns than were asked for, and the command that names them.
+    /// A file with other columns than were requested, and the command that names them.
     #[error("{0}")]
     OtherColumns(String),
     /// A stream that cannot be read, understood or written.
     #[error("{0}")]
     Stream(String),
     /// A result that was made and could not be printed.
-    #[error("standard output cannot be written: {0}; what was asked is not there, or is cut: make room for it")]
+    #[error("standard output cannot be written: {0}; what was asked is missing, or is cut: make room for it")]
     Output(std::io::Error),
-    /// A result that was printed, and says that the data do not determine what was asked.
-    #[error("the data do not determine what was asked: {0}")]
+    /// A result that was printed, and reports that the data do not determine the requested
+    /// quantity.
+    #[error("the data do not determine the requested quantity: {0}")]
     NotDetermined(String),
     /// Work that was interrupted and can be resumed.
     #[error("{0}")]
@@ -84,7 +85,7 @@ impl From<AnalysisError> for CliError {
             AnalysisError::Option { name, reason } => Self::Usage(format!("{}: {reason}", typed(name))),
             AnalysisError::Misplaced { name, of, instead } => {
                 let instead = instead.replace("delay", "--delay");
-                Self::Usage(format!("{} belongs to {}{instead}", typed(name), in_words(&of)))
+                Self::Usage(format!("{} belongs to {}{instead}", typed(name), as_text(&of)))
             }
         }
     }
@@ -110,7 +111,7 @@ impl From<hoid_lab::LabError> for CliError {
 }
 
 impl CliError {
-    /// What is wrong with options, before anything is read.
+    /// Problems with options, before anything is read.
     pub fn of_options(error: AnalysisError) -> Self {
         match error {
             AnalysisError::Ident(IdentError::BadOption {
@@ -122,10 +123,10 @@ impl CliError {
         }
     }
 
-    /// What follows from the verdict on a result that has been printed.
+    /// Exit code for the verdict of a printed result.
     ///
     /// # Errors
-    /// [`CliError::NotDetermined`] where the data do not determine what was asked.
+    /// [`CliError::NotDetermined`] where the data do not determine the requested quantity.
     pub fn of_verdict(verdict: &Verdict) -> Result<(), Self> {
         match verdict.level {
             VerdictLevel::NotDetermined => {
@@ -136,8 +137,7 @@ impl CliError {
         }
     }
 
-    /// 2 for wrong usage, 1 for data and tasks that give no result, 128 and its number for what a signal
-    /// stopped.
+    /// 2 for wrong usage, 1 for data and tasks that give no result, 128 and its number after a signal.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_)

@@ -1,4 +1,4 @@
-//! An operator of the family that polynomials stand for, shown to people.
+//! An operator of the family that polynomials represent, shown to people.
 
 use hoid::ident::family::{FamilyConversion, PoleRole};
 use hoid::model::{GainUnit, NotConvertible};

@@ -1,17 +1,17 @@
 //! Interrupts: Ctrl-C, and where the system has them SIGTERM and SIGHUP, which end a command with
 //! its files whole. SIGXFSZ (a limit of the size of files) is an error of writing instead of an end.
 //!
-//! By default what is on its way is removed and the program ends with 128 and the number of the
-//! signal. A command that can stop, or has something to say at its end, sets its own answer.
+//! By default output in progress is removed and the program ends with 128 and the number of the
+//! signal. A command that can stop, or has something to report at its end, sets its own answer.
 
 use std::sync::{
     Mutex, MutexGuard, PoisonError,
     atomic::{AtomicI32, Ordering},
 };
 
-type Answer = Box<dyn FnMut(i32) + Send>;
+type Handler = Box<dyn FnMut(i32) + Send>;
 
-static ANSWER: Mutex<Option<Answer>> = Mutex::new(None);
+static HANDLER: Mutex<Option<Handler>> = Mutex::new(None);
 /// The last signal, for the exit code of what was stopped by it.
 static LAST: AtomicI32 = AtomicI32::new(SIGINT);
 const SIGINT: i32 = 2;
@@ -34,19 +34,19 @@ pub fn on_interrupt(new: impl FnMut(i32) + Send + 'static) {
     *answer() = Some(Box::new(new));
 }
 
-/// Ends the program; what is on its way to a file is removed.
+/// Ends the program; output in progress to a file is removed.
 pub fn end(code: i32) -> ! {
     hoid::io::remove_unfinished_files();
     std::process::exit(code)
 }
 
-/// The exit code of what an interrupt stopped, as shells have it.
+/// The exit code after an interrupt, as shells have it.
 pub fn exit_code() -> i32 {
     128 + LAST.load(Ordering::Relaxed)
 }
 
-fn answer() -> MutexGuard<'static, Option<Answer>> {
-    ANSWER.lock().unwrap_or_else(PoisonError::into_inner)
+fn answer() -> MutexGuard<'static, Option<Handler>> {
+    HANDLER.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(unix)]
@@ -56,7 +56,7 @@ fn listen(heard: impl Fn(i32) + Send + 'static) -> std::io::Result<()> {
         flag,
         iterator::Signals,
     };
-    // A signal with a handler does not end the program: the write says EFBIG.
+    // A signal with a handler does not end the program: the write reports EFBIG.
     flag::register(SIGXFSZ, std::sync::Arc::default())?;
     let mut signals = Signals::new([SIGINT, SIGTERM])?;
     // As `nohup` wants it.
@@ -74,8 +74,8 @@ fn listen(heard: impl Fn(i32) + Send + 'static) -> Result<(), ctrlc::Error> {
     ctrlc::set_handler(move || heard(SIGINT))
 }
 
-/// Whether the program was started with a signal ignored, where Linux says it; elsewhere a signal is
-/// taken for one that is not.
+/// Whether the program was started with a signal ignored, where Linux reports it; elsewhere a signal
+/// is taken for one that is not.
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

@@ -9,7 +9,7 @@ use crate::{error::CliError, output};
 /// Prints one object, indented, and nothing else.
 ///
 /// # Errors
-/// Those of [`output::print`].
+/// The errors of [`output::print`].
 pub fn print(value: &Value) -> Result<(), CliError> {
     output::print(&format!("{value:#}\n"))
 }

@@ -1,10 +1,9 @@
 //! The command line `hoid`. Only this crate prints: results to standard output, everything else to
 //! standard error.
 //!
-//! Exit code 0: done; 1: the data or the task cannot give a result, or it cannot be written; 2: wrong
-//! usage; 128 and its number for a signal. `args` says
-//! what can be typed, `commands` what it does, one file a command; `json` and `text` are the two
-//! forms of a result.
+//! Exit code 0: done; 1: the data or the task cannot give a result, or it cannot be written; 2: wrong usage; 128 and
+//! its number for a signal. `args` states what can be typed, `commands` what it does, one file a command; `json` and
+//! `text` are the two forms of a result.
 
 mod args;
 mod commands;

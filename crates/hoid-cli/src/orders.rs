@@ -10,7 +10,7 @@ use hoid::ident::{
 
 use crate::error::CliError;
 
-/// The orders that were typed; the delay stands beside them.
+/// The orders that were typed; the delay is next to them.
 pub fn named_orders(orders: Option<&str>, nk: Option<&DelayRange>) -> Result<NamedOrders, CliError> {
     let read = orders.filter(|text| !text.trim().is_empty()).map(NamedOrders::read);
     let all = match read {

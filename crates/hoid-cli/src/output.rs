@@ -1,6 +1,6 @@
 //! Standard output and standard error. A reader that closes the pipe early (`hoid ... | head`) has
-//! what it wanted: the command goes on with its files, and nothing is said. Any other output that
-//! cannot be written, such as a full disk, is an error.
+//! what it wanted: the command continues with its files, and nothing is reported. Any other output
+//! that cannot be written, such as a full disk, is an error.
 
 use std::{
     io::{self, ErrorKind, IsTerminal, Write},
@@ -22,7 +22,8 @@ use crate::error::CliError;
 /// Writes a result to standard output.
 ///
 /// # Errors
-/// [`CliError::Output`] for what the system says, but not for a pipe that its reader has closed.
+/// [`CliError::Output`] for errors that the operating system reports, but not for a pipe that its
+/// reader has closed.
 pub fn print(text: &str) -> Result<(), CliError> {
     printed(io::stdout().lock().write_all(text.as_bytes()))
 }
@@ -62,7 +63,7 @@ fn coloured(page: &str) -> String {
 /// Narrowest and widest line of a page: below, words are cut; above, the eye loses the line.
 const WIDTHS: (usize, usize) = (60, 110);
 
-/// Columns of the screen: those of `COLUMNS`, else of the terminal; none where a page goes into a
+/// Columns of the screen: those of `COLUMNS`, else of the terminal; none if a page goes into a
 /// file, which keeps its lines whole.
 pub fn width() -> Option<usize> {
     let told = std::env::var("COLUMNS").ok().and_then(|text| text.parse().ok());
@@ -74,7 +75,7 @@ pub fn width() -> Option<usize> {
 }
 
 /// A page with the lines of its sentences wrapped; tables have the width that they were made with.
-/// What continues a point of a list stands below its words.
+/// What continues a point of a list is below its words.
 fn wrapped(page: &str, width: usize) -> String {
     let mut text = String::with_capacity(page.len() + page.len() / 16);
     for line in page.split_inclusive('\n') {
@@ -104,10 +105,10 @@ fn wrapped(page: &str, width: usize) -> String {
     text
 }
 
-/// What is said after the answer: words, and what they are said of.
+/// The report after the answer: words, and what they are reported about.
 static NOTICES: Mutex<Vec<(String, Vec<String>)>> = Mutex::new(Vec::new());
 
-/// What stands before a remark that speaks of trouble.
+/// Prefix of a warning.
 const WARNING: &str = "warning: ";
 
 /// Keeps a warning, as [`notice`].
@@ -115,7 +116,8 @@ pub fn warning(of: &str, words: &str) {
     notice(of, format!("{WARNING}{words}"));
 }
 
-/// Keeps a remark until the answer is printed; what is said of several files is said once.
+/// Keeps a remark until the answer is printed; what is reported about several files is reported
+/// once.
 pub fn notice(of: &str, words: String) {
     let mut all = NOTICES.lock().unwrap_or_else(PoisonError::into_inner);
     match all.iter_mut().find(|(known, _)| *known == words) {
@@ -141,7 +143,7 @@ pub fn tell_notices() {
     }
 }
 
-/// What became of something that was written to standard output.
+/// Outcome of something that was written to standard output.
 ///
 /// # Errors
 /// As [`print`].
@@ -165,12 +167,12 @@ pub fn reader_left() -> bool {
 
 /// Writes a warning, a note or an error to standard error.
 pub fn message(text: &str) {
-    // When even standard error is closed there is no one to tell.
+    // When even standard error is closed there is no place for a message.
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
 
-/// A progress bar on standard error with rate and time left; invisible where standard error is no
-/// terminal.
+/// A progress bar on standard error with rate and time left; invisible where standard error is not
+/// a terminal.
 pub fn progress(total: usize, what: &str) -> ProgressBar {
     let bar = ProgressBar::new(total as u64);
     // Should the template be wrong, the plain bar does as well.
@@ -183,7 +185,7 @@ pub fn progress(total: usize, what: &str) -> ProgressBar {
 }
 
 /// Does work that may last, with the time since its start on standard error, and a bar with the
-/// time left as soon as it says how far it is; nothing where standard error is no terminal.
+/// time left as soon as it reports how far it is; nothing if standard error is not a terminal.
 pub fn watched<T>(what: &'static str, work: impl FnOnce() -> T) -> T {
     let bar = ProgressBar::new_spinner().with_message(what);
     if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}, {elapsed}") {

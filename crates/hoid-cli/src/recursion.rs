@@ -18,7 +18,7 @@ use crate::{
 /// The option that may be a file.
 const PRIOR: &str = "prior";
 
-/// The recursion that was asked for.
+/// The recursion that was requested.
 ///
 /// # Errors
 /// [`CliError::Usage`].
@@ -30,7 +30,7 @@ pub fn request(args: &RecursionArgs) -> Result<TrackRequest, CliError> {
         orders: orders::named_orders(args.orders.as_deref(), delay.as_ref())?,
         delay,
         start: match args.start.as_deref().map(str::trim) {
-            None => RequestedStart::Usual,
+            None => RequestedStart::Default,
             Some("nothing") => RequestedStart::Nothing,
             Some(text) => RequestedStart::Coefficients(orders::start(text)?),
         },
@@ -41,7 +41,7 @@ pub fn request(args: &RecursionArgs) -> Result<TrackRequest, CliError> {
     })
 }
 
-/// A recursion over a record, as it was asked for.
+/// A recursion over a record, as it was requested.
 ///
 /// # Errors
 /// As [`request`].
@@ -60,7 +60,7 @@ pub fn tracking(args: &TrackArgs) -> Result<Tracking, CliError> {
 /// Searches the orders that a plan leaves open, and shows how far it is.
 ///
 /// # Errors
-/// Those of the search.
+/// The errors of the search.
 pub fn choose(plan: &TrackPlan, span: &Record) -> Result<(TrackOptions, Option<Choice>), IdentError> {
     searching(plan, |each| plan.choose(span, each))
 }
@@ -78,7 +78,7 @@ pub fn searching<T>(plan: &TrackPlan, work: impl FnOnce(&(dyn Fn() + Sync)) -> T
     done
 }
 
-/// The method of a name as typed; of an earlier name it is said what it is called now.
+/// The method of a name as typed; of an earlier name it is shown what it is called now.
 ///
 /// # Errors
 /// A name that no method has.
@@ -92,7 +92,7 @@ pub fn method_of(name: &str) -> Result<Method, CliError> {
 /// The method with the options that were typed.
 ///
 /// # Errors
-/// [`CliError::Usage`] for an option of another method, or a text that is no value of it.
+/// [`CliError::Usage`] for an option of another method, or a text that is not a value of it.
 fn method(args: &RecursionArgs) -> Result<Method, CliError> {
     let usage = |name: &str, text: &str| CliError::Usage(format!("--{} {text}", flag(name)));
     let mut method = method_of(&args.method)?;

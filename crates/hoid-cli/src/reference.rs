@@ -7,15 +7,15 @@ use hoid::analysis::registry::estimators;
 use hoid::ident::settings::{Kind, MethodSpec, Setting};
 use hoid::survey::registry;
 
-use crate::args::in_words;
+use crate::args::as_text;
 
-/// The type of a value in words.
-fn kind_in_words(kind: Kind) -> String {
+/// The type of a value as text.
+fn kind_as_text(kind: Kind) -> String {
     match kind {
         Kind::Flag => "flag".to_owned(),
         Kind::Count => "whole number".to_owned(),
         Kind::Number => "number".to_owned(),
-        Kind::NumberOrUsual(usual) => format!("number; {usual} where none is given"),
+        Kind::NumberOrDefault(default) => format!("number; {default} if none is given"),
         Kind::Counts => "whole number or `LO..HI`".to_owned(),
         Kind::NumberOrSpan => "number or `LO..HI`".to_owned(),
         Kind::Delay => "samples (`29`, `20..40`) or seconds (`0.28s`, `0.1s..0.4s`)".to_owned(),
@@ -33,7 +33,7 @@ fn kind_in_words(kind: Kind) -> String {
         Kind::Guess => "`VALUE:WEIGHT`".to_owned(),
         Kind::Element => "`90/(s(s+6))` or `90/1,6,0`".to_owned(),
         Kind::Prior => "`population`, `none`, `NAME=CENTRE:SPREAD,...`, or a file of `identify --json`".to_owned(),
-        Kind::Named(of) => format!("`NAME=VALUE,...`, each {}", kind_in_words(*of)),
+        Kind::Named(of) => format!("`NAME=VALUE,...`, each {}", kind_as_text(*of)),
     }
 }
 
@@ -55,7 +55,7 @@ fn options_page(methods: &[MethodSpec]) -> String {
             structures.join(", "),
             spec.source
         ));
-        page.push_str("| option | type | unit | default | bounds | what it does |\n|---|---|---|---|---|---|\n");
+        page.push_str("| option | type | unit | default | bounds | effect |\n|---|---|---|---|---|---|\n");
         for setting in &spec.settings {
             let bounds = match setting.kind {
                 Kind::Count | Kind::Number | Kind::NumberOrOff | Kind::Span | Kind::Named(Kind::Number) => {
@@ -66,7 +66,7 @@ fn options_page(methods: &[MethodSpec]) -> String {
             page.push_str(&format!(
                 "| `{}` | {} | {} | {} | {bounds} | {} |\n",
                 setting.name,
-                kind_in_words(setting.kind),
+                kind_as_text(setting.kind),
                 setting.unit,
                 setting.default,
                 setting.help
@@ -89,7 +89,7 @@ fn python_type(kind: Kind) -> String {
         Kind::Flag => "bool".to_owned(),
         Kind::Count => "int".to_owned(),
         Kind::Number => "float".to_owned(),
-        Kind::NumberOrUsual(_) => "float | bool".to_owned(),
+        Kind::NumberOrDefault(_) => "float | bool".to_owned(),
         Kind::Counts => "int | tuple[int, int] | range".to_owned(),
         Kind::NumberOrSpan => "float | tuple[float, float]".to_owned(),
         Kind::Delay => "int | tuple[int, int] | range | str".to_owned(),
@@ -137,7 +137,7 @@ struct Keywords<'a> {
 }
 
 impl<'a> Keywords<'a> {
-    /// Those of the methods, without what Python has in another way.
+    /// The entries of the methods, without what Python has in another way.
     fn of(methods: &'a [MethodSpec], without: &[&str]) -> Self {
         let mut settings: Vec<(&Setting, Vec<&str>)> = Vec::new();
         for spec in methods {
@@ -156,7 +156,7 @@ impl<'a> Keywords<'a> {
 
     fn about(&self, setting: &Setting, of: &[&str]) -> String {
         let of = if of.len() < self.methods {
-            let words = in_words(of)
+            let words = as_text(of)
                 .replace("--noise remnant", "noise=\"remnant\"")
                 .replace("--change sigmoid", "change=\"sigmoid\"");
             format!(" For {words}.")

@@ -1,8 +1,8 @@
 //! Tables for people: three rules, as in print, and as wide as the screen.
 //!
-//! On a narrow screen cells are wrapped between words, never within a word or a number with its
-//! error. A table that is too wide even so becomes a list for each row, and a course of values a table
-//! on its side, with as many of its times as there is room for.
+//! On a narrow screen cells are wrapped between words, never within a word or a number with its error. A table that is
+//! too wide even so becomes a list for each row, and a series of values a transposed table, with as many of its times
+//! as there is room for.
 
 use std::fmt;
 
@@ -29,7 +29,7 @@ const FIXED_BLANK: &str = "\u{a0}";
 pub struct Rows {
     header: Vec<String>,
     rows: Vec<Vec<String>>,
-    /// True where rows are instants of one course.
+    /// True if rows are instants of one course.
     course: bool,
 }
 
@@ -43,7 +43,7 @@ impl Rows {
     }
 
     /// Rows of which some may be left out for want of room, but not the last.
-    pub fn in_course(self) -> Self {
+    pub fn as_time_series(self) -> Self {
         Self { course: true, ..self }
     }
 
@@ -51,7 +51,7 @@ impl Rows {
         self.rows.push(cells.into_iter().map(Into::into).collect());
     }
 
-    /// The table on a screen of so many columns; of any width without.
+    /// The table on a screen of a given number of columns; of any width without.
     fn on(&self, width: Option<usize>) -> String {
         let whole = self.drawn(None);
         let Some(width) = width else { return whole };
@@ -66,8 +66,7 @@ impl Rows {
         }
     }
 
-    /// A course with its times above and its names before, for a narrow screen; none where not even the
-    /// last fits.
+    /// A course with its times above and its names before, for a narrow screen; none if not even the last fits.
     fn on_its_side(&self, width: usize) -> Option<String> {
         let last = self.rows.len().checked_sub(1).filter(|_| self.course)?;
         (1..=self.rows.len()).rev().find_map(|count| {
@@ -125,7 +124,7 @@ impl Rows {
         (0..self.header.len()).map(of).collect()
     }
 
-    /// Each row as its first cell with the others below, each behind its heading.
+    /// Each row as its first cell with the others below, each after its heading.
     fn as_lists(&self) -> String {
         let name = self.header.iter().map(|name| name.chars().count()).max().unwrap_or(0);
         let mut lines = Vec::new();
@@ -158,7 +157,7 @@ mod tests {
     use super::*;
 
     fn rows() -> Rows {
-        let mut rows = Rows::under(&["person", "phase margin (deg)", "what is to be said"]);
+        let mut rows = Rows::under(&["person", "phase margin (deg)", "what is to be reported"]);
         rows.add_row(["anna", "13.5 ± 1.9", "at the end of its range"]);
         rows.add_row(["bert", "7 ± 19", ""]);
         rows
@@ -174,7 +173,7 @@ mod tests {
             "zeta_nm",
             "tau_e (s)",
         ];
-        let mut course = Rows::under(&[&["t in s"], names.as_slice()].concat()).in_course();
+        let mut course = Rows::under(&[&["t in s"], names.as_slice()].concat()).as_time_series();
         for t in 1..9 {
             let values = names.iter().map(|_| "0.0914 ± 0.0062".to_owned());
             course.add_row(std::iter::once(format!("{t}.00")).chain(values));
@@ -204,7 +203,7 @@ mod tests {
         assert!(
             whole
                 .lines()
-                .any(|l| l.contains("phase margin (deg)") && l.contains("what is to be said"))
+                .any(|l| l.contains("phase margin (deg)") && l.contains("what is to be reported"))
         );
         assert_eq!(rows().on(Some(110)), whole);
         let narrow = rows().on(Some(38));

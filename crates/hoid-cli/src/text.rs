@@ -31,12 +31,12 @@ pub fn with_uncertainty(e: &Estimate) -> (String, String) {
     numbers::with_uncertainty(e.value, e.standard_error)
 }
 
-/// What the result is worth, on top of it.
+/// Verdict on the result, on top of it.
 pub fn verdict(verdict: &Verdict) -> String {
     format!("{verdict}\n\n")
 }
 
-/// What is behind the page.
+/// Content after the page.
 pub const MORE: &str = "More with -v: what else was tried, tests, every setting; --report DIR writes a page.\n";
 
 /// The same where only settings are.
@@ -45,7 +45,7 @@ pub const MORE_SETTINGS: &str = "More with -v: every setting.\n";
 /// Records that are named one by one.
 const RECORDS_SHOWN: usize = 4;
 
-/// The records in use, and what was done to them.
+/// The records in use, and the processing of them.
 pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbose: bool) -> String {
     let line = |((file, record), account): ((&String, &Record), &Account)| {
         let mut lines = format!(
@@ -76,7 +76,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbo
     };
     let mut text = String::new();
     for (k, one) in all.enumerate() {
-        // What was done to a record is always said, of records alike once.
+        // The processing applied to a record is always reported, once for identical records.
         if verbose || k < shown || !quiet(one.1) {
             text.push_str(&line(one));
         }
@@ -97,7 +97,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbo
 pub fn levels(files: &[String], accounts: &[Account]) -> String {
     let line = |(file, account): (&String, &Account)| {
         let level = account.level.as_ref()?;
-        Some(format!("{file}: level of u beside its response to e: {level}\n"))
+        Some(format!("{file}: level of u next to its response to e: {level}\n"))
     };
     files.iter().zip(accounts).filter_map(line).collect()
 }
@@ -138,7 +138,7 @@ pub fn remnant_orders(grey_box: &GreyBoxFit) -> String {
     format!("{rows}\n\n")
 }
 
-/// The operators of the records behind the first, where a grey box has parameters for each.
+/// The operators of the records after the first, where a grey box has parameters for each.
 pub fn other_records(grey_box: &GreyBoxFit, files: &[String], gain: &GainUnit) -> String {
     let differs = |k: &usize| grey_box.operator_parameters(*k) != grey_box.operator_parameters(0);
     let mut text = String::new();
@@ -167,7 +167,7 @@ pub fn search(fit: &Fit) -> String {
     )
 }
 
-/// What is wrong with the model itself; nothing mostly.
+/// Problems with the model itself; nothing mostly.
 pub fn instability(fit: &Fit) -> &'static str {
     if fit.model().is_stable() {
         ""
@@ -176,7 +176,7 @@ pub fn instability(fit: &Fit) -> &'static str {
     }
 }
 
-/// A number of something in words: "1 step", "2 steps".
+/// A number of something as text: "1 step", "2 steps".
 pub fn counted(n: u64, what: &str) -> String {
     match n {
         1 => format!("1 {what}"),
@@ -184,7 +184,7 @@ pub fn counted(n: u64, what: &str) -> String {
     }
 }
 
-/// How much of u the model tells, in a line.
+/// How much of u the model explains, in a line.
 pub fn fit_line(fit: &Fit, q: &GoodnessOfFit) -> String {
     if fit.model().structure().has_input() {
         format!(
@@ -339,8 +339,9 @@ pub fn crossings(all: &Crossings) -> String {
     line
 }
 
-/// What there is to say of the loop of an estimate beside its lowest crossover: the others, the smallest phase margin,
-/// the gain margin, and that it is not stable. Nothing is said of one that crosses once and is stable, unless it is asked for.
+/// Report of there is to on the loop of an estimate next to its lowest crossover: the others, the smallest phase
+/// margin, the gain margin, and that it is not stable. Nothing is reported about one that crosses once and is stable,
+/// unless it is requested.
 pub fn loop_shape(shape: &LoopShape, always: bool) -> String {
     if !always && shape.crossovers.len() < 2 && shape.is_stable() != Some(false) {
         return String::new();
@@ -415,7 +416,7 @@ pub fn roots(fit: &Fit) -> String {
     format!("{rows}\n")
 }
 
-/// What the residuals say, record by record.
+/// Results of the residuals, record by record.
 pub fn residual_tests(files: &[String], validations: &[Validation]) -> String {
     let mut rows = table(&["residuals of", "Ljung-Box Q", "degrees", "p", "signs"]);
     let (mut coloured, mut missed, mut feedback) = (false, false, false);
@@ -489,7 +490,7 @@ pub fn candidates(choice: &Choice) -> String {
         let value = |f: &hoid::ident::order_selection::CandidateFigures| f.value(choice.criterion);
         value(a.1).total_cmp(&value(b.1))
     });
-    // The usual columns, and the one that decided where it is another.
+    // The default columns, and the one that decided where it is another.
     let decides = !matches!(choice.criterion, Criterion::Loss | Criterion::Aic | Criterion::Bic);
     let mut header = vec!["candidate", "loss", "AIC", "BIC", ""];
     if decides {

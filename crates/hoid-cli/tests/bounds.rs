@@ -1,4 +1,4 @@
-//! Numbers that no work could meet are told at once, with their limit.
+//! Numbers that no work could meet are reported at once, with their limit.
 #![allow(clippy::unwrap_used)]
 
 mod common;

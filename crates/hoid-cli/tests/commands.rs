@@ -115,7 +115,7 @@ fn convert_gives_the_operator_behind_three_poles_and_says_which_is_the_lag() {
         .map(|(name, value)| (name.to_owned(), value)),
     )
     .unwrap();
-    let held = family.hold(hoid::model::SampleTime::HUNDREDTH).unwrap();
+    let held = family.zoh(hoid::model::SampleTime::HUNDREDTH).unwrap();
     let list = |c: &[f64]| c.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
     let (f, b, nk) = (list(&held.f), list(&held.b), held.nk.to_string());
     let arguments = ["convert", "--f", &f, "--b", &b, "--nk", &nk, "--sample-time", "0.01"];

@@ -102,7 +102,7 @@ fn mistakes_have_remedies() {
     }
     let (code, said) = bad(at, &["compare", "."]);
     assert!(code == 1 && said.contains("there is no group.toml"), "{said}");
-    // Nobody has a margin: that is told, and nothing is determined.
+    // No one has a margin: that is reported, and nothing is determined.
     let output = hoid(at, &["compare", "results.json", "--of", "phase_margin"]);
     assert_eq!(output.status.code(), Some(1));
     assert!(String::from_utf8(output.stdout).unwrap().contains("without P03 in fo"));

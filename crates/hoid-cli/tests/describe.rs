@@ -89,7 +89,7 @@ fn simulated_runs_have_their_loop() {
     ] {
         assert!(number(&line[key]).is_finite(), "{key}");
     }
-    // A tenth of the variance is remnant by definition, of which some stands at the lines.
+    // A tenth of the variance is remnant by definition, of which some is at the lines.
     let remnant = &found["remnant"];
     let (share, ratio) = (
         number(&remnant["share"]["value"]),

@@ -1,5 +1,4 @@
-//! Faults of recorded data, as a user meets them: no estimate beyond four standard errors of the truth
-//! without a word.
+//! Faults of recorded data, as a user meets them: no estimate beyond four standard errors of the truth silently.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -200,8 +199,8 @@ fn wrong_units_wrong_columns_and_a_wrong_sign() {
         (kinds(&found), found["verdict"]["level"].as_str()),
         (vec!["sign"], Some("doubtful"))
     );
-    let mended = identified(d, &[&BOX_JENKINS[..], &["--output=-u"]].concat());
-    assert_eq!(mended["verdict"]["level"], "trustworthy", "{}", mended["verdict"]);
+    let repaired = identified(d, &[&BOX_JENKINS[..], &["--output=-u"]].concat());
+    assert_eq!(repaired["verdict"]["level"], "trustworthy", "{}", repaired["verdict"]);
 }
 
 #[test]
@@ -249,11 +248,11 @@ fn an_offset_is_estimated_and_biases_nothing() {
             error > 0.0 && (by - added).abs() < 0.01 * added.abs().max(error),
             "{by} {added}"
         );
-        // As they are: said where it matters.
+        // As they are: reported where it matters.
         let kept = identified(d, &[&BOX_JENKINS[..], &["--detrend", "mean"]].concat());
         assert!(kept["records"][0]["level"].is_null());
         let page = good(d, &[&["identify", "c.csv", "-v"], &BOX_JENKINS[..]].concat());
-        assert!(page.contains("level of u beside its response to e: "), "{page}");
+        assert!(page.contains("level of u next to its response to e: "), "{page}");
         let family = identified(d, &["--form", "lead"]);
         assert!(family["records"][0]["level"]["value"].is_number());
     }

@@ -1,5 +1,5 @@
-//! `hoid fmu`: what goes into a unit, and what is refused. That it runs in a simulator is tested with
-//! the Python package.
+//! `hoid fmu`: what goes into a unit, and the refused input. That it runs in a simulator is tested with the Python
+//! package.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -24,8 +24,8 @@ fn a_unit_is_written_whole_and_the_same_again() {
     let folder = TempDir::new().unwrap();
     library(&folder);
     let with = |more: &[&str]| {
-        let usual = ["fmu", "--library", "libhoid.so", "--out", "a.fmu"];
-        let said = good(folder.path(), &[&usual[..], more].concat());
+        let default = ["fmu", "--library", "libhoid.so", "--out", "a.fmu"];
+        let said = good(folder.path(), &[&default[..], more].concat());
         (said, fs::read(folder.path().join("a.fmu")).unwrap())
     };
     let (said, bytes) = with(&[]);

@@ -139,7 +139,7 @@ fn a_virtual_experiment_is_analysed_and_reported() {
                 measure["standard_error"].as_f64().unwrap(),
             );
             let end = |i: usize| measure["interval"][i].as_f64().unwrap();
-            // Of a mixture over forms, so that it need not be symmetric.
+            // For a mixture over forms, so that it need not be symmetric.
             assert!(error > 0.0 && end(0) < value && value < end(1), "{measure}");
             assert!(end(1) - end(0) > 2.0 * 1.96 * error, "{measure}");
         }
@@ -210,7 +210,7 @@ fn init_looks_at_the_files_and_says_what_it_saw() {
     assert_eq!(condition["controlled_element"].as_str(), Some("1/s"));
     assert_eq!(condition["offset_samples"].as_float(), Some(0.0));
     assert_eq!(manifest["read"]["input"].as_str(), Some("e"));
-    // Each stands below its evidence.
+    // Each is below its evidence.
     for (evidence, line) in [
         ("# the tracking error, by its name", "input = "),
         ("# d has", "excitation = "),
@@ -282,7 +282,7 @@ fn a_manifest_is_made_from_names_and_mistakes_are_named() {
     }
     let joined = text.replace("subject = \"anna\"", "then = \"nothing.csv\"\nsubject = \"anna\"");
     fs::write(at.join("joined.toml"), joined).unwrap();
-    // All runs failed: no result, and what there is to say is written.
+    // All runs failed: no result, and what there is to report is written.
     let output = hoid(at, &["group", "joined.toml", "--out", "joined", "--csv"]);
     let message = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(
@@ -302,7 +302,7 @@ fn a_manifest_is_made_from_names_and_mistakes_are_named() {
 fn people_are_simulated_and_their_options_are_theirs() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
-    let usual = [
+    let default = [
         "simulate-group",
         "--people",
         "--subjects",
@@ -322,7 +322,7 @@ fn people_are_simulated_and_their_options_are_theirs() {
         "--sample-time",
         "0.01",
     ];
-    let said = good(at, &[&usual[..], &more].concat());
+    let said = good(at, &[&default[..], &more].concat());
     assert!(said.contains("1 runs") && said.contains("truth.csv"), "{said}");
     let run = fs::read_to_string(at.join("people/S1_integrator_1.csv")).unwrap();
     assert!(run.starts_with("t,e,u,d,y\n") && run.lines().count() == 4001);

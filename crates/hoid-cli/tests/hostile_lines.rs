@@ -1,5 +1,5 @@
-//! Lines of a stream as nobody wrote them: each that is no comment gives one line of JSON, nothing
-//! ends the stream, and what follows is tracked.
+//! Lines of a stream as no one wrote them: each that is not a comment gives one line of JSON,
+//! nothing ends the stream, and what follows is tracked.
 #![allow(clippy::unwrap_used)]
 
 use std::{

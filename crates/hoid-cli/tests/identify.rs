@@ -66,7 +66,7 @@ fn identify_prints_the_json_of_the_contract() {
     assert_eq!(found["candidates"], serde_json::json!([]));
 }
 
-/// The bytes with which a file begins say what it is, and it has the width that was asked for.
+/// The bytes with which a file starts report what it is, and it has the width that was requested.
 #[test]
 #[cfg(feature = "pdf-png")]
 fn a_figure_is_a_page_or_a_picture_as_its_name_says() {
@@ -83,7 +83,7 @@ fn a_figure_is_a_page_or_a_picture_as_its_name_says() {
     assert!(pdf.starts_with(b"%PDF-") && text.contains("/MediaBox [0 0 240.9") && text.contains("/Font"));
     let png = draw("bode.png");
     assert!(png.starts_with(b"\x89PNG\r\n\x1a\n"));
-    // At 300 dots an inch; the width stands in the first chunk.
+    // At 300 dots an inch; the width is in the first chunk.
     let width = u32::from_be_bytes(png[16..20].try_into().unwrap());
     assert!(width.abs_diff(1004) <= 4, "{width}");
 }
@@ -260,7 +260,7 @@ fn a_change_is_found_and_its_gains_are_written() {
     assert!((midpoint["value"].as_f64().unwrap() - 40.96).abs() < 3.0, "{midpoint}");
     let trace = fs::read_to_string(d.join("trace.csv")).unwrap();
     assert!(trace.contains("t,K_e,K_e_se,T_L,T_L_se,K_e_dot,K_e_dot_se"));
-    // 8192 rows behind two comments and the header.
+    // 8192 rows after two comments and the header.
     assert_eq!(trace.lines().count(), 8195);
 }
 
@@ -446,7 +446,7 @@ fn a_loop_that_is_not_stable_is_a_doubt() {
     );
 }
 
-/// What anybody tries first: a simulation without noise gives its operator back, and says that there is no noise.
+/// What anyone tries first: a simulation without noise gives its operator back, and reports that there is no noise.
 #[test]
 fn a_simulation_without_noise_gives_its_operator_back() {
     let directory = TempDir::new().unwrap();
@@ -518,7 +518,7 @@ fn a_simulation_with_little_noise_is_identified() {
             (&"lead".into(), &"trustworthy".into()),
             "{level}"
         );
-        // Of a gain: 0.3 sqrt(share), and some rounding.
+        // For a gain: 0.3 sqrt(share), and some rounding.
         let allowed = 0.3 * level.parse::<f64>().unwrap().sqrt();
         for (name, expected) in [("K_e", 0.09), ("K_e_dot", 0.036), ("tau_e", 0.28)] {
             let value = found["operator"][name]["value"].as_f64().unwrap();
@@ -527,8 +527,8 @@ fn a_simulation_with_little_noise_is_identified() {
     }
 }
 
-/// The delay of a person whose error was logged at a tenth of its rate is right by one of the two values, and by the course
-/// that is asked for.
+/// The delay of a person whose error was logged at a tenth of its rate is right by one of the two values, and by the
+/// course that is requested.
 #[test]
 fn the_course_between_samples_moves_the_delay_by_half_a_sample() {
     let directory = simulated();

@@ -1,5 +1,5 @@
-//! One look at a file: `hoid info`, `hoid group init`, `identify`, `describe` and `track` see the same columns
-//! and the same span, and say what to type.
+//! One look at a file: `hoid info`, `hoid group init`, `identify`, `describe` and `track` see the same columns and the
+//! same span, and report what to type.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -10,7 +10,7 @@ use tempfile::TempDir;
 
 use common::{bad, good, hoid, json, wave, write};
 
-/// A person on an integrator, recorded as time, r, y and u: two periods of 20 s, begun 3 s before the first and
+/// A person on an integrator, recorded as time, r, y and u: two periods of 20 s, started 3 s before the first and
 /// stopped 1 s after the last.
 fn recorded() -> TempDir {
     let directory = TempDir::new().unwrap();
@@ -27,7 +27,7 @@ fn recorded() -> TempDir {
     for k in 0..2640_usize {
         // Columns t, e, u, d, y, of which the last rows come first again.
         let row = &rows[(k + 2400 - 180) % 2400];
-        // No target before the first period and behind the last.
+        // No target before the first period and after the last.
         let (r, e) = (if !(180..2580).contains(&k) { 0.0 } else { row[3] }, row[1]);
         csv.push_str(&format!("{},{r},{},{}\n", k as f64 / 60.0, r - e, row[2]));
     }
@@ -81,7 +81,7 @@ fn one_file_has_one_reading() {
     );
     assert_eq!(manifest["conditions"]["so"]["excitation"].as_str(), Some("r"));
 
-    // Without the columns each says which they are, and what it says can be typed.
+    // Without the columns each reports which they are, and what it reports can be typed.
     for (verb, more) in [
         ("identify", &[][..]),
         ("describe", &[]),
@@ -97,7 +97,7 @@ fn one_file_has_one_reading() {
         let found = json(at, &[&command[..], &["--from", "3", "--to", "43", "--json"]].concat());
         assert_eq!(found["records"][0]["samples"], 2400, "{verb}");
     }
-    // What was typed is replaced; of another name a near one is looked for.
+    // What was typed is replaced; of another name a near one is searched for.
     let (_, message) = bad(at, &["identify", file, "--input", "R"]);
     assert!(message.contains("did you mean \"r\"?"), "{message}");
     let (_, message) = bad(at, &["identify", file, "--input=e", "--output", "u"]);
@@ -138,7 +138,7 @@ fn nothing_is_guessed_where_it_is_not_certain() {
     }
     let named = ["info", "two.csv", "--input", "r-y", "--excitation", "none"];
     let said = good(at, &named);
-    assert!(said.contains("excitation  as asked for") && said.contains("Next: hoid identify two.csv --input r-y"));
+    assert!(said.contains("excitation  as requested") && said.contains("Next: hoid identify two.csv --input r-y"));
     let (code, _) = bad(at, &["info", "empty.csv"]);
     assert_eq!(code, 1);
 }
@@ -235,7 +235,7 @@ fn a_delay_in_seconds_is_nk() {
     }
 }
 
-/// What `info` says of a cell is what a reader makes of it.
+/// What `info` states of a cell is what a reader makes of it.
 #[test]
 fn a_cell_is_the_same_to_info_and_to_who_reads_it() {
     let directory = TempDir::new().unwrap();

@@ -1,4 +1,4 @@
-//! What is in a file, and what is said where it or the command line is not as it should be.
+//! Contents of a file, and the report where it or the command line is not as it should be.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -51,7 +51,7 @@ fn info_shows_what_is_inside() {
         assert!(text.contains(words), "{words}: {text}");
     }
     fs::write(at.join("bad.mat"), "t,e,u").unwrap();
-    assert!(bad(at, &["info", "bad.mat"]).1.contains("is no MATLAB file"));
+    assert!(bad(at, &["info", "bad.mat"]).1.contains("is not a MATLAB file"));
 }
 
 #[test]

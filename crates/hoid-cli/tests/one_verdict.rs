@@ -14,7 +14,7 @@ const ELEMENT: &str = "90/(s(s+6))";
 const ROWS: usize = 4096;
 
 type Rows = Vec<[f64; 2]>;
-/// What a fault is called, and how it comes into a recording.
+/// Name of a fault, and how it comes into a recording.
 type Spoilt = (&'static str, fn(&mut Rows));
 
 /// What went wrong with both runs of a person.

@@ -222,7 +222,7 @@ fn a_reader_that_leaves_early_ends_nothing_else() {
         );
         let _ = fs::remove_dir_all(directory.path().join("h"));
     }
-    // The trace is there, whole, though nobody read the page.
+    // The trace is there, whole, though no one read the page.
     let rows = fs::read_to_string(directory.path().join("trace.csv")).unwrap();
     assert!(rows.lines().count() > 8192);
 }
@@ -286,7 +286,7 @@ structure = "arx"
 orders.nk = 29
 "#;
 
-/// True where a program started from here is not to end with its terminal (`nohup`), and rightly goes on.
+/// True if a program started from here is not to end with its terminal (`nohup`), and rightly continues.
 #[cfg(unix)]
 fn hang_up_is_ignored() -> bool {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -335,7 +335,7 @@ fn signals_end_with_their_code_and_leave_nothing() {
     }
 }
 
-/// Estimates with errors and intervals, for a paper: what the JSON says.
+/// Estimates with errors and intervals, for a paper: what the JSON states.
 #[test]
 fn a_result_is_a_table_for_a_paper() {
     let directory = simulated();

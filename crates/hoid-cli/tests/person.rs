@@ -96,7 +96,7 @@ fn a_person_is_found_by_default() {
         assert!(!found[key].is_null(), "{key}");
     }
     assert!(found["forms"].as_array().unwrap().len() == 8);
-    // The element is 1/s: with ten times its gain, or with 1/s^2, nobody could have held this loop.
+    // The element is 1/s: with ten times its gain, or with 1/s^2, no one could have held this loop.
     for wrong in ["10/s", "1/s^2", "0.001/s"] {
         let last = arguments.len() - 1;
         arguments[last] = wrong;

@@ -1,4 +1,4 @@
-//! Rates above 200 Hz: filtered and decimated by themselves, said in the result, and the same person.
+//! Rates above 200 Hz: filtered and decimated automatically, stated in the result, and the same person.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -16,11 +16,11 @@ use tempfile::TempDir;
 
 use common::{bad, good, hoid, json};
 
-/// A run of C1, or of a person with an element, at so many Hz.
+/// A run of C1, or of a person with an element, at a given number of Hz.
 fn simulate(at: &Path, person: &str, hz: f64, seed: u64) -> String {
     let file = format!("{person}-{hz}-{seed}.csv");
     let (ts, seed) = (format!("{:?}", 1.0 / hz), seed.to_string());
-    // Four periods, or three where these are no whole samples of four.
+    // Four periods, or three where these are not whole samples of four.
     let (measurement_s, run_in_s) = if ts == "0.003" { (60.0, 6.0) } else { (80.0, 8.0) };
     let toml = |form: &str, gains: &str, element: &str| {
         format!(
@@ -246,7 +246,7 @@ fn a_stream_at_1000_hz_is_the_track() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let file = simulate(at, "lead", 1000.0, 1);
-    // Of any worth: 20 s are few.
+    // For any worth: 20 s are few.
     hoid(at, &["track", &file, "--to", "20", "--out", "trace.csv"]);
     let text = fs::read_to_string(at.join(&file)).unwrap();
     let rows: Vec<&str> = text
@@ -271,7 +271,7 @@ fn a_stream_at_1000_hz_is_the_track() {
         .lines()
         .map(|line| serde_json::from_str(line).unwrap())
         .collect();
-    // A line for each line, and nothing but samples behind the header.
+    // A line for each line, and nothing but samples after the header.
     assert_eq!(answers.len(), rows.len() - 1);
     let last = &answers[answers.len() - 1];
     let decimated = &last["decimated"];
@@ -283,7 +283,7 @@ fn a_stream_at_1000_hz_is_the_track() {
     assert!((0.1..0.2).contains(&behind_s), "{behind_s}");
     let told = String::from_utf8(output.stderr).unwrap();
     assert!(told.contains("filtered and decimated by 10 to 100 Hz"), "{told}");
-    // Of the same sample the digits are those of the track.
+    // For the same sample the digits are those of the track.
     let trace = fs::read_to_string(at.join("trace.csv")).unwrap();
     let mut table = trace.lines().filter(|line| !line.starts_with('#'));
     let names: Vec<&str> = table.next().unwrap().split(',').collect();

@@ -20,8 +20,8 @@ const FIT: [&str; 8] = [
     "run.csv",
 ];
 
-/// A simulated run, e in rad, u recorded two samples late, t from 100 s on; some rows are told by
-/// `row`.
+/// A simulated run, e in rad, u recorded two samples late, t from 100 s on; some rows are reported
+/// by `row`.
 fn recorded(row: impl Fn(usize, [f64; 3]) -> Vec<[f64; 3]>) -> TempDir {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
@@ -168,7 +168,7 @@ fn what_is_done_is_told_in_every_form() {
 
 #[test]
 fn trouble_is_shown_and_handled_only_as_asked() {
-    // Every five hundredth row is there twice, 20 rows are missing, u is clipped.
+    // Every five hundredth row is duplicated, 20 rows are missing, u is clipped.
     let directory = recorded(|k, [t, e, u]| {
         let values = [t, e, u.clamp(-0.15, 0.15)];
         match k {
@@ -195,14 +195,14 @@ fn trouble_is_shown_and_handled_only_as_asked() {
     let text = good(at, &["info", "run.csv"]);
     for words in [
         "Trouble:",
-        "7 rows are there twice, time included",
+        "7 rows are duplicated, time included",
         "remedy: drop them with --drop-repeated",
-        "20 rows missing in 1 place, the first behind row",
+        "20 rows missing in 1 place, the first after row",
         "u stays at its largest value, 0.15",
     ] {
         assert!(text.contains(words), "{words}: {text}");
     }
-    // Nothing is mended unasked.
+    // Nothing is repaired unasked.
     let (code, message) = bad(at, &["identify", "run.csv"]);
     assert!(code == 1 && message.contains("expected increasing time"), "{message}");
     let (code, message) = bad(at, &["identify", "run.csv", "--drop-repeated"]);

@@ -1,4 +1,4 @@
-//! What the screen shows: the answer first and on one page, details on demand, remarks after it and
+//! Results of the screen: the answer first and on one page, details on demand, remarks after it and
 //! once, at any width; help, completions and manual pages.
 
 #![allow(clippy::unwrap_used)]
@@ -29,7 +29,7 @@ const FIT: [&str; 8] = [
     "nd=1",
 ];
 
-/// Standard output on a screen of so many columns.
+/// Standard output on a screen of a given number of columns.
 fn at_width(directory: &Path, columns: &str, arguments: &[&str]) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_hoid"))
         .args(arguments)
@@ -207,9 +207,9 @@ fn files_of_a_newcomer_are_read_or_answered_with_what_to_do() {
         let page = good(d, &[&["identify", file], &own[..], more].concat());
         page.replace(file, "FILE")
     };
-    let usual = page("mine.csv", &[]);
-    assert_eq!(page("comma.csv", &[]), usual);
-    assert!(!usual.contains("deg"), "no file says a unit: {usual}");
+    let default = page("mine.csv", &[]);
+    assert_eq!(page("comma.csv", &[]), default);
+    assert!(!default.contains("deg"), "no file states a unit: {default}");
     assert_eq!(
         page("mine.csv", &["--unit", "e=degrees,u=radians"]),
         page("mine.csv", &["--unit", "e=deg,u=rad"])
@@ -230,8 +230,8 @@ fn choices_and_delays_as_people_type_them() {
     let directory = simulated();
     let d = directory.path();
     let page = |arguments: &[&str]| good(d, &[&["identify", "1.csv", "--orders", "nd=1"], arguments].concat());
-    let usual = page(&["--structure", "bj", "--nk", "29"]);
-    assert_eq!(page(&["--structure", "BJ", "--nk", "0.28s"]), usual);
+    let default = page(&["--structure", "bj", "--nk", "29"]);
+    assert_eq!(page(&["--structure", "BJ", "--nk", "0.28s"]), default);
     assert!(page(&["--nk", "0.27s..0.29s"]).contains("BJ(nb=2, nd=1, nf=2, nk=29)"));
 }
 

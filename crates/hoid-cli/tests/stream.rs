@@ -85,7 +85,7 @@ impl Stream {
         assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
     }
 
-    /// Waits for the end: how it ended, the lines that were left, what it said.
+    /// Waits for the end: how it ended, the lines that were left, what it reported.
     fn end(mut self) -> (ExitStatus, Vec<String>, String) {
         drop(self.input.take());
         let begun = Instant::now();
@@ -328,7 +328,7 @@ fn a_wild_value_and_a_hostile_span_are_told_in_their_lines() {
         "{events:?}"
     );
     assert!((span["from"].as_f64().unwrap() - 30.0).abs() < 0.2, "{span}");
-    // In the pause the estimate stands still, and is no more than doubtful.
+    // In the pause the estimate stays constant, and is no more than doubtful.
     assert!((paused + 1..*restarted).all(|k| answers[k]["level"] != "trustworthy"));
     assert_eq!(answers[paused + 1]["parameters"], answers[restarted - 1]["parameters"]);
     let last = answers.last().unwrap();
@@ -337,7 +337,7 @@ fn a_wild_value_and_a_hostile_span_are_told_in_their_lines() {
         (&1.into(), &"trustworthy".into()),
         "{last}"
     );
-    assert!(said.contains("begun again 1 time."), "{said}");
+    assert!(said.contains("started again 1 time."), "{said}");
 }
 
 #[test]
@@ -429,7 +429,7 @@ fn a_warm_up_that_fails_goes_on_until_there_is_something_to_fit() {
     let directory = TempDir::new().unwrap();
     let text = simulated(directory.path(), "1");
     let mut input = String::new();
-    // Silence, then the run: what is silent is left out, and the warm-up waits for as much of the run.
+    // Silence, then the run: the silence is left out, and the warm-up waits for as much of the run.
     for _ in 0..600 {
         input.push_str("0,0\n");
     }
@@ -453,11 +453,11 @@ fn a_warm_up_that_fails_goes_on_until_there_is_something_to_fit() {
     let last = lines.last().unwrap();
     assert_eq!(last["operator"]["convertible"], true, "{last}");
     assert!(said.contains("started after"), "{said}");
-    // A stream that ends before says so.
+    // A stream that ends before reports it.
     let (lines, said) = answers(&arguments, "0.1,0.2\n0.2,0.1\n");
     assert_eq!(lines.len(), 2);
     assert!(said.contains("The warm-up did not end: 2 of 600"), "{said}");
-    // Faults within the warm-up: a short one is bridged, a long one begins it anew.
+    // Faults within the warm-up: a short one is bridged, a long one starts it again.
     let mut input: String = (0..50).map(|k| format!("{},{}\n", wave(k).0, wave(k).1)).collect();
     input.push_str("nan,0\n0.1,0.2\n");
     let (lines, _) = answers(&arguments, &input);

@@ -38,7 +38,7 @@ fn told(stream: &Stream) -> Value {
     serde_json::from_slice(&stream.answer()).unwrap()
 }
 
-/// Lost, doubled and late samples are told by their sequence, as by a column t.
+/// Lost, doubled and late samples are reported by their sequence, as by a column t.
 #[cfg(unix)]
 #[test]
 fn lost_samples_are_bridged_and_counted() {
@@ -52,7 +52,7 @@ fn lost_samples_are_bridged_and_counted() {
         udp.send(&as_struct(k, f64::NAN, 0.0, 0.0));
         udp.estimate();
     }
-    // A line asks how it stands.
+    // A line requests its state.
     udp.send(b"2.00,0.1,0.2");
     let line = told(&udp);
     assert_eq!((&line["skipped"], &line["dropped"]), (&5.into(), &2.into()), "{line}");
@@ -108,13 +108,13 @@ fn hostile_datagrams_are_counted() {
     for bytes in hostile {
         udp.send(bytes);
     }
-    // Nothing at all, and what says nothing, is not even counted.
+    // Nothing at all, and what carries no information, is not even counted.
     udp.send(b"");
     udp.send(b"# a comment\n\n");
     udp.socket.set_read_timeout(Some(SHORT)).unwrap();
-    assert_eq!(udp.receive(&mut [0; 16]), None, "no answer for what is no sample");
+    assert_eq!(udp.receive(&mut [0; 16]), None, "no answer for what is not a sample");
     udp.socket.set_read_timeout(Some(PATIENCE)).unwrap();
-    // Values that are none are samples with a fault.
+    // Invalid values are samples with a fault.
     udp.send(&as_struct(2, f64::NAN, f64::INFINITY, f64::NAN));
     assert!(udp.estimate().1[17].is_nan());
     udp.send(b"0.03,0.1,0.2");

@@ -303,7 +303,7 @@ fn the_default_needs_nothing_and_tells_the_loop() {
     let found = json(d, &arguments);
     assert_eq!(found["method"], "adaptive");
     assert!(found["start"].is_null());
-    assert_eq!(setting(&found, "start"), "what is usual of people");
+    assert_eq!(setting(&found, "start"), "the defaults for people");
     assert_eq!(setting(&found, "response at"), "1, 2.5 rad/s");
     let trace = trace(d);
     // The first second gives the scale of the gains; then there are bands, which become narrower.
@@ -321,7 +321,7 @@ fn the_default_needs_nothing_and_tells_the_loop() {
     let without = column(&trace, "crossover_rad_s").iter().filter(|w| w.is_nan()).count();
     assert_eq!(found["rows_without_crossover"], without);
     assert!(without == 0 || found["no_crossover_reason"].is_string());
-    // Before the data say something of the neuromuscular system, that is said.
+    // Before the data carry information about the neuromuscular system, that is reported.
     let determined = column(&trace, "omega_nm_determined");
     assert!(determined[..300].iter().all(|v| *v == 0.0));
     assert!(determined[1500..].iter().all(|v| *v == 1.0));
@@ -343,7 +343,8 @@ fn the_default_needs_nothing_and_tells_the_loop() {
     assert!(page.contains("Open loop at 81.91 s: crossover"), "{page}");
 }
 
-/// The same numbers by the earlier name of a method; that it is one is said on standard error alone.
+/// The same numbers by the earlier name of a method; that it is one is reported on standard error
+/// alone.
 #[test]
 fn an_earlier_name_of_a_method_is_read_and_said_to_be_one() {
     let directory = simulated("C1");
@@ -390,9 +391,9 @@ fn a_person_is_followed_from_an_earlier_fit_of_them() {
     assert_eq!(setting(&found, "prior"), "fit.json");
     let known = trace(d);
     json(d, &["track", "c.csv", "--out", "trace.csv", "--json", "--at", "2.5"]);
-    let usual = trace(d);
+    let default = trace(d);
     // There from the first sample on, and for the first seconds known better than without.
-    let (of_known, of_usual) = (column(&known, "gain_db@2.5_se"), column(&usual, "gain_db@2.5_se"));
+    let (of_known, of_usual) = (column(&known, "gain_db@2.5_se"), column(&default, "gain_db@2.5_se"));
     assert!(of_known[0].is_finite() && of_usual[0].is_nan());
     assert!(
         (150..800).all(|k| of_known[k] < of_usual[k]),
@@ -405,7 +406,7 @@ fn a_person_is_followed_from_an_earlier_fit_of_them() {
     let off = |k: usize| (gain[k] - 0.036).abs();
     assert!((0..gain.len()).all(|k| off(k) < 2.0 * error[k] && off(k) < 0.02));
     assert!(off(8191) < 0.003, "{}", gain[8191]);
-    // What does not fit together is told before the work.
+    // What does not fit together is reported before the work.
     good(
         d,
         &[

@@ -1,4 +1,4 @@
-//! What results are worth, as a user reads it.
+//! Reliability of results, as a user reads it.
 #![allow(clippy::unwrap_used)]
 
 mod common;

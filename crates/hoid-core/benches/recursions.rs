@@ -9,8 +9,9 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use hoid_core::{
     adaptation::Forgetting,
     adaptive::{
-        AdaptiveFilter, memory_needed,
-        usual::{REPLAYED_S, Usual},
+        AdaptiveFilter,
+        defaults::{DefaultOperator, REPLAYED_S},
+        memory_needed,
     },
     covariance::Covariance,
     error_bars::{ErrorBars, NoErrorBars},
@@ -172,14 +173,14 @@ fn plain(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
     }
 }
 
-/// A person in the basis that people share, at its usual settings.
+/// A person in the basis that people share, at its default settings.
 fn person() -> AdaptiveFilter<Vec<f64>> {
-    let (usual, ts) = (Usual::with_delay(0.285), 0.01);
+    let (default_operator, ts) = (DefaultOperator::with_delay(0.285), 0.01);
     let memory = vec![0.0; memory_needed(ts, REPLAYED_S)];
-    AdaptiveFilter::new(usual.prior(ts), memory).unwrap()
+    AdaptiveFilter::new(default_operator.prior(ts), memory).unwrap()
 }
 
-/// Goes on with a person: from the beginning, where replays are short, or from where they are long.
+/// Continues with a person: from the start, where replays are short, or from where they are long.
 fn follow(mut person: AdaptiveFilter<Vec<f64>>, data: &[(f64, f64)], history: &mut Vec<f64>) {
     history.clear();
     for &(x, u) in data {
@@ -205,7 +206,7 @@ fn bench(c: &mut Criterion) {
     let mut h5: Vec<[f64; 5]> = Vec::with_capacity(SAMPLES);
     let bj = FixedShape::<0, 2, 0, 1, 2>;
     group.bench_function("rpem 5", |b| b.iter(|| rpem::<_, 5, 2>(bj, scalar(), data, &mut h5)));
-    group.bench_function("rpem 5, usual error bars", |b| {
+    group.bench_function("rpem 5, default error bars", |b| {
         b.iter(|| rpem::<_, 5, 0>(bj, scalar(), data, &mut h5))
     });
     group.bench_function("rpem 5, no error bars", |b| b.iter(|| bare_rpem(data, &mut h5)));
@@ -227,7 +228,7 @@ fn bench(c: &mut Criterion) {
         b.iter(|| rls(any(16, 16, 0, 0), scalar(), data, &mut h32))
     });
     let mut innovations: Vec<f64> = Vec::with_capacity(SAMPLES);
-    group.bench_function("adaptive, from the beginning", |b| {
+    group.bench_function("adaptive, from the start", |b| {
         b.iter(|| follow(person(), data, &mut innovations))
     });
     let mut later = person();

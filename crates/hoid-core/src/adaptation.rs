@@ -36,7 +36,7 @@ pub enum Forgetting<const N: usize> {
     },
     /// A scalar factor that falls where the innovations are larger than their variance explains.
     Variable {
-        /// Memory N_0 in samples while the innovations are as large as their variance says.
+        /// Memory N_0 in samples while the innovations are as large as their variance reports.
         memory: f64,
         /// Smallest factor.
         smallest: f64,
@@ -70,11 +70,11 @@ impl<const N: usize> ParameterStep<N> {
     };
 }
 
-/// What turns gradients into steps: [`crate::covariance::Covariance`] and
+/// An adaptation, which turns gradients into steps: [`crate::covariance::Covariance`] and
 /// [`crate::window::Window`].
 pub trait Adaptation<const N: usize> {
-    /// The step for psi and the innovation eps at theta. `variance` is sigma^2, zero where it is
-    /// not known.
+    /// The step for psi and the innovation eps at theta. `variance` is sigma^2, zero if it is not
+    /// known.
     fn update(&mut self, psi: &[f64; N], eps: f64, theta: &[f64; N], variance: f64) -> ParameterStep<N>;
     /// Covariance of theta over sigma^2, for an adaptation that knows it without [`ErrorBars`].
     fn own_covariance(&self) -> Option<[[f64; N]; N]> {

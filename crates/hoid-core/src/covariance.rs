@@ -1,11 +1,11 @@
 //! The gain of the prediction-error method: P with a rule of forgetting and a guard against windup.
 //!
-//! The equations stand in [`crate::adaptation`].
+//! The equations are in [`crate::adaptation`].
 //!
 //! **Windup.** Where nothing excites a direction, forgetting alone would let P grow without limit.
 //! In turn each parameter gets a pseudo-measurement of the value that it has: the estimate stays,
-//! and `P^{-1} >= diag(1/bound_i)` up to what is forgotten in one round. Its information is the
-//! part of `1/bound_i` that was forgotten since the last turn of that parameter.
+//! and `P^{-1} >= diag(1/bound_i)` up to the forgetting of one round. Its information is the part
+//! of `1/bound_i` that was forgotten since the last turn of that parameter.
 
 use crate::{
     adaptation::{Adaptation, Forgetting, ParameterStep},
@@ -22,7 +22,7 @@ const NO_EXCITATION: f64 = 1e-100;
 const POWER_WEIGHT: f64 = 0.01;
 /// c of the normalised gradient, relative to the largest mean power of psi.
 const GRADIENT_OFFSET: f64 = 0.01;
-/// What an early sample forgets in addition is over below this.
+/// Lower limit of the additional forgetting of early samples.
 const NO_EARLY_FORGETTING: f64 = 1e-9;
 /// Longest period of the guard in samples.
 const LONGEST_PERIOD: f64 = 64.0;
@@ -42,11 +42,11 @@ pub struct Covariance<const N: usize> {
     bound: [f64; N],
     /// Information of the pseudo-measurement of each parameter, per unit of what is forgotten.
     guard: [f64; N],
-    /// What has been forgotten since the start, now and at the last pseudo-measurement of each
+    /// Accumulated forgetting since the start, now and at the last pseudo-measurement of each
     /// parameter.
     forgotten: f64,
     forgotten_at_turn: [f64; N],
-    /// What an early sample forgets in addition, and the factor by which that decays from sample to
+    /// Additional forgetting of an early sample, and the factor by which that decays from sample to
     /// sample.
     early: f64,
     early_decay: f64,
@@ -138,8 +138,8 @@ impl<const N: usize> Covariance<N> {
         self.factors.matrix()
     }
 
-    /// The step by every rule and at every time; [`Adaptation::update`] has the usual case beside
-    /// it.
+    /// The step by every rule and at every time; [`Adaptation::update`] has the typical case next
+    /// to it.
     #[inline(never)]
     fn update_by_rule(&mut self, psi: &[f64; N], eps: f64, variance: f64) -> ParameterStep<N> {
         if self.early > NO_EARLY_FORGETTING {
@@ -180,6 +180,8 @@ impl<const N: usize> Covariance<N> {
 
     /// `sum_of_squares` is N_0 sigma^2.
     fn update_variable(&mut self, psi: &[f64; N], eps: f64, sum_of_squares: f64, smallest: f64) -> ParameterStep<N> {
+        // 1 + psi' P psi is the variance of the innovation over sigma^2. An innovation larger than this explains
+        // shortens the memory.
         let denominator = 1.0 + self.factors.quadratic_form(psi);
         let gain = self.factors.measurement_update(psi, 1.0);
         let expected = denominator * sum_of_squares;
@@ -208,6 +210,7 @@ impl<const N: usize> Covariance<N> {
     fn update_gradient(&mut self, psi: &[f64; N], eps: f64, rate: f64) -> ParameterStep<N> {
         let power: f64 = psi.iter().map(|p| p * p).sum();
         self.power += (power - self.power) * POWER_WEIGHT;
+        // The offset keeps the step bounded where psi vanishes: rate psi/psi'psi would grow without limit.
         self.largest_power = self.largest_power.max(self.power);
         let denominator = GRADIENT_OFFSET * self.largest_power + power;
         let scale = if denominator > 0.0 { rate / denominator } else { 0.0 };
@@ -251,7 +254,7 @@ impl<const N: usize> Adaptation<N> for Covariance<N> {
     fn update(&mut self, psi: &[f64; N], eps: f64, _theta: &[f64; N], variance: f64) -> ParameterStep<N> {
         let exponential = matches!(self.forgetting, Forgetting::Exponential { .. });
         if !exponential || self.early > NO_EARLY_FORGETTING {
-            // A copy, so that psi can stay in registers in the usual case.
+            // A copy, so that psi can stay in registers in the typical case.
             let psi = *psi;
             return self.update_by_rule(&psi, eps, variance);
         }

@@ -10,7 +10,7 @@
 //! same functions, only evaluated in different ways so that nothing cancels:
 //!
 //! - small poles: the relation between the Phi_j downwards from `Phi_j = 1/j!` (Clenshaw's
-//!   summation), beside it the same for the slopes `D_j = dPhi_j/ds`,
+//!   summation), next to it the same for the slopes `D_j = dPhi_j/ds`,
 //!   `D_j = Phi_{j+1} + s D_{j+1} - q D_{j+2}`. No division, and no elementary function;
 //! - other poles: with `h = s/2`, `x = h^2 - q`, `E = e^h`, `C = cosh sqrt x`,
 //!   `S = sinh sqrt x/sqrt x`, `G = dS/dx = (C - S)/(2x)`, `Phi_1 = E S`,
@@ -237,9 +237,9 @@ mod tests {
         ]
     }
 
-    /// What rounding is measured by: the values themselves; where they pass zero, which they do
-    /// among fast complex poles, the amplitudes of sine and cosine; for those that are sums of
-    /// others, the sum of the magnitudes.
+    /// Scale of rounding errors: the values themselves; where they pass zero, which they do among
+    /// fast complex poles, the amplitudes of sine and cosine; for those that are sums of others,
+    /// the sum of the magnitudes.
     fn scales(s: f64, q: f64, values: &[f64; 8]) -> [f64; 8] {
         let [mut mean, mut phi1, phi2, mut phi2_slope, ..] = values.map(f64::abs);
         let x = s * s / 4.0 - q;

@@ -20,10 +20,10 @@
 //! thirds of the products are shared. No assumption is made about g: the error bars hold for a
 //! scalar factor, where they tend to `P/(1 + lambda)` for ARX (L. Ljung and T. Söderström, *Theory
 //! and Practice of Recursive Identification*, 1983, eq. 4.136), for a forgetting matrix, a
-//! shortened step, or a gradient. Without forgetting `Sigma` becomes P. The usual `h = psi` is the
-//! same for an estimate that does not move within the memory of the filters. Where the memory of
-//! the estimate is not much longer than that of 1/F, its variances are up to a third too small; a
-//! step costs half. K = 0 (no errors of filters) chooses it.
+//! shortened step, or a gradient. Without forgetting `Sigma` becomes P. The default `h = psi` is
+//! the same for an estimate that does not move within the memory of the filters. Where the memory
+//! of the estimate is not much longer than that of 1/F, its variances are up to a third too small;
+//! a step costs half. K = 0 (no errors of filters) chooses it.
 //!
 //! **Outliers.** An innovation beyond a few sigma moves the estimate as if it were at that limit
 //! (P. J. Huber, *Robust Statistics*, 1981, section 7.3; the gain in the equations above is then
@@ -79,7 +79,7 @@ pub trait ErrorPropagation<const N: usize, const K: usize>: State {
     fn propagate(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>);
     /// Adds the variance by which parameter i drifts in a sample, up to `bound`.
     fn add_drift(&mut self, i: usize, variance: f64, bound: f64);
-    /// Innovation variance sigma^2; `None` where it is not estimated.
+    /// Innovation variance sigma^2; `None` if it is not estimated.
     fn variance(&self) -> Option<f64>;
 }
 

@@ -204,7 +204,7 @@ mod tests {
         for n in 0..=d.len() {
             let mut whole = wave(200);
             divide_in_place(&d[..n], &mut whole);
-            // A cut behind one sample, too: what the filter has not seen is zero.
+            // A cut after one sample, too: what the filter has not seen is zero.
             for cut in [1, 3, 64] {
                 let mut parts = wave(200);
                 divide_in_place(&d[..n], &mut parts[..cut]);

@@ -125,7 +125,7 @@ impl Poles {
     }
 }
 
-/// What K_e and K_e_dot contribute to the step response at one time, with derivatives; `dA/dt` is
+/// Contributions of K_e and K_e_dot to the step response at one time, with derivatives; `dA/dt` is
 /// R.
 #[derive(Debug, Clone, Copy)]
 struct Gains {

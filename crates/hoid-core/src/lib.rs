@@ -1,5 +1,4 @@
-//! Recursive identification of a human operator in real time: what runs once per sample, beside a
-//! control loop.
+//! Recursive identification of a human operator in real time: what runs once per sample, next to a control loop.
 //!
 //! A person steers a machine by the tracking error e and gives the control output u. Their dynamics
 //! change as they learn, tire or adapt to the machine. The recursions of this crate estimate a
@@ -19,11 +18,10 @@
 //! predictor unstable is halved until it does not. The error bars follow the error of the estimate
 //! through the recursion, whatever the gain, in units of the innovation variance sigma^2.
 //!
-//! **Real time.** `no_std`, no allocation, no dependency but small systems of equations
-//! (`hoid-numerics`) and elementary functions (`libm`). Every
-//! routine works in memory that the caller owns and has a bounded number of operations. The numbers
-//! of a recursion can be saved and restored ([`mod@state`]). Batch estimators and simulator of hoid
-//! stand on the same filters, so that a recursion and its batch counterpart cannot differ in them.
+//! **Real time.** `no_std`, no allocation, no dependency but small systems of equations (`hoid-numerics`) and
+//! elementary functions (`libm`). Every routine works in memory that the caller owns and has a bounded number of
+//! operations. The numbers of a recursion can be saved and restored ([`mod@state`]). Batch estimators and simulator of
+//! hoid are on the same filters, so that a recursion and its batch counterpart cannot differ in them.
 //!
 //! ```
 //! use hoid_core::{
@@ -65,7 +63,7 @@
 //! # Ok::<(), &str>(())
 //! ```
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`rls`], [`rpem`] | the recursions: least squares, prediction-error method |
 //! | [`adaptive`] | gains in a basis that people share, a noise model and a level of its own, a test for changes |
@@ -78,7 +76,7 @@
 //! | [`guard`] | samples and spans that no tracking signal makes, before a recursion sees them |
 //! | [`held_operator`], [`divided_differences`] | exact zero-order hold of the operator with any delay, and its Jacobian; the functions that it is made of |
 //! | [`filter`], [`delay`], [`stability`] | rational filters over slices, a delay line, the Schur-Cohn test |
-//! | [`mod@state`] | the numbers that change, to save a recursion and go on elsewhere |
+//! | [`mod@state`] | the numbers that change, to save a recursion and continue elsewhere |
 #![no_std]
 
 #[cfg(test)]

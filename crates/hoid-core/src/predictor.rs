@@ -27,8 +27,8 @@
 //! which the recursion converges faster (L. Ljung and T. Söderström, *Theory and Practice of
 //! Recursive Identification*, 1983, section 3.7.3 and eq. 3.151).
 //!
-//! The input is kept over L samples, so that B may begin at any `offset` within them: a delay can
-//! be changed without a transient. N is the capacity for parameters.
+//! The input is kept over L samples, so that B may start at any `offset` within them: a delay can be
+//! changed without a transient. N is the capacity for parameters.
 
 use core::hint::black_box;
 
@@ -113,7 +113,7 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         self.shape
     }
 
-    /// Lets B begin `offset` samples before the newest input, as far as the kept input reaches; B
+    /// Lets B start `offset` samples before the newest input, as far as the kept input reaches; B
     /// can shift where L is larger than N.
     pub fn set_offset(&mut self, offset: usize) {
         self.offset = offset.min(L - self.shape.nb().min(L));
@@ -130,7 +130,7 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         }
     }
 
-    /// Where B begins. Where it cannot shift, this is a constant that the compiler knows.
+    /// Where B starts. Where it cannot shift, this is a constant that the compiler knows.
     #[inline(always)]
     fn offset(&self) -> usize {
         if L > N { self.offset } else { 0 }

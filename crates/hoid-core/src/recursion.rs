@@ -18,7 +18,7 @@ pub enum Stable {
     /// C and F.
     #[default]
     Predictor,
-    /// C, D and F: a noise model that is stationary too, as the reference text has it.
+    /// C, D and F: a noise model that is stationary too, as the thesis has it.
     PredictorAndNoise,
 }
 

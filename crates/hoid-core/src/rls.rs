@@ -52,6 +52,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         // State is read once, worked on in locals and written once.
         let theta = self.theta;
         let (psi, innovation) = self.innovation(&theta, x, u);
+        // A limited innovation bounds the step of an outlier.
         let limited = self.bars.clip(innovation);
         let moved = self
             .adaptation
@@ -60,6 +61,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         let sound = all_finite(&theta);
         if sound {
             self.theta = theta;
+            // theta moved by g eps_limited = (eps_limited/eps) g eps: the error bars follow the gain that was applied.
             let used = ratio(limited, innovation);
             let gain = moved.gain.map(|g| used * g);
             self.bars.update(
@@ -70,6 +72,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
             );
             self.adaptation.add_drift_to(&mut self.bars);
             self.shift(psi, u);
+        // A number that is not finite would stay in the regressor for max(na, nb) samples.
         } else {
             self.psi = [0.0; N];
             self.restarts += 1;
@@ -94,6 +97,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
     /// its place.
     pub fn bridge(&mut self, x: f64) {
         let (psi, innovation) = self.innovation(&self.theta, x, 0.0);
+        // With u = 0 the innovation is minus the one-step prediction, which replaces the missing output.
         self.shift(psi, -innovation);
     }
 

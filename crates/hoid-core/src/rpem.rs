@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// The recursion. N is the capacity for parameters, K that for the errors of its filters
-/// ([`ErrorLayout::filter_errors`]): 0 for the usual error bars and for none, B =
+/// ([`ErrorLayout::filter_errors`]): 0 for the default error bars and for none, B =
 /// [`NoErrorBars`](crate::error_bars::NoErrorBars).
 #[derive(Debug, Clone, PartialEq)]
 #[repr(align(64))]
@@ -76,9 +76,13 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
             .adaptation
             .update(&psi, limited, &theta, self.bars.variance().unwrap_or(0.0));
         let stable = self.stable;
+        // eps and psi are outputs of filters with the poles of C and F: outside of the stable region they diverge, and
+        // with them the estimate (Ljung and Söderström 1983, section 3.7.3).
         let (allowed, theta) = backtrack(&theta, &moved.step, |theta| stable.holds(&shape, theta));
+        // The filters continue with the a-posteriori residuals of the new theta (Ljung and Söderström 1983, eq. 3.151).
         self.correct(&theta);
         (self.theta, self.psi) = (theta, psi);
+        // The error bars follow the step that was made: shortened by `allowed`, limited by `used`.
         let gain = moved.gain.map(|g| allowed * used * g);
         self.bars.update(&layout, &rows, &gain, innovation);
         self.adaptation.add_drift_to(&mut self.bars);

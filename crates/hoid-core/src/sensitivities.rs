@@ -41,7 +41,7 @@ impl ErrorLayout {
         }
     }
 
-    /// No errors of filters: the usual error bars, with `h = psi`.
+    /// No errors of filters: the default error bars, with `h = psi`.
     pub const NONE: Self = Self {
         na: 0,
         noise: (0, 0),
@@ -84,8 +84,8 @@ pub struct Sensitivities<const N: usize, const K: usize> {
 }
 
 impl<const N: usize, const K: usize> Sensitivities<N, K> {
-    /// Those of an estimate that does not move within the memory of its filters: `h = psi`, and no
-    /// errors in the filters.
+    /// The entries of an estimate that does not move within the memory of its filters: `h = psi`,
+    /// and no errors in the filters.
     #[inline(always)]
     pub fn from_gradient(psi: &[f64; N]) -> Self {
         let form = LinearForm {

@@ -1,8 +1,8 @@
 //! Orders of the general model, as numbers or in the type.
 //!
-//! The parameters of `A u = (B/F) q^-nk e + (C/D) eps` stand in one vector,
-//! `theta = [a.. b.. c.. d.. f..]`. A [`Shape`] says how many there are of each kind, and so where
-//! each polynomial stands.
+//! The parameters of `A u = (B/F) q^-nk e + (C/D) eps` are in one vector,
+//! `theta = [a.. b.. c.. d.. f..]`. A [`Shape`] states how many there are of each kind, and so the
+//! position of each polynomial.
 
 /// Numbers of coefficients of A, B, C, D and F.
 ///

@@ -1,10 +1,10 @@
-//! The numbers that change while a recursion runs, so that it can be saved and go on elsewhere.
+//! The numbers that change while a recursion runs, so that it can be saved and continue elsewhere.
 //!
 //! One function visits them in both directions: to read them is to save, to write them is to
-//! restore, and the two cannot differ in order. A restored recursion goes on with the same digits.
-//! Counters are numbers as well; those of a recursion stay below `2^53`, up to which f64 holds them
-//! exactly. Shape and options are not part of the state: restore it into a recursion that was made
-//! with the same ones.
+//! restore, and the two cannot differ in order. A restored recursion continues with the same
+//! digits. Counters are numbers as well; those of a recursion stay below `2^53`, up to which f64
+//! holds them exactly. Shape and options are not part of the state: restore it into a recursion
+//! that was made with the same ones.
 
 /// A part of a recursion with numbers to be saved.
 pub trait State {
@@ -70,9 +70,9 @@ impl<T: State + ?Sized> State for &mut T {
     }
 }
 
-/// Makes a type a [`State`] of the fields that are named:
-/// `state!([const N: usize] Type<N> { field, field })`. With `, bounded` behind them the type has a method of that
-/// name, which brings places, lengths and counts back to where they may be: numbers may have been made by anyone.
+/// Makes a type a [`State`] of the fields that are named: `state!([const N: usize] Type<N> { field, field })`. With
+/// `, bounded` after them the type has a method of that name, which brings places, lengths and counts back to where
+/// they may be: numbers may have been made by anyone.
 #[macro_export]
 macro_rules! state {
     ([$($generics:tt)*] $type:ty { $($field:ident),+ $(,)? }) => {

@@ -21,8 +21,8 @@
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]
 pub struct UdCovariance<const N: usize> {
-    /// Column j holds `U_ij`, i < j, and `d_j` in the place of the 1; the rest is not used. The d
-    /// do not stand side by side, so that no compiler makes a vector of them, whose first element
+    /// Column j holds `U_ij`, i < j, and `d_j` in the place of the 1; the rest is not used. The entries d
+    /// are not contiguous, so that no compiler makes a vector of them, whose first element
     /// would wait for the last.
     u: [[f64; N]; N],
 }
@@ -95,6 +95,8 @@ impl<const N: usize> UdCovariance<N> {
     /// The measurement, of the projections and of D.
     #[inline(always)]
     fn update_projected_by(&mut self, grown: [f64; N], f: [f64; N], v: [f64; N], variance: f64) -> [f64; N] {
+        // Bierman's recursion: alpha_j = R + sum_{i<=j} f_i v_i. All d_j are multiplied by positive ratios, so that P
+        // stays positive whatever the rounding. `gain` accumulates P psi.
         let mut gain = [0.0; N];
         let (mut before, mut inverse_before) = (variance, 1.0 / variance);
         for j in 0..N {

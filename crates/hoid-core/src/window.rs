@@ -186,7 +186,7 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Adaptation<N> for Window<N,
         for i in 0..p {
             self.largest[i] = self.largest[i].max(self.growing.r[i][i] + self.fading.r[i][i]);
         }
-        // With as many samples as parameters the residuals are zero and say nothing.
+        // With as many samples as parameters the residuals are zero and carry no information.
         let factor = if self.filled > p { self.cholesky() } else { None };
         let Some(factor) = factor else {
             self.undetermined += 1;

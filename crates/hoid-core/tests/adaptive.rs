@@ -5,12 +5,12 @@ use hoid_core::{
     adaptive::{
         AdaptiveFilter, AdaptivePrior, GAINS, LARGEST_ORDER, STATES,
         basis::{Basis, Point},
+        defaults::{DefaultOperator, REPLAYED_S},
         detector::Detection,
-        known::Known,
+        initial_estimate::InitialEstimate,
         least_memory, memory_needed,
         mixture::ChangePrior,
         noise::Lags,
-        usual::{REPLAYED_S, Usual},
     },
     state::State,
 };
@@ -25,14 +25,14 @@ fn prior(threshold: f64) -> AdaptivePrior {
             least: 16,
             most: 80,
             threshold,
-            held: [3.3, 0.125, 0.05],
+            dynamics: [3.3, 0.125, 0.05],
             refractory: 16,
         },
-        ..Usual::with_delay(0.2).prior(TS)
+        ..DefaultOperator::with_delay(0.2).prior(TS)
     }
 }
 
-fn usual() -> Point {
+fn default_operator() -> Point {
     Point {
         tau: 0.2,
         omega: 11.0,
@@ -74,13 +74,13 @@ struct Person {
     past: Vec<f64>,
     e: f64,
     v: [f64; 2],
-    /// What the error of the last sample was answered with.
+    /// The response to the error of the last sample.
     w: f64,
 }
 
 impl Person {
     fn new(seed: u64) -> Self {
-        Self::at(seed, usual())
+        Self::at(seed, default_operator())
     }
 
     fn at(seed: u64, point: Point) -> Self {
@@ -163,7 +163,8 @@ fn bands_cover_and_precision_grows() {
     assert!(ratio < 0.5, "{ratio}");
 }
 
-/// A remnant of so many poles at -1/.06 s, of the power .04: its samples, and the variance of its innovations.
+/// A remnant of a given number of poles at -1/.06 s, of the power .04: its samples, and the variance of its
+/// innovations.
 fn steep(poles: usize, samples: usize, seed: u64) -> (Vec<f64>, f64) {
     let (pole, mut stream, mut state) = ((-TS / 0.06).exp(), Stream(seed), vec![0.0; poles]);
     let mut sample = || {
@@ -194,7 +195,7 @@ fn a_steep_remnant_is_no_harder_than_a_flat_one() {
                 assert!((0.7..1.5).contains(&ratio), "{poles} poles: {ratio}");
             }
         }
-        let truth = response(&basis(usual()), GAINS_OF_A_PERSON, 2.0);
+        let truth = response(&basis(default_operator()), GAINS_OF_A_PERSON, 2.0);
         let (value, variance) = estimate(&filter, 2.0);
         for part in 0..2 {
             let z = (value[part] - truth[part]) / variance[part].sqrt();
@@ -202,18 +203,18 @@ fn a_steep_remnant_is_no_harder_than_a_flat_one() {
         }
         precision.push((variance[0] + variance[1]).sqrt());
     }
-    // Of the same power, with less of it where the response is.
+    // For the same power, with less of it where the response is.
     assert!(precision[1] < 2.0 * precision[0], "{precision:?}");
 }
 
 #[test]
 fn neuromuscular_system_and_delay_are_found() {
-    // So far from what is usual that the basis has to move.
+    // So far from the default that the basis has to move.
     let point = Point {
         tau: 0.22,
         omega: 13.0,
         zeta: 0.35,
-        ..usual()
+        ..default_operator()
     };
     for seed in 0..3 {
         let (mut person, mut filter) = (Person::at(300 + seed, point), filter(1e9));
@@ -221,7 +222,7 @@ fn neuromuscular_system_and_delay_are_found() {
             let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.02);
             filter.step(e, u);
         }
-        let found = filter.held();
+        let found = filter.dynamics();
         let near = |found: f64, truth: f64, by: f64| (found - truth).abs() < by;
         let all = near(found.omega, 13.0, 0.4) && near(found.zeta, 0.35, 0.04) && near(found.tau, 0.22, 0.004);
         assert!(all && filter.basis().point().omega > 12.0, "{seed}: {found:?}");
@@ -230,16 +231,22 @@ fn neuromuscular_system_and_delay_are_found() {
 
 #[test]
 fn one_who_is_far_from_what_is_usual_is_found() {
-    // A delay 100 ms later than what is supposed, and a system of 16 rad/s that acts 60 ms earlier: from
-    // the usual person the corrections end elsewhere.
+    // A delay 100 ms later than the prior, and a system of 16 rad/s that acts 60 ms earlier: from the default person
+    // the corrections end elsewhere.
     for (point, seed) in [
-        (Point { tau: 0.3, ..usual() }, 400),
+        (
+            Point {
+                tau: 0.3,
+                ..default_operator()
+            },
+            400,
+        ),
         (
             Point {
                 tau: 0.14,
                 omega: 16.0,
                 zeta: 0.15,
-                ..usual()
+                ..default_operator()
             },
             401,
         ),
@@ -249,7 +256,7 @@ fn one_who_is_far_from_what_is_usual_is_found() {
             let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.02);
             filter.step(e, u);
         }
-        let found = filter.held();
+        let found = filter.dynamics();
         assert!((found.tau - point.tau).abs() < 0.003, "{seed}: {found:?}");
         assert!((found.omega / point.omega - 1.0).abs() < 0.06, "{seed}: {found:?}");
     }
@@ -257,7 +264,10 @@ fn one_who_is_far_from_what_is_usual_is_found() {
 
 #[test]
 fn a_change_of_the_delay_is_found_and_told_from_one_of_the_gains() {
-    let later = Point { tau: 0.21, ..usual() };
+    let later = Point {
+        tau: 0.21,
+        ..default_operator()
+    };
     let mut found = 0;
     for seed in 600..604 {
         let (mut person, mut filter) = (Person::new(seed), filter(12.5));
@@ -362,7 +372,10 @@ fn a_copy_goes_on_with_the_same_digits() {
     for k in 0..1000 {
         let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
         assert_eq!(first.step(e, u), second.step(e, u), "{k}");
-        assert_eq!(first.detector().against_chance(), second.detector().against_chance());
+        assert_eq!(
+            first.detector().log_significance(),
+            second.detector().log_significance()
+        );
     }
     assert_eq!(estimate(&first, 2.0), estimate(&second, 2.0));
 }
@@ -373,17 +386,17 @@ fn what_says_nothing_does_no_harm() {
     for _ in 0..500 {
         assert_eq!(silent.step(0.0, 0.0).innovation, 0.0);
     }
-    assert!(!silent.began());
-    // No error ever, an output that moves: nothing to begin with.
+    assert!(!silent.has_started());
+    // No error ever, an output that moves: nothing to start with.
     let mut stream = Stream(3);
     for _ in 0..500 {
         silent.step(0.0, stream.normal());
     }
-    assert!(!silent.began());
+    assert!(!silent.has_started());
 
     let (mut person, mut filter) = (Person::new(9), filter(12.5));
     let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
-    assert!(filter.step(e, u).innovation.is_finite() && !filter.began());
+    assert!(filter.step(e, u).innovation.is_finite() && !filter.has_started());
     for k in 0..2000 {
         let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
         match k % 7 {
@@ -431,7 +444,10 @@ fn what_makes_no_sense_is_refused() {
     };
     for wrong in [
         AdaptivePrior {
-            person: Point { tau: 1.0, ..usual() },
+            person: Point {
+                tau: 1.0,
+                ..default_operator()
+            },
             ..sound
         },
         AdaptivePrior { order: 1, ..sound },
@@ -506,7 +522,7 @@ fn what_is_known_stands_at_the_beginning() {
         let of = |a: f64, b: f64| a.powi(k as i32 + 1) / ((a - b) * (1.0 - a * b) * (1.0 - a * a));
         of(pole, other_pole) + of(other_pole, pole)
     });
-    let known = Known {
+    let known = InitialEstimate {
         state,
         covariance,
         variance: 0.05 * 0.05,
@@ -514,16 +530,19 @@ fn what_is_known_stands_at_the_beginning() {
         remnant: Some((lags, 20.0)),
     };
     let mut told = filter(1e9).with_initial_estimate(&known).expect("a sound estimate");
-    assert!(told.began() && (told.d()[0] + 1.6).abs() < 0.01 && (told.d()[1] - 0.63).abs() < 0.01);
+    assert!(told.has_started() && (told.d()[0] + 1.6).abs() < 0.01 && (told.d()[1] - 0.63).abs() < 0.01);
     let spread = told.state_covariance();
     for i in 0..STATES {
         for j in 0..STATES {
             assert!((spread[i][j] - covariance[i][j]).abs() < 1e-12);
         }
     }
-    let (value, truth) = (told.response(2.0), response(&basis(usual()), GAINS_OF_A_PERSON, 2.0));
+    let (value, truth) = (
+        told.response(2.0),
+        response(&basis(default_operator()), GAINS_OF_A_PERSON, 2.0),
+    );
     assert!((value[0] - truth[0]).hypot(value[1] - truth[1]) < 1e-9);
-    // Beside one who begins with nothing, over ten seconds.
+    // Next to one who starts with nothing, over ten seconds.
     let (mut person, mut other) = (Person::new(3), filter(1e9));
     let mut errors = [0.0; 2];
     for k in 0..500 {
@@ -538,12 +557,12 @@ fn what_is_known_stands_at_the_beginning() {
     }
     assert!(errors[0] < 0.25 * errors[1], "{errors:?}");
     for wrong in [
-        Known { unit: 0.0, ..known },
-        Known {
+        InitialEstimate { unit: 0.0, ..known },
+        InitialEstimate {
             variance: f64::NAN,
             ..known
         },
-        Known {
+        InitialEstimate {
             remnant: Some(([0.0; LARGEST_ORDER + 1], 1.0)),
             ..known
         },
@@ -570,7 +589,7 @@ fn a_stick_that_ends_does_not_make_the_person_answer_less() {
             let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
             let stick = u.clamp(-end, end);
             knows.step(e, stick);
-            // No two samples alike: nothing tells that the stick stands.
+            // No two samples alike: nothing shows that the stick is stationary.
             does_not.step(e, stick * (1.0 + 1e-9 * f64::from(k % 2)));
         }
         let (of, _) = estimate(&free, 2.0);

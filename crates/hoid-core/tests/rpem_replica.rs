@@ -107,7 +107,7 @@ fn the_gradient_is_one_filter_in_direct_form_while_theta_moves() {
     }
 }
 
-/// The test can fail: a cascade of 1/F and D/C is another recursion wherever F stands beside C or D.
+/// The test can fail: a cascade of 1/F and D/C is another recursion wherever F is next to C or D.
 #[test]
 fn a_cascade_is_another_recursion() {
     for (name, difference) in differences(Regressor::Cascade) {

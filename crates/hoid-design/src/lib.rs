@@ -1,6 +1,7 @@
-//! Before and after an experiment: what its data will say, and whether conditions and people differ.
+//! Before and after an experiment: what its data will report, and whether conditions and people
+//! differ.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`compare`] | differences between conditions and people, from the estimates of each person |
 //! | [`experiment`] | standard errors of an experiment before it is done |

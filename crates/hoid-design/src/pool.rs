@@ -10,8 +10,8 @@
 //! **B is the shrinkage**, 1 for a person of whom nothing is known. That tau^2 is estimated is not in the variance. A person of
 //! tomorrow has `mu` with the variance `tau^2 + var(mu)`: what a prior is.
 //!
-//! A prior that the estimates hold already is taken out first, or it would count once for each person: with its
-//! share w, centre m and an estimate y, the data say `y - w (m - y)/(1 - w)` with the variance `v/(1 - w)`
+//! A prior that the estimates hold already is taken out first, or it would count once for each person: with its share
+//! w, centre m and an estimate y, the data show `y - w (m - y)/(1 - w)` with the variance `v/(1 - w)`
 //! ([`OperatorPrior::pull`]). A person of whom more than nine tenths are prior is one of whom nothing is known.
 
 use hoid_ident::family::{OperatorPrior, Parameter};
@@ -25,9 +25,9 @@ use crate::compare::{CompareError, Observation, Weights, meta_mean, variance_bet
 
 /// Parameters that mean the same in every form.
 const OF_ANY_FORM: [&str; 3] = ["omega_nm", "zeta_nm", "tau_e"];
-/// People of whom the data say something.
+/// People of whom the data show something.
 const LEAST_PEOPLE: usize = 3;
-/// Share of the prior beyond which the data say nothing.
+/// Share of the prior beyond which the data carry no information.
 const ALL_PRIOR: f64 = 0.9;
 
 /// A person, from all.
@@ -35,7 +35,7 @@ const ALL_PRIOR: f64 = 0.9;
 pub struct PooledPerson {
     /// Who.
     pub subject: String,
-    /// What their own data say, with the standard error; none where that is nothing.
+    /// Estimate from their own data, with the standard error; none without information.
     pub own: Option<(f64, f64)>,
     /// The estimate from all.
     pub value: f64,
@@ -67,7 +67,7 @@ pub struct PooledParameter {
 pub struct Population {
     /// The condition.
     pub condition: String,
-    /// The form of its people; none where they differ.
+    /// The form of its people; none if they differ.
     pub form: Option<String>,
     /// Its parameters.
     pub parameters: Vec<PooledParameter>,
@@ -107,7 +107,7 @@ fn population(condition: &str, people: &[&Person], prior: &OperatorPrior) -> Pop
             continue;
         }
         if form.is_none() && !OF_ANY_FORM.contains(&name) {
-            let why = "the forms of people differ; say one under [analysis] in group.toml".to_owned();
+            let why = "the forms of people differ; name one under [analysis] in group.toml".to_owned();
             found.left_out.push((name.to_owned(), why));
             continue;
         }
@@ -128,7 +128,7 @@ fn population(condition: &str, people: &[&Person], prior: &OperatorPrior) -> Pop
     found
 }
 
-/// What the data of a person say of the logarithm of a parameter.
+/// Report of the data of a person on the logarithm of a parameter.
 fn data(parameter: &Parameter, prior: &OperatorPrior) -> Option<Observation> {
     let error = parameter.standard_error_person.or(parameter.standard_error)?;
     let counts = parameter.determined && parameter.value > 0.0 && parameter.value.is_finite() && error > 0.0;
@@ -146,7 +146,7 @@ fn data(parameter: &Parameter, prior: &OperatorPrior) -> Option<Observation> {
 
 fn pooled((name, unit): (&str, &str), own: &[(&str, Option<Observation>)]) -> Result<PooledParameter, CompareError> {
     let known: Vec<Observation> = own.iter().filter_map(|(_, o)| *o).collect();
-    // Of two people a variance between them is not known at all.
+    // For two people a variance between them is not known at all.
     if known.len() < LEAST_PEOPLE {
         return Err(CompareError::TooFew {
             found: known.len(),

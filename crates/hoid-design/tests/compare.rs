@@ -113,7 +113,7 @@ fn what_is_missing_is_named() {
         reasons.iter().any(|r| r.contains("one degree of freedom")),
         "{reasons:?}"
     );
-    // Nobody is left.
+    // No one is left.
     let found = Comparing {
         of: crossover(),
         ..Comparing::default()

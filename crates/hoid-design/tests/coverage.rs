@@ -1,9 +1,10 @@
 //! Do intervals of 95 % hold the difference in 95 % of experiments, and is there one false finding in twenty?
 //!
-//! Virtual people have a true difference each, `N(delta, tau^2)`, and an estimate of it with an error whose size is their own,
-//! .1 to .5. The error is told as it is, or estimated as the scatter of five runs is, `v chi^2_4/4`. Of 6000 experiments the
-//! standard error of a share of .95 is .0028. A test of no difference finds one exactly where the interval of the same
-//! people, moved by delta, does not hold zero: 5 +- 1 % false findings are 94 to 96 % of the intervals.
+//! Virtual people have a true difference each, `N(delta, tau^2)`, and an estimate of it with an error whose size is
+//! their own, .1 to .5. The error is reported as it is, or estimated as the scatter of five runs is, `v chi^2_4/4`. Of
+//! 6000 experiments the standard error of a share of .95 is .0028. A test of no difference finds one exactly where the
+//! interval of the same people, moved by delta, does not hold zero: 5 +- 1 % false findings are 94 to 96 % of the
+//! intervals.
 //!
 //! Where people do not differ beyond errors of so different size, intervals of few of them hold the difference too often, up to
 //! 98 % (so do those of the t test without weights): there they are bounded from below.

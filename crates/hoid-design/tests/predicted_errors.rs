@@ -149,7 +149,7 @@ fn a_target_with_a_lead() {
     );
 }
 
-/// Lines that are as large behind the element as before a target.
+/// Lines that are as large after the element as before a target.
 #[test]
 fn a_disturbance_with_a_gain() {
     let pairs = [("K", 2.0), ("omega_nm", 11.0), ("zeta_nm", 0.25), ("tau_e", 0.2)];

@@ -13,7 +13,7 @@ unsafe extern "C" {
     static _stack_end: u32;
 }
 
-/// What the stack is painted with before it is used (`cortex-m-rt`, `paint-stack`).
+/// Pattern that marks unused stack (`cortex-m-rt`, `paint-stack`).
 const PAINT: u32 = 0xcccc_cccc;
 
 #[entry]

@@ -6,8 +6,8 @@
 //! | `run.rs` | what is the same everywhere: lines, filter, estimates |
 //! | `board.rs` | entry, files and output of a processor without an operating system, by semihosting |
 //!
-//! On the host it is an ordinary program, so that the digits of both can be compared (`cargo xtask
-//! embedded`). No memory is allocated; the filter stands on the stack.
+//! On the host it is an ordinary program, so that the digits of both can be compared (`cargo xtask embedded`). No
+//! memory is allocated; the filter is on the stack.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]

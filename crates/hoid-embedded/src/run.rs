@@ -7,18 +7,18 @@ use core::{ffi::CStr, fmt::Arguments};
 
 use hoid_core::adaptive::{
     AdaptiveFilter, PARAMETERS,
-    usual::{GIVEN_DELAY_S, SPREAD, Usual},
+    defaults::{DefaultOperator, GIVEN_DELAY_S, SPREAD},
 };
 
 /// The file of the samples.
 pub const FILE: &CStr = c"run.csv";
-/// What is said where it cannot be read.
+/// The report where it cannot be read.
 pub const UNREADABLE: &str = "run.csv cannot be read";
 /// Columns of the output.
 const HEADER: &str = "t,K_e,K_e_se,K_e_dot,K_e_dot_se,omega_nm,omega_nm_se,zeta_nm,zeta_nm_se,tau_e,tau_e_se";
 /// s.
 const SAMPLE_TIME_S: f64 = 0.01;
-/// nk of the textbook's operator, whose delay the filter begins with.
+/// nk of the textbook's operator, whose delay the filter starts with.
 const NK: f64 = 29.0;
 /// Samples from one line of output to the next.
 const EVERY: u32 = 100;
@@ -36,14 +36,14 @@ pub const STATE_BYTES: usize = size_of::<Filter>();
 /// Reads samples to their end and writes estimates.
 ///
 /// # Errors
-/// A sentence about what cannot be read or written.
+/// A sentence about input or output that failed.
 pub fn run(
     read: impl FnMut(&mut [u8]) -> Result<usize, &'static str>,
     mut write: impl FnMut(Arguments<'_>) -> Result<(), &'static str>,
 ) -> Result<(), &'static str> {
-    let supposed = Usual {
+    let supposed = DefaultOperator {
         spread: [SPREAD[0], SPREAD[1], GIVEN_DELAY_S],
-        ..Usual::with_delay((NK - 0.5) * SAMPLE_TIME_S)
+        ..DefaultOperator::with_delay((NK - 0.5) * SAMPLE_TIME_S)
     };
     let mut filter =
         Filter::new(supposed.prior(SAMPLE_TIME_S), [0.0; MEMORY]).ok_or("there is no filter for this prior")?;
@@ -53,7 +53,7 @@ pub fn run(
     while let Some((e, u)) = lines.next()? {
         filter.step(e, u);
         samples += 1;
-        if samples.is_multiple_of(EVERY) && filter.began() {
+        if samples.is_multiple_of(EVERY) && filter.has_started() {
             let (values, covariance) = (filter.operator(), filter.operator_covariance());
             let [a, b, c, d, t]: [f64; PARAMETERS] = values;
             let se = |i: usize| libm::sqrt(covariance[i][i]);

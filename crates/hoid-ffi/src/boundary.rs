@@ -1,8 +1,8 @@
 //! Pointers of the caller: all that this crate believes.
 //!
-//! A pointer that is null or not aligned is refused. That it points to what the header says, and
-//! that the caller does not use it at the same time from another thread, cannot be checked: it is
-//! the contract of every function here.
+//! A pointer that is null or not aligned is refused. Two conditions cannot be checked and are the
+//! contract of every function here: the pointer refers to an object as the header describes it, and
+//! no other thread uses it at the same time.
 
 use std::{
     ffi::{CStr, c_char},
@@ -12,7 +12,8 @@ use std::{
 use crate::{
     session::Session,
     status::{
-        Failure, HOID_BAD_POINTER, HOID_BAD_TEXT, HOID_BROKEN, HOID_PANIC, HOID_TOO_SMALL, HoidStatus, guarded, said,
+        Failure, HOID_BAD_POINTER, HOID_BAD_TEXT, HOID_BROKEN, HOID_PANIC, HOID_TOO_SMALL, HoidStatus, guarded,
+        panic_message,
     },
 };
 
@@ -62,7 +63,8 @@ pub(crate) unsafe fn bytes<'a>(pointer: *const u8, length: usize, what: &str) ->
             format!("{what}: no memory has {length} bytes"),
         ));
     }
-    // SAFETY: not null, and no longer than a slice may be; that there are so many is the contract.
+    // SAFETY: not null, and no longer than a slice may be; that there are this many is the
+    // contract.
     Ok(unsafe { slice::from_raw_parts(pointer, length) })
 }
 
@@ -72,13 +74,13 @@ pub(crate) unsafe fn bytes<'a>(pointer: *const u8, length: usize, what: &str) ->
 /// `pointer` is null or points to room for one value.
 pub(crate) unsafe fn put<T>(pointer: *mut T, value: T, what: &str) -> Result<(), Failure> {
     check(pointer, what)?;
-    // SAFETY: not null, aligned; that there is room is the contract. What stood there needs no drop.
+    // SAFETY: not null, aligned; that there is room is the contract. What was there needs no drop.
     unsafe { pointer.write(value) };
     Ok(())
 }
 
 /// Writes a list where the caller wants it, and its length. Without room (`list` null and `room`
-/// zero) only the length is told.
+/// zero) only the length is reported.
 ///
 /// # Safety
 /// `list` is null or points to room for `room` values, `count` is null or to room for a number.
@@ -143,7 +145,7 @@ pub(crate) unsafe fn with_tracker(
 ) -> HoidStatus {
     guarded(|| {
         check(tracker, "the tracker")?;
-        // SAFETY: not null, aligned; by the contract it is ours and nobody changes it.
+        // SAFETY: not null, aligned; by the contract it is ours and no one changes it.
         let tracker = unsafe { &*tracker };
         tracker.check()?;
         call(&tracker.session)
@@ -160,14 +162,14 @@ pub(crate) unsafe fn move_tracker(
 ) -> HoidStatus {
     guarded(|| {
         check(tracker, "the tracker")?;
-        // SAFETY: not null, aligned; by the contract it is ours and nobody else uses it.
+        // SAFETY: not null, aligned; by the contract it is ours and no other code uses it.
         let tracker = unsafe { &mut *tracker };
         tracker.check()?;
         let session = &mut tracker.session;
         let moved = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| call(session)));
         moved.unwrap_or_else(|panic| {
             tracker.is_broken = true;
-            Err(Failure::new(HOID_PANIC, said(&*panic)))
+            Err(Failure::new(HOID_PANIC, panic_message(&*panic)))
         })
     })
 }

@@ -1,23 +1,22 @@
-//! The tracker of `hoid track` and `hoid stream` behind a C ABI.
+//! The tracker of `hoid track` and `hoid stream` after a C ABI.
 //!
-//! The one crate of the workspace with unsafe code. What is unsafe about a C boundary is that
-//! pointers are believed, so that is all the unsafe code does: `boundary` reads texts and writes
-//! results through pointers of the caller, and nothing else dereferences one. Behind it stands the
-//! safe `session`, which knows nothing of C.
+//! The one crate of the workspace with unsafe code. What is unsafe about a C boundary is that pointers are trusted, so
+//! that is all the unsafe code does: `boundary` reads texts and writes results through pointers of the caller, and
+//! nothing else dereferences one. After it comes the safe `session`, which has no information about C.
 //!
 //! Three rules hold for every function:
 //!
-//! - **It answers with a status**, zero for done, positive where there is no value now, negative for
-//!   an error. What is behind it stands in [`hoid_last_error`] of the calling thread.
+//! - **It answers with a status**, zero for done, positive where there is no value now, negative for an error. What is
+//!   after it is in [`hoid_last_error`] of the calling thread.
 //! - **No panic crosses.** A panic is caught, becomes [`HOID_PANIC`], and the tracker that was at work
 //!   answers [`HOID_BROKEN`] from then on: its state may be half moved.
 //! - **A null pointer is an error**, not a crash, and a list that is too short is left as it was.
 //!
 //! Names, order and units are those of Rust and Python.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
-//! | `session` | a tracker as its options ask for it, and what is known of it |
+//! | `session` | a tracker as its options ask for it, and the prior knowledge of it |
 //! | `options` | options in JSON, by the keywords of Python |
 //! | `saved`, `packed` | a tracker as bytes |
 //! | `status`, `boundary` | statuses and their texts; pointers |

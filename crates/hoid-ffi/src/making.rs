@@ -51,7 +51,7 @@ pub unsafe extern "C" fn hoid_tracker_new(
     })
 }
 
-/// Makes a tracker that begins with an earlier fit of the person: the text that hoid identify --json
+/// Makes a tracker that starts with an earlier fit of the person: the text that hoid identify --json
 /// prints. Sample time in s and options as in hoid_tracker_new.
 ///
 /// # Safety
@@ -88,8 +88,8 @@ pub unsafe extern "C" fn hoid_tracker_free(tracker: *mut HoidTracker) {
     });
 }
 
-/// Saves a tracker as bytes, to go on in another process with the same digits. With `buffer` NULL and
-/// `room` 0 only the length is told.
+/// Saves a tracker as bytes, to continue in another process with the same digits. With `buffer` NULL and `room` 0 only
+/// the length is reported.
 ///
 /// # Safety
 /// `tracker` was made here; `buffer` has room for `room` bytes, `length` for a number.

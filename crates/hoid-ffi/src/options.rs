@@ -1,4 +1,4 @@
-//! What is to be tracked: method, sample time, options in JSON, a fit.
+//! Signals to be tracked: method, sample time, options in JSON, a fit.
 //!
 //! The options are one object with the keywords of `pyhoid.Tracker`: `structure`, `na` to `nk` (a
 //! number, or a pair that is searched on the warm-up), `criterion`, `start` (coefficients by name, or
@@ -20,14 +20,14 @@ use serde_json::{Map, Value};
 use crate::status::Failure;
 
 /// Length of the warm-up of methods that have one, s.
-const USUAL_WARM_UP_S: f64 = 20.0;
+const DEFAULT_WARM_UP_S: f64 = 20.0;
 /// Longest warm-up, samples.
 const LONGEST_WARM_UP: f64 = 1e7;
 
-/// What was asked for, as it is saved.
+/// The request, as it is saved.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Asked {
-    /// Name of the method; none for the usual one.
+pub(crate) struct TrackerRequest {
+    /// Name of the method; none for the default one.
     pub method: Option<String>,
     pub sample_time_s: f64,
     /// Options in JSON.
@@ -36,16 +36,16 @@ pub(crate) struct Asked {
     pub fit: Option<String>,
 }
 
-/// What it means.
-pub(crate) struct Understood {
+/// Meaning of it.
+pub(crate) struct ResolvedTracker {
     pub plan: TrackPlan,
     pub sample_time: SampleTime,
     /// Samples of the warm-up.
     pub warm_up: usize,
 }
 
-impl Asked {
-    pub fn understood(&self) -> Result<Understood, Failure> {
+impl TrackerRequest {
+    pub fn resolve(&self) -> Result<ResolvedTracker, Failure> {
         let sample_time = SampleTime::new(self.sample_time_s)?;
         let mut options = object(self.options.as_deref().unwrap_or("{}"))?;
         let mut method = match &self.method {
@@ -58,7 +58,7 @@ impl Asked {
         let at_rad_s = taken(&mut options, "at", numbers)?;
         let controlled_element = taken(&mut options, "controlled_element", element)?;
         let start = taken(&mut options, "start", start)?;
-        let warm_up_s = taken(&mut options, "warm_up", number)?.unwrap_or(USUAL_WARM_UP_S);
+        let warm_up_s = taken(&mut options, "warm_up", number)?.unwrap_or(DEFAULT_WARM_UP_S);
         let mut orders = NamedOrders::new();
         for name in ["na", "nb", "nc", "nd", "nf", "nk"] {
             if let Some(range) = taken(&mut options, name, |value| range(value, name))? {
@@ -67,9 +67,7 @@ impl Asked {
         }
         set(&mut method, options, self.fit.as_deref())?;
         if method.smooths() {
-            return Err(Failure::option(
-                "smooth: what is still to come cannot say anything of a stream; drop it",
-            ));
+            return Err(Failure::option("smooth: a stream has no future samples; drop it"));
         }
 
         let asked = TrackRequest {
@@ -88,7 +86,7 @@ impl Asked {
                 "warm_up is {warm_up_s} s, expected a time of one sample to 10 million"
             )));
         }
-        Ok(Understood {
+        Ok(ResolvedTracker {
             plan: asked.plan(sample_time)?,
             sample_time,
             warm_up: warm_up as usize,
@@ -145,12 +143,12 @@ fn object(text: &str) -> Result<Map<String, Value>, Failure> {
     let text = if text.trim().is_empty() { "{}" } else { text };
     serde_json::from_str(text).map_err(|error| {
         Failure::option(format!(
-            "the options are no object in JSON ({error}); write them as {{\"nk\": 29, \"memory\": \"4s\"}}"
+            "the options are not an object in JSON ({error}); write them as {{\"nk\": 29, \"memory\": \"4s\"}}"
         ))
     })
 }
 
-/// Takes an option out; none where it is not there or null.
+/// Takes an option out; none if it is missing or null.
 fn taken<T>(
     options: &mut Map<String, Value>,
     name: &str,
@@ -220,7 +218,7 @@ fn range(value: &Value, name: &str) -> Result<RangeInclusive<usize>, String> {
     }
 }
 
-/// A value as the command line writes it; none where it says nothing.
+/// A value as the command line writes it; none if it carries no information.
 fn text(value: &Value) -> Option<String> {
     Some(match value {
         Value::Null | Value::Bool(false) => return None,
@@ -246,19 +244,19 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    fn understood(method: &str, options: &str) -> Result<Understood, Failure> {
-        let asked = Asked {
+    fn resolved(method: &str, options: &str) -> Result<ResolvedTracker, Failure> {
+        let asked = TrackerRequest {
             method: Some(method.to_owned()),
             sample_time_s: 0.01,
             options: Some(options.to_owned()),
             fit: None,
         };
-        asked.understood()
+        asked.resolve()
     }
 
     #[test]
     fn options_are_those_of_python() {
-        let found = understood(
+        let found = resolved(
             "rpem",
             r#"{"structure": "bj", "nk": 29, "nd": [1, 2], "memory": 256, "memory_of": {"b": "inf"}, "largest": 50,
                 "at": [1, 2.5], "controlled_element": "90/(s(s+6))", "warm_up": 10, "forgetting": "exponential",
@@ -271,9 +269,9 @@ mod tests {
         let memory = options.method.settings().get("memory_of").unwrap();
         assert_eq!(memory, "b=inf");
         assert!(!found.plan.is_settled());
-        let pair = understood("adaptive", r#"{"controlled_element": [[90], [1, 6, 0]]}"#).unwrap();
+        let pair = resolved("adaptive", r#"{"controlled_element": [[90], [1, 6, 0]]}"#).unwrap();
         assert_eq!(pair.plan.options().controlled_element, options.controlled_element);
-        let none = understood("adaptive", " ").unwrap();
+        let none = resolved("adaptive", " ").unwrap();
         assert_eq!(none.plan.options().method, Method::adaptive());
     }
 
@@ -300,17 +298,17 @@ mod tests {
                 "no form of an operator",
             ),
         ] {
-            let failure = understood(method, options).err().unwrap();
+            let failure = resolved(method, options).err().unwrap();
             assert!(failure.text.contains(reason), "{options}: {}", failure.text);
         }
-        let mut asked = Asked {
+        let mut asked = TrackerRequest {
             method: None,
             sample_time_s: f64::NAN,
             options: None,
             fit: None,
         };
-        assert!(asked.understood().is_err());
+        assert!(asked.resolve().is_err());
         asked.sample_time_s = 0.01;
-        assert!(asked.understood().is_ok());
+        assert!(asked.resolve().is_ok());
     }
 }

@@ -1,4 +1,4 @@
-//! A description in JSON and bytes behind it, of which damage shows.
+//! A description in JSON and bytes after it, of which damage shows.
 //!
 //! | bytes | |
 //! |---|---|
@@ -8,7 +8,7 @@
 //! | | the bytes |
 //! | 8 | FNV-1a over all before (G. Fowler, L. C. Noll, K.-P. Vo, 1991; 64 bits) |
 //!
-//! All least byte first. The sum guards against damage, not against an adversary.
+//! Little-endian. The sum guards against damage, not against an adversary.
 
 use serde_json::Value;
 
@@ -62,7 +62,7 @@ pub(crate) fn as_bytes(numbers: &[f64]) -> Vec<u8> {
     numbers.iter().flat_map(|number| number.to_le_bytes()).collect()
 }
 
-/// The numbers of bytes; none where there are some left.
+/// The numbers of bytes; none if there are some left.
 pub(crate) fn as_numbers(bytes: &[u8]) -> Option<Vec<f64>> {
     let (numbers, []) = bytes.as_chunks::<8>() else {
         return None;

@@ -1,7 +1,7 @@
-//! What a tracker says.
+//! Report of a tracker.
 //!
-//! A list is asked for with its room and the place for its count; with NULL and no room only the
-//! count is told.
+//! A list is requested with its room and the place for its count; with NULL and no room only the
+//! count is reported.
 
 use std::ffi::c_char;
 
@@ -40,7 +40,7 @@ unsafe fn list<T: Copy>(
     unsafe { with_tracker(tracker, hand) }
 }
 
-/// HOID_OK once there is an estimate, HOID_NOTHING before; hoid_last_error then says how far the
+/// HOID_OK once there is an estimate, HOID_NOTHING before; hoid_last_error then reports how far the
 /// warm-up is.
 ///
 /// # Safety
@@ -143,7 +143,7 @@ pub unsafe extern "C" fn hoid_tracker_change(tracker: *const HoidTracker, change
 }
 
 /// Logarithm of the odds that the person changed within the last four seconds; -inf before the first
-/// estimate. HOID_NOTHING for a method that tells no changes.
+/// estimate. HOID_NOTHING for a method that does not report changes.
 ///
 /// # Safety
 /// `tracker` was made here; `log_odds` has room for a number.
@@ -157,7 +157,7 @@ pub unsafe extern "C" fn hoid_tracker_change_log_odds(tracker: *const HoidTracke
     unsafe { with_tracker(tracker, tell) }
 }
 
-/// What the estimate is worth now: HOID_TRUSTWORTHY, HOID_DOUBTFUL or HOID_NOT_DETERMINED.
+/// Verdict on the estimate now: HOID_TRUSTWORTHY, HOID_DOUBTFUL or HOID_NOT_DETERMINED.
 ///
 /// # Safety
 /// `tracker` was made here; `level` has room for a number.
@@ -180,7 +180,7 @@ pub(crate) fn number_of(level: VerdictLevel) -> i32 {
     }
 }
 
-/// A level in words, as "trustworthy"; empty for what is none.
+/// A level as text, as "trustworthy"; empty for what is none.
 #[unsafe(no_mangle)]
 pub extern "C" fn hoid_level_name(level: i32) -> *const c_char {
     let name = match level {

@@ -1,6 +1,6 @@
-//! A tracker as bytes, to go on elsewhere with the same digits.
+//! A tracker as bytes, to continue elsewhere with the same digits.
 //!
-//! The description is what was asked for and the orders, the bytes are the numbers of
+//! The description is the request and the orders, the bytes are the numbers of
 //! [`hoid_track::Live::saved`] (`packed`).
 
 use hoid_model::Orders;
@@ -8,7 +8,7 @@ use hoid_track::Live;
 use serde_json::{Value, json};
 
 use crate::{
-    options::Asked,
+    options::TrackerRequest,
     packed::{Closed, as_bytes, as_numbers, opened, packed},
     session::Session,
     status::{Failure, HOID_BAD_STATE},
@@ -37,7 +37,7 @@ impl Session {
         let wrong = |text: &str| Failure::new(HOID_BAD_STATE, format!("{text}; save the tracker again"));
         let damaged = || wrong("the bytes were changed or cut since they were saved");
         let (description, numbers) = opened(MAGIC, bytes).map_err(|closed| match closed {
-            Closed::Other => wrong("the bytes are no tracker that this version of hoid has saved"),
+            Closed::Other => wrong("the bytes are not a tracker that this version of hoid has saved"),
             Closed::Damaged => damaged(),
         })?;
         let numbers = as_numbers(numbers).ok_or_else(damaged)?;
@@ -46,13 +46,13 @@ impl Session {
             listed => Some(orders(listed).ok_or_else(damaged)?),
         };
         let text = |name: &str| description[name].as_str().map(str::to_owned);
-        let asked = Asked {
+        let asked = TrackerRequest {
             method: text("method"),
             sample_time_s: description["sample_time"].as_f64().ok_or_else(damaged)?,
             options: text("options"),
             fit: text("fit"),
         };
-        let live = |understood: &crate::options::Understood| {
+        let live = |understood: &crate::options::ResolvedTracker| {
             Live::restored(&understood.plan, orders, &numbers, understood.sample_time)
         };
         Self::of(asked, live).map_err(|failure| Failure::new(HOID_BAD_STATE, failure.text))
@@ -104,7 +104,7 @@ mod tests {
     fn a_saved_tracker_goes_on_with_the_same_digits() {
         let samples = samples();
         let [taken, all] = TAKEN;
-        // The second is an earlier name, as it stands in what was saved under it.
+        // The second is an earlier name, as it is in what was saved under it.
         let of_bank = [("adaptive", None), ("population", None)];
         let at_work = [("rpem", Some(AT_ONCE))];
         let warm = [

@@ -1,5 +1,5 @@
-//! A tracker as it was asked for, from its warm-up on. Nothing here knows of C, but for the names,
-//! which C wants to keep.
+//! A tracker as it was requested, from its warm-up on. Nothing here knows of C, except for the
+//! names, which C wants to keep.
 
 use std::ffi::{CStr, CString};
 
@@ -8,7 +8,7 @@ use hoid_model::{VerdictLevel, uncertainty::Estimate};
 use hoid_track::{Change, Counts, Live, Outcome, Sample, TrackPlan, Tracker};
 
 use crate::{
-    options::{Asked, Understood},
+    options::{ResolvedTracker, TrackerRequest},
     status::Failure,
     types::{HOID_SHIFTS, HoidChange, HoidCounts, HoidEstimate, HoidOutcome, HoidShift},
 };
@@ -22,12 +22,12 @@ const OPERATOR: [(&CStr, &CStr); 6] = [
     (c"zeta_nm", c""),
     (c"tau_e", c"s"),
 ];
-/// What a change is of.
+/// Quantities that a change refers to.
 const SHIFTED: [&CStr; HOID_SHIFTS] = [c"K_e", c"K_e_dot", c"omega_nm", c"zeta_nm", c"remnant", c"tau_e"];
 
-/// A tracker and what is known of it.
+/// A tracker and the prior knowledge of it.
 pub(crate) struct Session {
-    asked: Asked,
+    asked: TrackerRequest,
     plan: TrackPlan,
     sample_time: hoid_model::SampleTime,
     live: Live,
@@ -43,7 +43,7 @@ impl Session {
         options: Option<&str>,
         fit: Option<&str>,
     ) -> Result<Self, Failure> {
-        let asked = Asked {
+        let asked = TrackerRequest {
             method: method.map(str::to_owned),
             sample_time_s,
             options: options.map(str::to_owned),
@@ -55,8 +55,11 @@ impl Session {
     }
 
     /// With the recursion that `live` makes.
-    pub fn of(asked: Asked, live: impl FnOnce(&Understood) -> Result<Live, IdentError>) -> Result<Self, Failure> {
-        let understood = asked.understood()?;
+    pub fn of(
+        asked: TrackerRequest,
+        live: impl FnOnce(&ResolvedTracker) -> Result<Live, IdentError>,
+    ) -> Result<Self, Failure> {
+        let understood = asked.resolve()?;
         let mut session = Self {
             live: live(&understood)?,
             asked,
@@ -68,8 +71,8 @@ impl Session {
         Ok(session)
     }
 
-    /// What it was made of, and its recursion to be saved.
-    pub fn parts(&mut self) -> (&Asked, &mut Live) {
+    /// Components of it, and its recursion to be saved.
+    pub fn parts(&mut self) -> (&TrackerRequest, &mut Live) {
         (&self.asked, &mut self.live)
     }
 
@@ -188,10 +191,10 @@ impl Session {
     /// Logarithm of the odds of a change within the last seconds.
     pub fn change_log_odds(&self) -> Result<f64, Failure> {
         let odds = self.tracker()?.change_odds();
-        odds.ok_or_else(|| Failure::nothing("the method tells no changes; adaptive and multiple-model do"))
+        odds.ok_or_else(|| Failure::nothing("the method does not report changes; adaptive and multiple-model do"))
     }
 
-    /// What the estimate is worth now.
+    /// Verdict on the estimate now.
     pub fn level(&self) -> VerdictLevel {
         self.tracker().map_or(VerdictLevel::NotDetermined, |tracker| {
             tracker.level(&tracker.operator())
@@ -271,7 +274,7 @@ mod tests {
         for ((name, unit, _), (name_c, unit_c)) in rows.into_iter().zip(OPERATOR) {
             assert_eq!((name, unit), (name_c.to_str().unwrap(), unit_c.to_str().unwrap()));
         }
-        // Each quantity alone is the one that is said to have changed.
+        // Each quantity alone is the one that is reported to have changed.
         for (i, name) in SHIFTED.into_iter().enumerate() {
             let fixed = [Estimate::fixed(1.0); 2];
             let mut change = Change {

@@ -1,4 +1,4 @@
-//! Statuses, and the text behind the last one.
+//! Statuses, and the text after the last one.
 //!
 //! The text belongs to the thread: two threads with a tracker each do not mix theirs up.
 
@@ -13,12 +13,13 @@ use hoid_ident::IdentError;
 use hoid_io::IoError;
 use hoid_model::ModelError;
 
-/// What a function answers: zero for done, positive where there is no value, negative for an error.
+/// Return code of a function: zero for done, positive where there is no value, negative for an
+/// error.
 pub type HoidStatus = i32;
 
 /// Done.
 pub const HOID_OK: HoidStatus = 0;
-/// There is no such value now; hoid_last_error says why.
+/// There is no such value now; hoid_last_error gives the reason.
 pub const HOID_NOTHING: HoidStatus = 1;
 /// A pointer is null or not aligned.
 pub const HOID_BAD_POINTER: HoidStatus = -1;
@@ -86,17 +87,17 @@ pub(crate) fn guarded(call: impl FnOnce() -> Result<(), Failure>) -> HoidStatus 
     let failure = match catch_unwind(AssertUnwindSafe(call)) {
         Ok(Ok(())) => return HOID_OK,
         Ok(Err(failure)) => failure,
-        Err(panic) => Failure::new(HOID_PANIC, said(&*panic)),
+        Err(panic) => Failure::new(HOID_PANIC, panic_message(&*panic)),
     };
     remember(&failure.text);
     failure.status
 }
 
-/// What a panic says.
-pub(crate) fn said(panic: &(dyn Any + Send)) -> String {
+/// Report of a panic.
+pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> String {
     let words = (panic.downcast_ref::<&str>().copied())
         .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
-        .unwrap_or("a fault without words");
+        .unwrap_or("a fault without text");
     format!("a fault of hoid itself, please report it: {words}")
 }
 
@@ -106,7 +107,7 @@ fn remember(text: &str) {
     let _ = LAST.try_with(|last| *last.borrow_mut() = text);
 }
 
-/// The text behind the last status of this thread that was not HOID_OK, empty before the first. It
+/// The text after the last status of this thread that was not HOID_OK, empty before the first. It
 /// stays until the next one.
 #[unsafe(no_mangle)]
 pub extern "C" fn hoid_last_error() -> *const c_char {

@@ -9,7 +9,7 @@ use crate::{
     types::HoidOutcome,
 };
 
-/// Takes a sample: error e and control u. NaN stands for what is missing. `outcome` may be NULL.
+/// Takes a sample: error e and control u. NaN represents missing values. `outcome` may be NULL.
 ///
 /// # Safety
 /// `tracker` was made here; `outcome` is NULL or has room for one.

@@ -1,10 +1,10 @@
-//! What is handed over. Numbers that are not known are NaN.
+//! The data passed on. Numbers that are not known are NaN.
 
 use std::{ffi::c_char, ptr};
 
 use hoid_model::uncertainty::Estimate;
 
-/// What a sample led to.
+/// Result of a sample.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HoidOutcome {
@@ -32,7 +32,7 @@ pub struct HoidEstimate {
     pub unit: *const c_char,
     /// The value.
     pub value: f64,
-    /// Its standard error; NaN where there is none.
+    /// Its standard error; NaN if there is none.
     pub standard_error: f64,
     /// 1 where the data determine it, 0 where they do not, -1 where that is not judged.
     pub determined: i32,
@@ -58,11 +58,11 @@ pub struct HoidShift {
     pub name: *const c_char,
     /// Value before the change.
     pub before: f64,
-    /// Its standard error; NaN where there is none.
+    /// Its standard error; NaN if there is none.
     pub before_standard_error: f64,
     /// Value after the change.
     pub after: f64,
-    /// Its standard error; NaN where there is none.
+    /// Its standard error; NaN if there is none.
     pub after_standard_error: f64,
     /// The change over its standard error; for the remnant that of the logarithm.
     pub z: f64,
@@ -108,7 +108,7 @@ pub struct HoidCounts {
     pub skipped: u64,
     /// Samples that the guard held back.
     pub held: u64,
-    /// How often the guard began the estimate again.
+    /// How often the guard started the estimate again.
     pub restarts: u64,
     /// Steps that stability or a bound made shorter.
     pub steps_shortened: u64,

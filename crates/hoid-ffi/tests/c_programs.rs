@@ -24,7 +24,7 @@ fn built(name: &str, with: &str, options: &[&str]) -> Option<(TempDir, PathBuf)>
     Some((folder, program))
 }
 
-/// Value and error of each, NaN where there is none.
+/// Value and error of each, NaN if there is none.
 fn numbers(estimates: &[Option<Estimate>]) -> Vec<f64> {
     let pair = |e: &Option<Estimate>| {
         let value = e.map_or(f64::NAN, |e| e.value);
@@ -55,10 +55,10 @@ fn expected(record: &Record, options: &TrackOptions) -> Vec<Vec<f64>> {
         .collect()
 }
 
-fn usual(record: &Record) -> TrackOptions {
+fn typical(record: &Record) -> TrackOptions {
     let (method, structure) = (Method::adaptive(), Structure::BoxJenkins);
     let ranges = ranges_of(&method, structure, &NamedOrders::new(), &[], record.sample_time()).unwrap();
-    let options = TrackOptions::usual(method, 29);
+    let options = TrackOptions::default_for(method, 29);
     let plan = TrackPlan::new(options, ranges, Criterion::Bic, record.sample_time()).unwrap();
     plan.options().clone()
 }
@@ -88,7 +88,7 @@ fn the_example_in_c_gives_the_digits_of_rust() {
     let record = record();
     let with_element = TrackOptions {
         controlled_element: Some(ELEMENT.parse().unwrap()),
-        ..usual(&record)
+        ..typical(&record)
     };
     let expected_rows = expected(&record, &with_element);
     let options = format!("{{\"controlled_element\": \"{ELEMENT}\"}}");
@@ -108,7 +108,7 @@ fn the_s_function_gives_the_digits_of_rust() {
         return;
     };
     let record = record();
-    let rows = expected(&record, &usual(&record));
+    let rows = expected(&record, &typical(&record));
     let output = run(&program, &["adaptive", "0.01", ""], &lines(&record));
     same(&good(&output), &rows, &(0..17).collect::<Vec<_>>());
     let refused = run(&program, &["kalman", "0.01", ""], "");
@@ -124,7 +124,7 @@ fn the_dueca_module_gives_the_digits_of_rust() {
         return;
     };
     let record = record();
-    let rows = expected(&record, &usual(&record));
+    let rows = expected(&record, &typical(&record));
     let found = good(&run(&program, &[], &lines(&record)));
     same(&found, &rows, &[0, 1, 2, 3, 6, 8, 10]);
 }
@@ -154,7 +154,7 @@ fn the_example_in_cpp_gives_the_digits_of_rust() {
     let record = record();
     let options = TrackOptions {
         start: StartAt::Span(None),
-        ..usual(&record)
+        ..typical(&record)
     };
     let rows = expected(&record, &options);
     let found = good(&run(&program, &["adaptive", "0.01"], &lines(&record)));

@@ -37,18 +37,18 @@ type Lists<T> = unsafe extern "C" fn(*const HoidTracker, *mut T, usize, *mut usi
 /// A list: first its length, then into memory that was never written to, just long enough.
 fn listed<T: Copy>(tracker: *const HoidTracker, of: Lists<T>) -> Vec<T> {
     let mut count = 0;
-    // SAFETY: a tracker; only the count is asked for.
+    // SAFETY: a tracker; only the count is requested.
     assert_eq!(unsafe { of(tracker, ptr::null_mut(), 0, &mut count) }, HOID_OK);
     let mut list = Vec::<T>::with_capacity(count);
     if count > 0 {
         let mut small = Vec::<T>::with_capacity(count - 1);
-        // SAFETY: a tracker, and room as told, which is too little.
+        // SAFETY: a tracker, and room as reported, which is too little.
         let status = unsafe { of(tracker, small.as_mut_ptr(), count - 1, &mut count) };
         assert_eq!(status, HOID_TOO_SMALL);
     }
     // SAFETY: a tracker, and room as told.
     assert_eq!(unsafe { of(tracker, list.as_mut_ptr(), count, &mut count) }, HOID_OK);
-    // SAFETY: so many were written.
+    // SAFETY: this many were written.
     unsafe { list.set_len(count) };
     list
 }
@@ -124,14 +124,14 @@ fn a_tracker_by_every_function_of_the_header() {
     assert!(read(hoid_last_error()).contains("multiple-model"));
 
     let mut length = 0;
-    // SAFETY: only the length is asked for.
+    // SAFETY: only the length is requested.
     let status = unsafe { hoid_tracker_save(tracker, ptr::null_mut(), 0, &mut length) };
     assert_eq!(status, HOID_OK);
     let mut bytes = Vec::<u8>::with_capacity(length);
-    // SAFETY: room for so many.
+    // SAFETY: room for this many.
     let status = unsafe { hoid_tracker_save(tracker, bytes.as_mut_ptr(), length, &mut length) };
     assert_eq!(status, HOID_OK);
-    // SAFETY: so many were written.
+    // SAFETY: this many were written.
     unsafe { bytes.set_len(length) };
     let mut second = ptr::null_mut();
     // SAFETY: a slice, a place on the stack.
@@ -150,7 +150,7 @@ fn a_tracker_by_every_function_of_the_header() {
     }
 }
 
-/// The text behind a status is that of its thread, and two threads have a tracker each.
+/// The text after a status is that of its thread, and two threads have a tracker each.
 #[test]
 fn threads_with_a_tracker_each() {
     let tracked = |names: &'static str| {
@@ -273,7 +273,7 @@ macro_rules! life_of_a_unit {
         let mut counts = [-1; 2];
         assert_eq!(counted!($get_count, references, 2, counts.as_mut_ptr()), 0);
         assert_eq!(counts, [SAMPLES as c_int, 0]);
-        // An output is not set, nothing is read by a list that is null, no elements are no list.
+        // An output is not set, nothing is read by a list that is null, no elements are not a list.
         assert_eq!(counted!($set_count, references, 2, counts.as_ptr()), 3);
         assert_eq!(counted!($get_count, references, 2, ptr::null_mut()), 3);
         assert_eq!(counted!($get_count, references, 0, ptr::null_mut()), 0);
@@ -350,7 +350,8 @@ struct Callbacks {
     environment: *mut c_void,
 }
 
-/// Notes what it is told. Rust has such functions under Miri's compiler alone; elsewhere C has them.
+/// Notes what it is reported. Rust has such functions under Miri's compiler alone; elsewhere C has
+/// them.
 #[cfg(miri)]
 unsafe extern "C" fn logger_2(
     environment: *mut c_void,
@@ -478,7 +479,7 @@ fn a_unit_by_every_function_of_fmi_3() {
     assert!(told.iter().all(|(status, text)| *status == 3 && !text.is_empty()) && told.len() > 4);
 }
 
-/// What the library hands out stands above, but for what answers with an error whatever it is given.
+/// What the library hands out is above, except for what answers with an error whatever it is given.
 #[test]
 #[cfg_attr(miri, ignore = "it reads sources, not memory of a caller")]
 fn no_function_is_left_out() {

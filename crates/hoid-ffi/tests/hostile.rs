@@ -1,4 +1,4 @@
-//! Whatever a caller hands over, the answer is a status: no panic, no value that is none.
+//! Whatever a caller hands over, the answer is a status: no panic, no value that is invalid.
 #![allow(clippy::unwrap_used)]
 
 use std::{
@@ -39,11 +39,11 @@ fn answered(status: HoidStatus, tracker: *mut HoidTracker) -> Result<Owned, (Hoi
 
 fn saved(tracker: &Owned) -> Vec<u8> {
     let mut length = 0;
-    // SAFETY: only the length is asked for.
+    // SAFETY: only the length is requested.
     let status = unsafe { hoid_tracker_save(tracker.0, ptr::null_mut(), 0, &mut length) };
     assert_eq!(status, HOID_OK);
     let mut bytes = vec![0; length];
-    // SAFETY: room for so many.
+    // SAFETY: room for this many.
     let status = unsafe { hoid_tracker_save(tracker.0, bytes.as_mut_ptr(), length, &mut length) };
     assert_eq!(status, HOID_OK);
     bytes
@@ -64,7 +64,7 @@ const ANY: HoidEstimate = HoidEstimate {
     determined: 0,
 };
 
-/// Everything that a tracker says, each with an answer that is not a fault.
+/// Everything that a tracker reports, each with an answer that is not a fault.
 fn asked(tracker: &Owned) -> Vec<HoidStatus> {
     let t = tracker.0;
     let mut list = [ANY; 64];
@@ -118,7 +118,7 @@ fn null_pointers_are_refused_everywhere() {
     // SAFETY: null is allowed.
     let status = unsafe { hoid_tracker_step(ptr::null_mut(), 0.0, 0.0, ptr::null_mut()) };
     assert_eq!(status, HOID_BAD_POINTER);
-    // The usual method, or under Miri the one that is made in no time.
+    // The default method, or under Miri the one that is made in no time.
     let (method, options) = if cfg!(miri) {
         (c"rpem".as_ptr(), c"{\"nk\": 9}".as_ptr())
     } else {
@@ -179,7 +179,7 @@ fn a_fit_is_what_a_tracker_begins_with() {
     assert_eq!(first(&tracker), first(&same));
     let value = f64::from_bits(first(&tracker)[0].0);
     assert!((value - 2.0).abs() < 0.2, "the gain of the fit: {value}");
-    // It goes on from its bytes, which have the fit in them.
+    // It continues from its bytes, which have the fit in them.
     assert_eq!(first(&restored(&saved(&tracker)).ok().unwrap()), first(&tracker));
     // The sample time is that of the fit.
     let (status, said) = of(0.02, fit).err().unwrap();
@@ -267,7 +267,7 @@ proptest! {
         prop_assert_eq!(saved(&again), saved(&tracker));
     }
 
-    /// Options of any kind make a tracker or say why not.
+    /// Options of any kind make a tracker or give the reason why not.
     #[test]
     #[cfg_attr(miri, ignore = "the filters of the method adaptive take minutes there; tests/every_function.rs has few samples")]
     fn any_options_have_an_answer(
@@ -290,7 +290,7 @@ proptest! {
         }
     }
 
-    /// Bytes of any kind are no tracker.
+    /// Bytes of any kind are not a tracker.
     #[test]
     fn any_bytes_are_refused(bytes in prop::collection::vec(any::<u8>(), 0..200), magic in any::<bool>()) {
         let bytes = if magic { [b"hoid\x01\0\0\0".as_slice(), &bytes].concat() } else { bytes };

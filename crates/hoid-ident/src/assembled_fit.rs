@@ -26,7 +26,7 @@ pub(crate) struct Solution {
 /// The fit there, without a covariance.
 ///
 /// # Errors
-/// Those of [`PolynomialModel::new`].
+/// The errors of [`PolynomialModel::new`].
 pub(crate) fn assembled_fit(
     criterion: &Criterion<'_>,
     structure: Structure,

@@ -30,7 +30,7 @@ impl Constraint {
 
 /// A guess theta* of one parameter: the loss grows by `weight (theta - theta*)^2`.
 ///
-/// A weight of `sigma^2 / (N s^2)` stands for knowledge of theta* with the standard deviation s
+/// A weight of `sigma^2 / (N s^2)` represents knowledge of theta* with the standard deviation s
 /// (innovation variance sigma^2, N residuals).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {

@@ -2,8 +2,8 @@
 //!
 //! A simple root z of `p(z) = z^n + p_1 z^{n-1} + ... + p_n` moves with the coefficients as
 //! `dz/dp_j = -z^{n-j} / p'(z)`; the same holds for B with its leading coefficient b_0. At a
-//! multiple root the derivative does not exist, and near one it says little: the standard error
-//! grows without bound there, as the root itself is ill determined.
+//! multiple root the derivative does not exist, and near one it carries little information: the
+//! standard error grows without bound there, as the root itself is ill determined.
 //!
 //! The open loop is `L(omega, theta) = H(omega, theta) Y_c(omega)` with the controlled element Y_c
 //! given. Where `|L| = 1` stays so while theta moves,
@@ -46,8 +46,7 @@ impl Root {
     }
 }
 
-/// Crossover and margins of an open loop with their uncertainty; `None` where there is no
-/// crossover.
+/// Crossover and margins of an open loop with their uncertainty; `None` if there is no crossover.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MarginEstimates {
     /// Gain crossover frequency omega_c in rad/s.

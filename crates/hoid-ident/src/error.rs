@@ -34,7 +34,7 @@ pub enum IdentError {
         label: String,
         /// Its sample time, s.
         found: f64,
-        /// That of the first record, s.
+        /// The value for the first record, s.
         expected: f64,
     },
     /// Fewer residuals than unknowns.
@@ -93,7 +93,7 @@ pub enum IdentError {
     /// A channel that a record does not have.
     #[error("record {label} has no channel {channel} to make instruments of; it has {available}")]
     NoChannel {
-        /// The channel that was asked for.
+        /// The channel that was requested.
         channel: String,
         /// The record.
         label: String,
@@ -111,10 +111,10 @@ pub enum IdentError {
     /// A start that the search cannot use.
     #[error("the start cannot be used: {reason}")]
     BadStart {
-        /// What is wrong with it, and the remedy.
+        /// Problems with it, and the remedy.
         reason: String,
     },
-    /// A name that is no parameter of the model.
+    /// A name that is not a parameter of the model.
     #[error("the model has no parameter {name}; it has {available}")]
     UnknownParameter {
         /// The name.
@@ -122,14 +122,14 @@ pub enum IdentError {
         /// The parameters there are.
         available: String,
     },
-    /// An option that makes no sense, alone or with the others.
+    /// An option that is not valid, alone or with the others.
     #[error("{option}: found {found}; expected {expected}")]
     BadOption {
         /// The option.
         option: String,
-        /// What was given.
+        /// The value given.
         found: String,
-        /// What would be right.
+        /// The expected value.
         expected: String,
     },
     /// An option that contradicts another, or does not fit the estimator.
@@ -137,7 +137,7 @@ pub enum IdentError {
     Option {
         /// Its name.
         name: &'static str,
-        /// What was found, what was expected, what to do.
+        /// The findings, the expected value, what to do.
         reason: String,
     },
     /// Not one start led to a finite loss.

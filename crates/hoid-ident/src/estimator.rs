@@ -1,6 +1,6 @@
 //! The estimator by the prediction error method: what is to be estimated, and how.
 //!
-//! The options, their check, and the calls that fit. The method itself stands in [`crate::pem`].
+//! The options, their check, and the calls that fit. The method itself is in [`crate::pem`].
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use crate::{
     pem::{batched, fit_settings::FitSettings, prediction_focus, simulation_focus},
 };
 
-/// What the fitted model is to be good at.
+/// Purpose of the fitted model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Focus {
     /// One-step-ahead prediction: the prediction error method, efficient where the structure is
@@ -28,7 +28,7 @@ pub enum Focus {
 
 hoid_model::named_choice!(Focus, "focus", 2, { Prediction => "prediction", Simulation => "simulation" });
 
-/// What is to be estimated, and how.
+/// Quantity to be estimated, and how.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimator {
     /// The structure.
@@ -53,9 +53,9 @@ pub struct Estimator {
     /// How a residual counts. Default: by its square. With a robust loss each sample of e and u is
     /// held to its neighbours beforehand ([`crate::faults::resistant`]).
     pub loss: Loss,
-    /// What the model is to be good at. Default: prediction.
+    /// Purpose of the model. Default: prediction.
     pub focus: Focus,
-    /// True where u of each record has a constant that is no response to e, an unknown as its initial states are
+    /// True if u of each record has a constant that is not a response to e, an unknown as its initial states are
     /// ([`crate::level`]); not with initial states of zero. Default false.
     pub level: bool,
     /// True when A must be stable too, so that the model from e to u is. C and F always are.
@@ -94,7 +94,7 @@ impl Estimator {
     /// Checks structure, orders and options against each other.
     ///
     /// # Errors
-    /// [`IdentError`] with what is wrong.
+    /// [`IdentError`] with the problem.
     pub fn check(&self) -> Result<(), IdentError> {
         self.orders.check(self.structure)?;
         let mut named = self.constraints.keys().chain(self.priors.keys()).peekable();
@@ -144,7 +144,7 @@ impl Estimator {
                 return Err(IdentError::BadOption {
                     option: "the focus".to_owned(),
                     found: format!("simulation with {}", self.orders),
-                    expected: "na = 0 or nf = 0: the simulation error does not tell A from F".to_owned(),
+                    expected: "na = 0 or nf = 0: the simulation error does not distinguish A from F".to_owned(),
                 });
             }
         }
@@ -191,11 +191,12 @@ impl Estimator {
     /// Fits a model to each record alone.
     ///
     /// Box-Jenkins models of records of one length are searched side by side, in about half of the
-    /// time of one after the other. What a fit finds does not depend on what it is searched beside;
-    /// it differs from that of [`Estimator::fit`] by rounding, less than 1e-7 of a standard error.
+    /// time of one after the other. Dependencies of a fit finds does not what it is searched
+    /// alongside; it differs from that of [`Estimator::fit`] by rounding, less than 1e-7 of a
+    /// standard error.
     ///
     /// # Errors
-    /// Those of [`Estimator::fit`], for each record by itself.
+    /// The errors of [`Estimator::fit`], for each record by itself.
     pub fn fit_each(&self, records: &[&Record]) -> Vec<Result<Fit, IdentError>> {
         let batched = match self.check() {
             Ok(()) if self.focus == Focus::Prediction => {
@@ -209,12 +210,12 @@ impl Estimator {
         })
     }
 
-    /// True where the system from e to u is to minimise another error than that of the prediction.
+    /// True if the system from e to u is to minimise another error than that of the prediction.
     fn simulates(&self) -> bool {
         self.focus == Focus::Simulation && self.structure != Structure::OutputError
     }
 
-    /// What the method needs of the options.
+    /// Requirements of the method on the options.
     pub(crate) fn settings(&self) -> FitSettings {
         FitSettings {
             structure: self.structure,

@@ -31,9 +31,9 @@ pub struct Fit {
     pub(crate) held: Vec<bool>,
     /// Variance of the output over the residuals that count.
     pub(crate) output_variance: f64,
-    /// True where the innovation variance is the square of a robust scale.
+    /// True if the innovation variance is the square of a robust scale.
     pub(crate) robust: bool,
-    /// True where instruments stood in place of the regressors.
+    /// True if instruments replaced the regressors.
     pub(crate) instrumented: bool,
     /// The physical parameters that theta was computed from, for a grey box.
     pub(crate) physical: Option<Box<Physical>>,
@@ -41,10 +41,10 @@ pub struct Fit {
     pub(crate) searched_delay: Option<SearchedDelay>,
 }
 
-/// What a grey box fitted: theta is a function of these.
+/// Physical parameters of a grey-box fit: theta is a function of these.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Physical {
-    /// What was fitted, in a line.
+    /// The fitted model, in a line.
     pub title: String,
     /// Name and estimate of each parameter.
     pub parameters: Vec<(String, Estimate)>,
@@ -144,7 +144,7 @@ impl Fit {
         self.states
     }
 
-    /// What was assumed about the time before the records.
+    /// Assumptions about the time before the records.
     pub fn initial_state(&self) -> InitialState {
         self.initial_state
     }
@@ -160,7 +160,7 @@ impl Fit {
         self.termination
     }
 
-    /// The start that won.
+    /// The best start.
     pub fn start(&self) -> &str {
         &self.start
     }
@@ -267,7 +267,7 @@ impl Fit {
         }
     }
 
-    /// T_n and K_n of the remnant filter that the noise model stands for. A grey box has fitted
+    /// T_n and K_n of the remnant filter that the noise model represents. A grey box has fitted
     /// them as they are held over each sample, whatever `how`.
     ///
     /// # Errors
@@ -322,8 +322,8 @@ impl Fit {
         Ok(output_less(record, self.errors_of(orders, &theta, record)?))
     }
 
-    /// Variance of what has the gradient `by_theta` and changes with the delay by `by_delay` (1/s);
-    /// `None` without a covariance.
+    /// Variance of a quantity with the gradient `by_theta` and changes with the delay by `by_delay`
+    /// (1/s); `None` without a covariance.
     pub(crate) fn variance_of(&self, by_theta: &[f64], by_delay: f64) -> Option<f64> {
         let covariance = self.covariance.as_ref()?;
         // The covariance holds (g's)^2 var tau already.

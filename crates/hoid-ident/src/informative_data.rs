@@ -1,8 +1,9 @@
 //! Whether records are informative enough for a model: one sample time, an input that moves, more
 //! residuals than unknowns.
 //!
-//! This is what can be said before the fit; whether the regressors are independent, the fit itself
-//! finds out. Source: L. Ljung, *System Identification*, 1999, section 8.2 (informative data).
+//! This is what can be reported before the fit; whether the regressors are independent, the fit
+//! itself finds out. Source: L. Ljung, *System Identification*, 1999, section 8.2 (informative
+//! data).
 
 use hoid_model::{Orders, Record, SampleTime, Structure};
 

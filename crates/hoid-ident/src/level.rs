@@ -1,4 +1,4 @@
-//! The level of a record: the constant of u that is no response to e.
+//! The level of a record: the constant of u that is not a response to e.
 //!
 //! `u(t) = c + G e(t) + v(t)`: a stick that rests off its zero, an amplifier with an offset, an e with one.
 //! For given dynamics c is linear, and of long records least squares is that of the means,
@@ -6,13 +6,13 @@
 //! `c = mean(u) - G(1) mean(e)`,
 //!
 //! so that a fit to e and u without their means ([`hoid_model::Detrend::Mean`]) is the fit with c for each record (L.
-//! Ljung, *System Identification*, 1999, section 14.1), but for the ends of the record and what happens in them: over a
-//! step the mean of u is no level. There c is an unknown of the fit, as the initial states are
-//! ([`crate::Estimator::level`]), and what is left of it in a record is
+//! Ljung, *System Identification*, 1999, section 14.1), except for the ends of the record and what happens in them:
+//! over a step the mean of u is not a level. There c is an unknown of the fit, as the initial states are
+//! ([`crate::Estimator::level`]), and the remainder of it in a record is
 //!
 //! `c = eps'z / z'z`, z the residuals of u = 1 at e = 0.
 //!
-//! Its variance is `sigma^2 |H(1)|^2/n`, H = C/(A D) the noise model, and what is not known of G(1),
+//! Its variance is `sigma^2 |H(1)|^2/n`, H = C/(A D) the noise model, and the uncertainty of G(1),
 //! `mean(e)^2 var G(1)`.
 
 use hoid_model::{
@@ -44,11 +44,11 @@ pub fn without_level(records: &[Record]) -> Vec<Record> {
 }
 
 impl Fit {
-    /// The constant of u that is no response to e, by least squares over the residuals; `None` where the model makes
+    /// The constant of u that is not a response to e, by least squares over the residuals; `None` if the model makes
     /// nothing of one, as with an integration.
     ///
     /// # Errors
-    /// Those of residuals.
+    /// The errors of residuals.
     pub fn constant_of(&self, record: &Record) -> Result<Option<f64>, IdentError> {
         let ones = |name: &str, one: f64| Channel::new(name, "", vec![one; record.len()]);
         let unit = Record::new(record.sample_time(), ones("e", 0.0), ones("u", 1.0))?;
@@ -58,9 +58,8 @@ impl Fit {
         Ok((squares > LEAST * of_unit.len() as f64 && found.is_finite()).then_some(found))
     }
 
-    /// The level c of u in a record, in the unit of u, with its standard error; the fit is one to the
-    /// record without its means. `None` where the model has no static gain (an integration), no input or
-    /// no noise.
+    /// The level c of u in a record, in the unit of u, with its standard error; the fit is one to the record without
+    /// its means. `None` if the model has no static gain (an integration), no input or no noise.
     pub fn level(&self, record: &Record) -> Option<Estimate> {
         let model = self.model();
         let covariance = self.covariance()?;
@@ -134,7 +133,7 @@ mod tests {
 
     #[test]
     fn it_is_the_constant_of_the_regression() {
-        // Twin: ARX is linear, with a column of ones beside the regressors.
+        // Twin: ARX is linear, with a column of ones next to the regressors.
         let record = moved(&simulated(40), 0.0, 0.03);
         let fit = fitted(Structure::Arx, &record);
         let (e, u) = (record.input(), record.output());
@@ -194,7 +193,7 @@ mod tests {
                 ..Estimator::new(structure, orders)
             };
             let Ok(fit) = estimator.fit(&without) else {
-                // With one pole too many exact data say nothing of the second.
+                // With one pole too many exact data carry no information about the second.
                 assert_eq!(orders.na, 2);
                 continue;
             };

@@ -18,13 +18,11 @@
 //!
 //! `eps(t, theta) = (D/C) (A u(t) - (B/F) q^-nk e(t))`
 //!
-//! and theta minimises `V = (1/N) sum eps(t, theta)^2`: the prediction error method (L. Ljung,
-//! *System Identification*, 1999, ch. 7). It is consistent where the structure holds the true
-//! dynamics, in a closed loop too if there is a delay in the loop, and it attains the Cramér-Rao
-//! bound for normal innovations. Its covariance is `sigma^2 (psi' psi)^-1` with
-//! `psi = -d eps/d theta`. What a record does not say about the time before it, the initial states,
-//! enters eps linearly and is eliminated exactly for each theta. ARX is linear in theta and solved
-//! in one step; the others by damped Gauss-Newton from several starts.
+//! and theta minimises `V = (1/N) sum eps(t, theta)^2`: the prediction error method (L. Ljung, *System Identification*,
+//! 1999, ch. 7). It is consistent where the structure holds the true dynamics, in a closed loop too if there is a delay
+//! in the loop, and it attains the Cramér-Rao bound for normal innovations. Its covariance is `sigma^2 (psi' psi)^-1`
+//! with `psi = -d eps/d theta`. The unknown initial states of a record enter eps linearly and is eliminated exactly for
+//! each theta. ARX is linear in theta and solved in one step; the others by damped Gauss-Newton from several starts.
 //!
 //! ```
 //! use hoid_ident::Estimator;
@@ -52,7 +50,7 @@
 //!
 //! **Where to find what**
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`Estimator`] | the prediction error method: structure, orders, options; `fit`, `fit_each` |
 //! | [`Fit`] | the model, its covariance and criteria; prediction, simulation, frequency response, poles and margins |
@@ -62,20 +60,20 @@
 //! | [`family`] | operators of recorded people: form, parameters, errors that hold, a verdict |
 //! | [`grey_box`] | the fit in physical parameters: operator with a real delay, remnant filter |
 //! | [`SigmoidChange`] | gains that follow a sigmoid, with the time and the rate of the change |
-//! | [`faults`] | faults of recorded data, found and mended before a fit |
+//! | [`faults`] | faults of recorded data, found and repaired before a fit |
 //! | [`frequency`] | describing function, coherence, remnant spectrum and margins by Fourier coefficients |
-//! | [`judgement`] | what speaks for and against a fit: [`Fit::verdict`] |
-//! | [`progress`] | how far a fit is, for whoever waits |
+//! | [`diagnostics`] | what speaks for and against a fit: [`Fit::verdict`] |
+//! | [`progress`] | how far a fit is, for the caller that waits |
 //! | [`linalg`] | sums of products, least squares by QR, the inverse of an information matrix |
 //!
 //! and inside, each using those before it:
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `optimize` | minimisation of a sum of squares, also along the border of stability |
 //! | `criterion` | the prediction-error criterion of the general model and its gradients; initial states |
 //! | `multistart` | searches from several starts |
-//! | `initial_guess` | where a search begins |
+//! | `initial_guess` | where a search starts |
 //! | `pem` | bounds, priors, robust loss, focus; fits of one record or of many side by side |
 //! | `searched_delay` | what the search of nk adds to the error bars |
 
@@ -83,6 +81,7 @@ mod assembled_fit;
 mod constraint;
 mod criterion;
 mod derived;
+pub mod diagnostics;
 mod error;
 mod estimator;
 pub mod family;
@@ -93,7 +92,6 @@ pub mod grey_box;
 mod informative_data;
 mod initial_guess;
 pub mod iv;
-pub mod judgement;
 pub mod level;
 pub mod linalg;
 mod multistart;

@@ -36,7 +36,7 @@ pub struct OrderRanges {
 /// Orders by their names (na, nb, nc, nd, nf, nk), each with its range.
 pub type NamedOrders = BTreeMap<String, RangeInclusive<usize>>;
 
-/// Refuses what is no order, and orders that no model has.
+/// Refuses values that are not orders, and orders that no model has.
 ///
 /// # Errors
 /// [`IdentError::BadOption`].
@@ -111,7 +111,7 @@ impl OrderRanges {
     /// With the orders that are named in the place of these.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a name that is no order.
+    /// [`IdentError::BadOption`] for a name that is not an order.
     pub fn with(mut self, named: &NamedOrders) -> Result<Self, IdentError> {
         for (name, range) in named {
             let place = match name.as_str() {
@@ -187,7 +187,7 @@ impl OrderRanges {
     }
 }
 
-/// What decides between candidates; the smallest value wins.
+/// Criterion that decides between candidates; the smallest value wins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Criterion {
     /// The loss itself: right only for candidates with the same number of parameters.
@@ -235,7 +235,7 @@ pub struct Candidate {
     pub outcome: Result<CandidateFigures, String>,
 }
 
-/// What candidates are compared by, all on the same samples.
+/// Criterion for candidates, all on the same samples.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CandidateFigures {
     /// Loss V.
@@ -294,7 +294,7 @@ pub struct Choice {
     pub fit: Fit,
     /// All candidates in the order of [`OrderRanges::combinations`].
     pub candidates: Vec<Candidate>,
-    /// What decided.
+    /// The criterion of the choice.
     pub criterion: Criterion,
 }
 
@@ -428,7 +428,7 @@ fn fit_neighbours(
 /// alone.
 ///
 /// # Errors
-/// Those of [`Estimator::fit`] and [`choose_orders`]; [`IdentError::BadStart`] for a start where
+/// The errors of [`Estimator::fit`] and [`choose_orders`]; [`IdentError::BadStart`] for a start where
 /// several models are tried.
 pub fn fit_or_choose(
     template: &Estimator,
@@ -456,9 +456,9 @@ pub fn fit_or_choose(
 }
 
 impl Choice {
-    /// Delays nk that the data do not tell from the best one, the other orders being those of the
-    /// chosen model: the smallest and the largest with `n ln(V/V_min) <= 3.84`, the 95 % point of
-    /// chi-square with one degree of freedom (a profile likelihood interval; nk moves in whole
+    /// Delays nk that the data do not determine from the best one, the other orders being those of
+    /// the chosen model: the smallest and the largest with `n ln(V/V_min) <= 3.84`, the 95 % point
+    /// of chi-square with one degree of freedom (a profile likelihood interval; nk moves in whole
     /// samples, so that it is coarse where one sample changes the loss much). `None` when fewer
     /// than two delays were fitted.
     pub fn delay_interval(&self) -> Option<(usize, usize)> {

@@ -1,7 +1,7 @@
-//! How far a fit is, told to whoever waits on the thread that fits.
+//! How far a fit is, reported to the caller that waits on the thread that fits.
 //!
-//! A fit of forms or orders, one after the other, lasts seconds on many or long records. It says
-//! before each which one of how many it is; without anybody who watches that costs nothing.
+//! A fit of forms or orders, one after the other, lasts seconds on many or long records. It reports
+//! before each which one of how many it is; without anyone who watches that costs nothing.
 
 use std::{
     cell::RefCell,
@@ -11,10 +11,10 @@ use std::{
     },
 };
 
-/// What is being done now.
+/// Current activity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Step {
-    /// What is counted, in the plural.
+    /// The counted items, in the plural.
     pub what: &'static str,
     /// How many are done.
     pub done: usize,
@@ -28,7 +28,7 @@ thread_local! {
     static WATCHER: RefCell<Option<Watcher>> = const { RefCell::new(None) };
 }
 
-/// Does the work and tells the watcher each of its steps on this thread.
+/// Does the work and informs the watcher each of its steps on this thread.
 pub fn watched<T>(watcher: impl Fn(Step) + Send + Sync + 'static, work: impl FnOnce() -> T) -> T {
     /// Puts back who watched before, whatever happens.
     struct Before(Option<Watcher>);
@@ -41,7 +41,7 @@ pub fn watched<T>(watcher: impl Fn(Step) + Send + Sync + 'static, work: impl FnO
     work()
 }
 
-/// Tells that so many are done.
+/// Reports that so many are done.
 pub(crate) fn step(what: &'static str, done: usize, total: usize) {
     // Taken out of the cell first: the watcher may fit something itself.
     let watcher = WATCHER.with_borrow(Clone::clone);
@@ -50,7 +50,8 @@ pub(crate) fn step(what: &'static str, done: usize, total: usize) {
     }
 }
 
-/// Counts what is done on many threads for who watches this one: each call is one more of `total`.
+/// Counts what is done on many threads for callers that watches this one: each call is one more of
+/// `total`.
 pub fn counter(what: &'static str, total: usize) -> impl Fn() + Send + Sync {
     let watcher = WATCHER.with_borrow(Clone::clone);
     let done = AtomicUsize::new(0);

@@ -1,4 +1,4 @@
-//! What a searched delay adds to the error bars of a fit.
+//! Contribution of a searched delay to the error bars of a fit.
 //!
 //! Where nk is searched it is estimated from the data as theta is, and theta moves with it. The
 //! residual has a slope along the delay too: with `x = (D/C) w = sum_j b_j psi_bj` the response of the
@@ -7,12 +7,11 @@
 //!
 //! `s = d theta/d tau = -G^-1 psi' d`
 //!
-//! and what `d` has beside psi tells the delay: `var tau = sigma^2/(d'd - d' psi G^-1 psi' d) + Ts^2/12`
-//! (the corner of the inverse of the information of theta and tau together: L. Ljung, *System
-//! Identification*, 1999, section 9.4; the second part is that nk is a whole number: W. F. Sheppard,
-//! *Proc. London Math. Soc.* 29 (1898) 353-380). It is no more than that of all delays that were
-//! searched being equally likely. The covariance of theta becomes `P + s s' var tau`, and what depends
-//! on theta by the gradient g and on the delay by h has the variance
+//! and what `d` has next to psi reports the delay: `var tau = sigma^2/(d'd - d' psi G^-1 psi' d) + Ts^2/12` (the corner
+//! of the inverse of the information of theta and tau together: L. Ljung, *System Identification*, 1999, section 9.4;
+//! the second part is that nk is a whole number: W. F. Sheppard, *Proc. London Math. Soc.* 29 (1898) 353-380). It is no
+//! more than that of all delays that were searched being equally likely. The covariance of theta becomes
+//! `P + s s' var tau`, and what depends on theta by the gradient g and on the delay by h has the variance
 //!
 //! `g' P g + (g' s + h)^2 var tau`.
 //!
@@ -30,9 +29,8 @@ use crate::{
 };
 
 impl Fit {
-    /// The same fit with the delay counted as estimated over a range of `delays` values of nk. Models
-    /// that stand for no operator are left as they are: with many coefficients of B a shift of one
-    /// sample renames them.
+    /// The same fit with the delay counted as estimated over a range of `delays` values of nk. Models that do not
+    /// correspond to any operator are left as they are: with many coefficients of B a shift of one sample renames them.
     pub(crate) fn with_searched_delay(self, records: &[Record], delays: usize) -> Self {
         match self.delay_from(records, delays) {
             None => self,
@@ -76,7 +74,7 @@ impl Fit {
             }
         }
         let a = gram.cholesky()?.solve(&along);
-        // What the range of delays says without the data.
+        // What the range of delays reports without the data.
         let most = (delays as f64 * ts).powi(2) / 12.0;
         let known = own - along.dot(&a);
         let from_data = if known > 0.0 {
@@ -93,8 +91,8 @@ impl Fit {
         finite.then_some(SearchedDelay { variance_s2, slope })
     }
 
-    /// Columns of psi in the record of a criterion, and d behind them: the residual's slope along the
-    /// delay, as if that were the last element of theta.
+    /// Columns of psi in the record of a criterion, and d after them: the residual's slope along the delay, as if that
+    /// were the last element of theta.
     pub(crate) fn jacobian_with_delay(&self, criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Vec<f64>> {
         let mut psi = criterion.jacobian(self.model.theta(), 0, workspace);
         let of_b = &psi[criterion.orders.na..];
@@ -240,7 +238,7 @@ mod tests {
 
     #[test]
     fn no_delay_is_less_certain_than_its_range() {
-        // e alone, far from u: the delay says nothing.
+        // e alone, far from u: the delay carries no information.
         let record = run(2);
         let delays = 3;
         let fit = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(29))

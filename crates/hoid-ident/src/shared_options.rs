@@ -30,7 +30,7 @@ const fn or_auto<const N: usize, const M: usize>(names: [&'static str; N]) -> [&
 /// A field of an estimator.
 pub type Field<E, T> = fn(&mut E) -> &mut T;
 
-/// What noise an operator has: which of the operators is fitted follows from it.
+/// Noise model of an operator, which determines the estimator.
 pub fn noise<E: 'static>(set: impl Fn(&mut E, &Setting, &str) -> Result<(), IdentError> + 'static) -> BatchOption<E> {
     let help =
         "Noise of the operator: ar an autoregression, arma with a moving average (nc), remnant the remnant of order m";
@@ -78,11 +78,11 @@ pub fn yes_words(yes: bool) -> String {
     if yes { "yes" } else { "no" }.to_owned()
 }
 
-/// What is known of the person before the data.
-pub fn prior<E: 'static>(usual: &str, field: Field<E, OperatorPrior>) -> BatchOption<E> {
+/// Prior knowledge of the person before the data.
+pub fn prior<E: 'static>(default: &str, field: Field<E, OperatorPrior>) -> BatchOption<E> {
     let help = "What is known of the person before the data: population (published people), none, a JSON result of another fit, or \
                 NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_L, T_I, as omega_nm=10.5:0.3 (the spread is relative)";
-    let setting = Setting::new("prior", Kind::Prior, help).default(usual);
+    let setting = Setting::new("prior", Kind::Prior, help).default(default);
     BatchOption::new(setting, move |how, _, text| {
         *field(how) = text.parse()?;
         Ok(())
@@ -90,27 +90,27 @@ pub fn prior<E: 'static>(usual: &str, field: Field<E, OperatorPrior>) -> BatchOp
 }
 
 /// Orders, each given or searched.
-pub fn orders(usual: &str) -> Setting {
+pub fn orders(default: &str) -> Setting {
     let help = "Orders, each a number or a range to search, as nb=2,nc=0,nd=1..4,nf=2; nb counts b0, b1, ...";
-    Setting::new("orders", Kind::Named(&Kind::Counts), help).default(usual)
+    Setting::new("orders", Kind::Named(&Kind::Counts), help).default(default)
 }
 
 /// The delay in s.
-pub fn delay(usual: &str) -> Setting {
+pub fn delay(default: &str) -> Setting {
     let help = "Delay tau_e, or the shortest and the longest; of polynomials in place of nk = tau_e/Ts + 1";
     Setting::new("delay", Kind::NumberOrSpan, help)
-        .default(usual)
+        .default(default)
         .unit("s")
         .bounds(Bounds::NonNegative)
 }
 
 /// The shortest and the longest delay of an operator, and how they are printed.
 pub fn delay_range<E: 'static>(
-    usual: (f64, f64),
+    default: (f64, f64),
     field: Field<E, (f64, f64)>,
     of: fn(&E) -> (f64, f64),
 ) -> BatchOption<E> {
-    let setting = delay(&usual.text().unwrap_or_default());
+    let setting = delay(&default.text().unwrap_or_default());
     BatchOption::new(setting, move |how, option, text| {
         let OneOrSpan(low, high) = option.read(text)?;
         *field(how) = (low, high);
@@ -119,7 +119,7 @@ pub fn delay_range<E: 'static>(
     .printed("delay in s", move |how, _| of(how).text())
 }
 
-/// A range of orders in words.
+/// A range of orders as text.
 pub fn range_words(range: &RangeInclusive<usize>) -> String {
     range.text().unwrap_or_default()
 }
@@ -148,7 +148,7 @@ pub fn initial_state<E: 'static>(
     })
 }
 
-/// What is held at a value, and what within bounds; each parameter once.
+/// Parameters fixed at a value or constrained to bounds; each parameter once.
 pub fn constraints<E: 'static>(
     field: Field<E, BTreeMap<String, Constraint>>,
     of: Constraints<E>,
@@ -218,9 +218,9 @@ pub fn named_words<'a>(values: impl IntoIterator<Item = (&'a String, f64)>) -> O
 }
 
 /// How the search of an estimator steps and ends, by its own defaults.
-pub fn search<E: 'static>(usual: SearchOptions, field: Field<E, SearchOptions>) -> Vec<BatchOption<E>> {
+pub fn search<E: 'static>(default: SearchOptions, field: Field<E, SearchOptions>) -> Vec<BatchOption<E>> {
     let mut all = vec![search_method(field)];
-    all.extend(search_ends(usual, field));
+    all.extend(search_ends(default, field));
     all
 }
 
@@ -236,16 +236,16 @@ pub fn search_method<E: 'static>(field: Field<E, SearchOptions>) -> BatchOption<
 }
 
 /// How a search ends.
-pub fn search_ends<E: 'static>(usual: SearchOptions, field: Field<E, SearchOptions>) -> [BatchOption<E>; 2] {
+pub fn search_ends<E: 'static>(default: SearchOptions, field: Field<E, SearchOptions>) -> [BatchOption<E>; 2] {
     let steps = Setting::new(
         "max_iterations",
         Kind::Count,
         "Largest number of search steps from each start",
     )
-    .default(&usual.max_iterations.to_string());
+    .default(&default.max_iterations.to_string());
     let tolerance = "Relative decrease of the loss below which the search has converged";
     let tolerance = Setting::new("tolerance", Kind::Number, tolerance)
-        .default(&format!("{:e}", usual.tolerance))
+        .default(&format!("{:e}", default.tolerance))
         .bounds(Bounds::PositiveFinite);
     [
         BatchOption::new(steps, move |how, option, text| {

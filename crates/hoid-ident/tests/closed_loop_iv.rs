@@ -138,15 +138,15 @@ fn standard_errors_cover_the_truth() {
         );
     }
     println!("{converged} of {runs} converged, {:.1} % covered", 100.0 * covered);
-    // One standard error of the coverage is .6 %, more for what is correlated.
+    // One standard error of the coverage is .6 %, more for correlated quantities.
     assert!(converged as f64 >= 0.99 * runs as f64 && (covered - 0.95).abs() < 0.03);
 }
 
 #[test]
 fn converges_near_the_truth_in_a_closed_loop_with_a_rich_remnant() {
     let (converged, errors) = study(4, 3);
-    // 24 numbers, correlated within a run: fewer than 15 beyond 1.96 but for one case in 1e6, and
-    // none beyond six.
+    // 24 numbers, correlated within a run: fewer than 15 beyond 1.96 except for one case in 1e6,
+    // and none beyond six.
     assert!(converged == 4 && covered(&errors) > 0.5, "{converged}: {errors:?}");
     assert!(errors.iter().flatten().all(|z| z.abs() < 6.0), "{errors:?}");
 }

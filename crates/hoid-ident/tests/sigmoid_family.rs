@@ -1,5 +1,5 @@
 //! An operator of the family whose numerator changes once: recovery without noise, errors over
-//! simulated runs, and what is said where there is nothing to see.
+//! simulated runs, and the report where there is nothing to see.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::collections::BTreeMap;
@@ -165,7 +165,7 @@ fn a_level_of_u_is_found_and_moves_nothing() {
         let moved = Record::new(record.sample_time(), e, channel("u", record.output(), level)).unwrap();
         let clean = with_level.fit(std::slice::from_ref(&record)).unwrap();
         let fit = with_level.fit(std::slice::from_ref(&moved)).unwrap();
-        // To what the searches leave open.
+        // To the range that the searches leave open.
         for (a, b) in clean.parameters().iter().zip(fit.parameters()) {
             let (a, b) = (a.estimate, b.estimate);
             let error = a.standard_error.unwrap_or(f64::INFINITY);

@@ -19,7 +19,7 @@ const MOST_KB: u64 = 300_000;
 const LONGEST: Duration = Duration::from_secs(2);
 
 fn main() -> ExitCode {
-    let number = |k: usize, usual: u64| std::env::args().nth(k).map_or(usual, |text| text.parse().unwrap());
+    let number = |k: usize, default: u64| std::env::args().nth(k).map_or(default, |text| text.parse().unwrap());
     let (count, first) = (number(1, 100), number(2, 0));
     let own = tempfile::tempdir().unwrap();
     let directory = std::env::args().nth(3).map_or(own.path().to_owned(), PathBuf::from);

@@ -3,10 +3,10 @@
 //!
 //! `cargo xtask slow mutations [--inputs N] [--first N] [--jobs N] [--seed N] [--memory MB] [--keep DIRECTORY]`.
 //!
-//! The cases are shared among processes, each with a limit of its address space (`ulimit -v`; where
-//! there is no such limit, nothing is said of memory). A case that ends its process, or keeps it for
-//! [`PATIENCE`], is told and the process goes on behind it. `--keep` writes the files of the cases
-//! that failed. It is built with overflow checks on, as the tests are.
+//! The cases are shared among processes, each with a limit of its address space (`ulimit -v`; where there is no such
+//! limit, nothing is reported about memory). A case that ends its process, or keeps it for [`PATIENCE`], is reported
+//! and the process continues after it. `--keep` writes the files of the cases that failed. It is built with overflow
+//! checks on, as the tests are.
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
 #[path = "../tests/common/mutations/mod.rs"]
@@ -25,14 +25,14 @@ use std::{
 
 use mutations::{Case, case, originals::originals, readers, spent::Spent};
 
-/// That of the page; the tests have another.
+/// The value for the page; the tests have another.
 const SEED: u64 = 2026;
-/// What one case may take.
+/// Time limit of one case.
 const LIMIT: Duration = Duration::from_secs(1);
-/// A process that does not go on for so long hangs.
+/// A process that does not continue for so long hangs.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// What is asked for.
+/// The request.
 #[derive(Debug, Clone)]
 struct Task {
     inputs: u64,
@@ -41,7 +41,8 @@ struct Task {
     seed: u64,
     memory_mb: u64,
     keep: Option<PathBuf>,
-    /// That of the process itself, where it is one of several: its place for files, and its number.
+    /// The value for the process itself, where it is one of several: its place for files, and its
+    /// number.
     part: Option<(PathBuf, u64)>,
 }
 
@@ -110,7 +111,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// What all processes say.
+/// Report of all processes.
 #[derive(Debug, Default)]
 struct Sum {
     read: u64,
@@ -182,7 +183,7 @@ fn start(task: &Task, place: &Path, first: u64, end: u64) -> Child {
     command.stdout(Stdio::piped()).spawn().unwrap()
 }
 
-/// Waits for the end; true where it does not come and the process is ended.
+/// Waits for the end; true if it does not come and the process is ended.
 fn wait(child: &mut Child, progress: &Path) -> bool {
     let mut last = (u64::MAX, Instant::now());
     while child.try_wait().unwrap().is_none() {
@@ -228,8 +229,8 @@ fn part(task: &Task, place: &Path, first: u64) {
         let path = place.join("damaged").with_extension(case.extension);
         fs::write(&path, &case.bytes).unwrap();
         let mut took = Duration::MAX;
-        // Where the system does not say what this process had, another may have had the processor: the
-        // least of three counts.
+        // Where the system does not report what this process had, another may have had the processor: the least of
+        // three counts.
         for _ in 0..3 {
             let begun = Spent::now();
             let outcome = panic::catch_unwind(AssertUnwindSafe(|| readers::all(&path, case.bytes.len(), case.choice)));
@@ -258,7 +259,7 @@ fn failed(task: &Task, number: u64, case: &Case, what: &str) {
     keep(task, number);
 }
 
-/// Most of the address space that this process had, where the system says so.
+/// Most of the address space that this process had, where the system reports it.
 fn largest_mb() -> u64 {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmPeak:"));

@@ -1,4 +1,4 @@
-//! Everything that can be wrong with a file, in the words of the person who has to mend it.
+//! Everything that can be wrong with a file, in the words of the person who has to repair it.
 
 use hoid_model::ModelError;
 use thiserror::Error;
@@ -6,8 +6,8 @@ use thiserror::Error;
 use crate::wording::list;
 
 /// Why a file could not be read or written. Each message names the file, the place in it, what was
-/// found, what was expected and the remedy. A `place` is "line 12" where the format has lines, else
-/// "row 12".
+/// found, the expected value and the remedy. A `place` is "line 12" where the format has lines,
+/// else "row 12".
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum IoError {
@@ -16,7 +16,7 @@ pub enum IoError {
     Unreadable {
         /// The file.
         file: String,
-        /// What the system says.
+        /// Error reported by the operating system.
         source: std::io::Error,
     },
     /// A file that the system does not take.
@@ -24,7 +24,7 @@ pub enum IoError {
     Unwritable {
         /// The file.
         file: String,
-        /// What the system says.
+        /// Error reported by the operating system.
         source: std::io::Error,
     },
     /// A result in the place of what it is made of.
@@ -34,17 +34,17 @@ pub enum IoError {
     OutputIsInput {
         /// The place of the result.
         file: String,
-        /// What is read.
+        /// The data read.
         input: String,
     },
-    /// Results among what they are made of.
+    /// Results must not overwrite their inputs.
     #[error(
         "{directory} holds {input}, which is read by the same command and may be lost; take another directory for the results"
     )]
     OutputAmongInputs {
         /// The directory of the results.
         directory: String,
-        /// What is read.
+        /// The data read.
         input: String,
     },
     /// A file that holds no fit.
@@ -52,12 +52,12 @@ pub enum IoError {
     NoFit {
         /// The file.
         file: String,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
-    /// A file that is no shared library of a platform that units are made for.
+    /// A file that is not a shared library of a platform that units are made for.
     #[error(
-        "{file} is no shared library for Linux, Windows or macOS with 64 bits; give the one that `cargo xtask ffi` has built"
+        "{file} is not a shared library for Linux, Windows or macOS with 64 bits; give the one that `cargo xtask ffi` has built"
     )]
     NoLibrary {
         /// The file.
@@ -85,7 +85,7 @@ pub enum IoError {
         /// The directory.
         file: String,
     },
-    /// An extension that stands for no format.
+    /// An extension that does not correspond to any format.
     #[error("{file}: {found}, which names no format of a record; expected {expected}{remedy}")]
     UnknownFormat {
         /// The file.
@@ -94,10 +94,10 @@ pub enum IoError {
         found: String,
         /// The extensions that are known.
         expected: String,
-        /// "; unpack it", empty where the format is unknown.
+        /// "; unpack it", empty if the format is unknown.
         remedy: String,
     },
-    /// Bytes that are no text.
+    /// Bytes that are not text.
     #[error("{file}, {place}: {found}, expected text in UTF-8; save the table as CSV in UTF-8")]
     NotText {
         /// The file.
@@ -133,7 +133,7 @@ pub enum IoError {
     },
     /// Cells between blanks.
     #[error(
-        "{file}: {found} numbers between blanks stand in a line, expected commas, semicolons or tabs between them; save the table so, with a header such as t,e,u"
+        "{file}: {found} numbers between blanks are in a line, expected commas, semicolons or tabs between them; save the table so, with a header such as t,e,u"
     )]
     Blanks {
         /// The file.
@@ -204,17 +204,17 @@ pub enum IoError {
         missing: String,
         /// The whole expression.
         asked: String,
-        /// "; did you mean "u"?", empty where no name is near.
+        /// "; did you mean "u"?", empty if no name is near.
         meant: String,
         /// The names that exist.
         available: String,
     },
-    /// Text that is no choice of a column.
+    /// Text that is not a choice of a column.
     #[error("the column \"{found}\": {expected}")]
     Expression {
         /// The text as given.
         found: String,
-        /// What is wrong, and the remedy.
+        /// The problem, and the remedy.
         expected: String,
     },
     /// One column as input and as output.
@@ -236,7 +236,7 @@ pub enum IoError {
         column: String,
         /// The text found, cut to a readable length.
         found: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
     /// An infinite value.
@@ -268,7 +268,7 @@ pub enum IoError {
         found: String,
         /// How many values are missing.
         count: usize,
-        /// How many rows were looked at.
+        /// How many rows were examined.
         rows: usize,
     },
     /// Missing values with nothing on one side of them.
@@ -321,17 +321,17 @@ pub enum IoError {
         /// Their names, two at least.
         trials: Vec<String>,
     },
-    /// A trial that is not there.
+    /// A trial that does not exist.
     #[error("{file}: there is no trial {asked}; it has {available}")]
     NoSuchTrial {
         /// The file.
         file: String,
-        /// What was asked for.
+        /// The request.
         asked: String,
         /// The names that exist.
         available: String,
     },
-    /// Time that stands still or runs back.
+    /// Time that stays constant or runs back.
     #[error(
         "{file}, {place}: t = {found} s after {previous} s, expected increasing time; drop rows that were written twice with --drop-repeated, read trials whose time starts again with --trial t, write t with more decimals, or give --fs HZ to count samples instead"
     )]
@@ -345,9 +345,9 @@ pub enum IoError {
         /// The time before, s.
         previous: f64,
     },
-    /// Samples that are not there.
+    /// Missing samples.
     #[error(
-        "{file}: samples missing after {place}, t = {after_s} s: {missing} (the next is at {next_s} s, the sample time is {sample_time_s:.6} s; gaps in all: {gaps}); interpolate over them with --resample, or use the part before or behind with --from and --to"
+        "{file}: samples missing after {place}, t = {after_s} s: {missing} (the next is at {next_s} s, the sample time is {sample_time_s:.6} s; gaps in all: {gaps}); interpolate over them with --resample, or use the part before or after with --from and --to"
     )]
     Gap {
         /// The file.
@@ -356,7 +356,7 @@ pub enum IoError {
         place: String,
         /// Its time, s.
         after_s: f64,
-        /// The time of the row behind the gap, s.
+        /// The time of the row after the gap, s.
         next_s: f64,
         /// Samples missing in the first gap.
         missing: u64,
@@ -406,7 +406,7 @@ pub enum IoError {
     EmptySpan {
         /// The file.
         file: String,
-        /// The span as asked for.
+        /// The span as requested.
         span: String,
         /// First time of the record, s.
         start_s: f64,
@@ -420,20 +420,20 @@ pub enum IoError {
         record: String,
         /// The step, as the option is called.
         step: &'static str,
-        /// What was found.
+        /// The findings.
         found: String,
-        /// What was expected, or the remedy.
+        /// The expected value, or the remedy.
         expected: String,
     },
-    /// Text that is no scale.
+    /// Text that is not a scale.
     #[error("the scale \"{found}\": expected {expected}")]
     Scaling {
         /// The text, or the factor.
         found: String,
-        /// What a scale may be.
+        /// Admissible values of a scale.
         expected: String,
     },
-    /// Text that is no offset.
+    /// Text that is not an offset.
     #[error("the offset \"{found}\": expected a number of samples (1, -0.5) or of seconds (0.0167s)")]
     Offset {
         /// The text.
@@ -458,7 +458,7 @@ pub enum IoError {
         column: String,
         /// Its values.
         found: usize,
-        /// Those of the first column.
+        /// The entries of the first column.
         expected: usize,
     },
     /// Arrays of different lengths in one record.
@@ -485,7 +485,7 @@ pub enum IoError {
         /// The file.
         file: String,
     },
-    /// A name that stands for several arrays.
+    /// A name that represents several arrays.
     #[error("{file}: \"{asked}\" may be any of {found}; give the whole path with --input and --output")]
     AmbiguousColumn {
         /// The file.
@@ -511,17 +511,17 @@ pub enum IoError {
         /// The columns of the file.
         expected: String,
     },
-    /// Bytes that are no Parquet.
+    /// Bytes that are not a Parquet.
     #[error(
-        "{file} is no Parquet file: {found}, expected PAR1 at both ends; copy or write it again if it was cut short, or name it .csv if it is text"
+        "{file} is not a Parquet file: {found}, expected PAR1 at both ends; copy or write it again if it was cut short, or name it .csv if it is text"
     )]
     NotParquet {
         /// The file.
         file: String,
-        /// What stands there instead.
+        /// The replacement.
         found: String,
     },
-    /// Bytes of another format than the extension says.
+    /// Bytes of another format than the extension states.
     #[error(
         "{file} is no {format} file: {found}, expected {expected}; copy or write it again if it was cut short, or give it the extension of what it is"
     )]
@@ -530,9 +530,9 @@ pub enum IoError {
         file: String,
         /// The format of the extension.
         format: &'static str,
-        /// What stands there instead.
+        /// The replacement.
         found: String,
-        /// What such a file begins with.
+        /// First bytes of such a file.
         expected: &'static str,
     },
     /// Bytes that contradict the format of the file.
@@ -540,20 +540,20 @@ pub enum IoError {
     Damaged {
         /// The file.
         file: String,
-        /// What contradicts the format, and where.
+        /// The violation of the format, and its place.
         found: String,
     },
-    /// What the format allows and hoid does not read.
+    /// Content that the format allows and hoid does not support.
     #[error("{file}: {found}, which hoid does not read; {remedy}")]
     Unsupported {
         /// The file.
         file: String,
-        /// What was found, and where.
+        /// The findings, and where.
         found: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
-    /// What was read does not make a record.
+    /// The data do not form a record.
     #[error("{file}: {source}")]
     Model {
         /// The file.
@@ -563,7 +563,7 @@ pub enum IoError {
     },
 }
 
-/// What helps where a file cannot be written.
+/// Remedy for a file that cannot be written.
 fn remedy_of_writing(source: &std::io::Error) -> &'static str {
     use std::io::ErrorKind;
     // What the writer of CSV wraps.
@@ -580,7 +580,7 @@ fn remedy_of_writing(source: &std::io::Error) -> &'static str {
     }
 }
 
-/// Names in words.
+/// Names as text.
 fn listed(names: &[String]) -> String {
     list(&names.iter().map(String::as_str).collect::<Vec<_>>())
 }

@@ -1,5 +1,4 @@
-//! Files that are no recordings, read whole: texts, settings of a bounded length, bytes; and the names
-//! in a directory.
+//! Files that are not recordings, read whole: texts, settings of a bounded length, bytes; and the names in a directory.
 
 use std::fs;
 use std::io::{self, Read as _};
@@ -11,7 +10,7 @@ use crate::formats::Settings;
 /// The text of a file.
 ///
 /// # Errors
-/// [`IoError::Unreadable`] for what the system says.
+/// [`IoError::Unreadable`] for errors that the operating system reports.
 pub fn read_text(path: &Path) -> Result<String, IoError> {
     fs::read_to_string(path).map_err(|source| IoError::Unreadable {
         file: path.display().to_string(),
@@ -22,7 +21,8 @@ pub fn read_text(path: &Path) -> Result<String, IoError> {
 /// The text of a file of settings, of a length that can be read in bounded memory.
 ///
 /// # Errors
-/// [`IoError::Unreadable`] for what the system says, and for one that is too long.
+/// [`IoError::Unreadable`] for errors that the operating system reports, and for one that is too
+/// long.
 pub fn read_settings(path: &Path) -> Result<String, IoError> {
     settings_text(path).map_err(|source| IoError::Unreadable {
         file: path.display().to_string(),
@@ -30,7 +30,7 @@ pub fn read_settings(path: &Path) -> Result<String, IoError> {
     })
 }
 
-/// As [`read_settings`], with what the system would say.
+/// As [`read_settings`], with what the system would report.
 pub(crate) fn settings_text(path: &Path) -> io::Result<String> {
     let is_json = path
         .extension()
@@ -53,7 +53,7 @@ pub(crate) fn settings_text(path: &Path) -> io::Result<String> {
 /// The bytes of a file.
 ///
 /// # Errors
-/// [`IoError::Unreadable`] for what the system says.
+/// [`IoError::Unreadable`] for errors that the operating system reports.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>, IoError> {
     fs::read(path).map_err(|source| IoError::Unreadable {
         file: path.display().to_string(),
@@ -64,7 +64,7 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>, IoError> {
 /// Names of the files in a directory, in no order.
 ///
 /// # Errors
-/// [`IoError::Unreadable`] for what the system says.
+/// [`IoError::Unreadable`] for errors that the operating system reports.
 pub fn file_names(directory: &Path) -> Result<Vec<String>, IoError> {
     let unreadable = |source| IoError::Unreadable {
         file: directory.display().to_string(),

@@ -1,10 +1,9 @@
 //! The file formats of hoid: the only crate that knows them.
 //!
-//! Recordings come as CSV, Parquet, NPZ, MATLAB or XDF, with columns of any name, clocks that
-//! jitter and rows that are missing. Reading takes the columns that are asked for, finds the
-//! sampling, checks every value in use, and gives an evenly sampled [`Record`](hoid_model::Record)
-//! or an error that names the place in the file. Nothing is repaired unasked; what is wrong with
-//! the data is said beside the record.
+//! Recordings come as CSV, Parquet, NPZ, MATLAB or XDF, with columns of any name, clocks that jitter and rows that are
+//! missing. Reading takes the columns that are requested, finds the sampling, checks every value in use, and gives an
+//! evenly sampled [`Record`](hoid_model::Record) or an error that names the place in the file. Nothing is repaired
+//! unasked; problems of the data are reported next to the record.
 //!
 //! ```
 //! use hoid_io::{ReadOptions, read_record};
@@ -23,20 +22,20 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `formats` | the formats, a module each, and what they share; [`readable_endings`] |
 //! | `table` | the columns of any format; [`ColumnExpression`], [`error_among`]: which of them are meant |
 //! | `time` | [`TimeChoice`]: which column is the time; whether it is even: [`even_times`] |
 //! | `record` | [`read_record`], [`read_aligned`], [`read_segments`] by [`ReadOptions`]; [`write_record`] |
 //! | `preparation` | [`Preparation`]: scale, offset, rate, run-in and trend of channels, and the account of it |
-//! | `data_quality` | [`QualityIssue`]: what is wrong with the sampling and the values, where and how much |
+//! | `data_quality` | [`QualityIssue`]: the problems of the sampling and the values, where and how much |
 //! | `survey` | [`survey()`]: what is inside of a file |
 //! | `scenario` | [`read_scenario`]: scenarios in TOML |
 //! | [`fmu`] | functional mock-up units |
 //! | `results` | [`OutputTable`], [`write_table`], [`TableWriter`]: tables of results; [`read_fit`]: a fit that was printed |
 //! | `output` | [`write_atomically`], [`check_output`], [`DirectoryLock`]: what holds for all that is written |
-//! | `input_file` | [`read_text`], [`read_settings`]: files that are no recordings |
+//! | `input_file` | [`read_text`], [`read_settings`]: files that are not recordings |
 //! | `wording` | numbers and names in messages |
 //! | `error` | [`IoError`] |
 
@@ -55,7 +54,7 @@ mod table;
 mod time;
 mod wording;
 
-pub use data_quality::{Place, QualityIssue, QualityIssueKind, quality_of_record};
+pub use data_quality::{QualityIssue, QualityIssueKind, RowSpan, quality_of_record};
 pub use error::IoError;
 pub use formats::{readable_endings, writable_endings};
 pub use input_file::{file_names, read_bytes, read_settings, read_text};

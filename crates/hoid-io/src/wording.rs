@@ -20,7 +20,7 @@ pub(crate) fn shown(text: &str) -> String {
 /// The longest name of a column in a message, characters.
 const NAMED: usize = 80;
 
-/// The name of a column for a message: as it stands, but for its length and what a terminal obeys.
+/// The name of a column for a message: unchanged, except for its length and what a terminal obeys.
 pub(crate) fn named(name: &str) -> String {
     let mut text = String::with_capacity(name.len().min(4 * NAMED));
     for (at, character) in name.chars().enumerate() {
@@ -52,7 +52,7 @@ pub fn printable(message: &str) -> String {
     text
 }
 
-/// What a crate says, short, and without anything that a terminal obeys.
+/// Report of a crate, short, and without anything that a terminal obeys.
 pub(crate) fn told(what: &str) -> String {
     let line = what.lines().next().unwrap_or_default();
     line.chars().take(200).collect::<String>().escape_debug().to_string()
@@ -61,14 +61,14 @@ pub(crate) fn told(what: &str) -> String {
 /// How near a name has to be to be offered: as near as the command line wants a flag.
 const NEAR: f64 = 0.7;
 
-/// "; did you mean "u"?" for names that are not there: of each the one that differs in capitals
-/// alone, else the nearest by Jaro's measure (M. A. Jaro, J. Am. Stat. Assoc. 84 (1989) 414-420).
-/// Of e and u it may be the column that has the usual name of what they are. Empty where none is near.
+/// "; did you mean "u"?" for names that do not exist: of each the one that differs in capitals alone, else the nearest
+/// by Jaro's measure (M. A. Jaro, J. Am. Stat. Assoc. 84 (1989) 414-420). Of e and u it may be the column that has the
+/// common name of what they are. Empty where none is near.
 pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
     let of = |asked: &&str| {
         let asked = asked.trim().to_lowercase();
         let score = |name: &str| (strsim::jaro(&asked, &name.trim().to_lowercase()), name.to_owned());
-        // A letter or two are within every longer name: what begins with them is meant.
+        // A letter or two are within every longer name: what starts with them is meant.
         let is_near = |name: &&&str| asked.chars().count() > 2 || name.trim().to_lowercase().starts_with(&asked);
         let known = names
             .iter()
@@ -87,15 +87,15 @@ pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
     }
 }
 
-/// The column that is what was asked for by another name: the error for `e` or `error`, the control
-/// for `u` or `stick`.
+/// The column that is the request by another name: the error for `e` or `error`, the control for
+/// `u` or `stick`.
 fn by_what_it_is(asked: &str, names: &[&str]) -> Option<String> {
-    let usual = match (error_among(&[asked]), control_among(&[asked])) {
+    let default = match (error_among(&[asked]), control_among(&[asked])) {
         (Some(_), _) => error_among(names),
         (_, Some(_)) => control_among(names),
         _ => None,
     };
-    usual.map(str::to_owned)
+    default.map(str::to_owned)
 }
 
 /// Names for a message: all of them, unless there are very many.

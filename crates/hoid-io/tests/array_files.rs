@@ -93,7 +93,7 @@ fn arrays_of_numpy() {
         channel(&read("npz/savez_compressed.npz", "e", "f[0,:]"), "f[0,:]"),
         &u(),
     );
-    // What stands beside, and what is no column.
+    // What is alongside, and what is not a column.
     let found = read("npz/savez_compressed.npz", "e", "u");
     assert_eq!(found.record.channels().count(), 6);
     let found = read("npz/others.npz", "e", "u");
@@ -148,7 +148,7 @@ fn variables_of_matlab() {
         if name != "mat/h5py_v73.mat" {
             close(channel(&read(&name, "e", "u"), "wide(2,:)"), &times(3.0, &u()));
         }
-        // Elements of structures, in full and by their end, at the time that stands nearest.
+        // Elements of structures, in full and by their end, at the time that is nearest.
         for run in 1..=3_i32 {
             let factor = f64::from(run);
             for path in ["run", "data.run"] {
@@ -218,7 +218,7 @@ fn objects_of_matlab_come_with_the_line_that_saves_their_numbers() {
         message.contains("timeseries") && message.contains("x.Time"),
         "{message}"
     );
-    // A name that is not there stands in the object.
+    // A name that does not exist is in the object.
     let message = refused("mat/h5py_objects_v73.mat", "e", "u");
     assert!(
         message.contains("runs holds an object of the class timetable"),
@@ -325,12 +325,12 @@ fn what_cannot_be_meant_says_so() {
     assert!(message.contains("no samples"), "{message}");
     let dir = tempfile::tempdir().unwrap();
     for (name, bytes, word) in [
-        ("a.npz", &b"t,e,u\n0,1,2\n"[..], "is no NPZ file"),
-        ("a.npz", b"", "is no NPZ file"),
+        ("a.npz", &b"t,e,u\n0,1,2\n"[..], "is not an NPZ file"),
+        ("a.npz", b"", "is not an NPZ file"),
         ("a.npz", b"PK\x05\x06", "is damaged"),
-        ("a.npy", b"t,e,u\n0,1,2\n", "is no NPY file"),
-        ("a.mat", b"t,e,u\n0,1,2\n", "is no MATLAB file"),
-        ("a.mat", b"", "is no MATLAB file"),
+        ("a.npy", b"t,e,u\n0,1,2\n", "is not an NPY file"),
+        ("a.mat", b"t,e,u\n0,1,2\n", "is not a MATLAB file"),
+        ("a.mat", b"", "is not a MATLAB file"),
         ("a.mat", &[0; 64], "is damaged: variable 4"),
     ] {
         fs::write(dir.path().join(name), bytes).unwrap();
@@ -450,7 +450,7 @@ fn damaged_files_never_panic() {
             bytes.truncate(draw.below(bytes.len()));
         }
         for _ in 0..=draw.below(4) {
-            // The heads of files say most, and the end of an archive.
+            // The heads of files state most, and the end of an archive.
             let length = bytes.len().max(1);
             let at = match draw.below(3) {
                 0 => draw.below(length),

@@ -1,5 +1,5 @@
-//! Small files that are made to unpack to any size: refused in words, in bounded memory. The bombs of `cargo xtask slow
-//! bombs` are sampled.
+//! Small files that are made to unpack to any size: refused as text, in bounded memory. The bombs of
+//! `cargo xtask slow bombs` are sampled.
 //!
 //! One test, so that the peak of the process is that of the readers.
 #![allow(clippy::unwrap_used)]
@@ -23,9 +23,9 @@ use bombs::{
 use hoid_io::{read_any_scenario, read_fit, read_table, survey};
 use parquet::basic::{Compression, GzipLevel};
 
-/// Most memory of the process, kB, on systems that tell.
+/// Most memory of the process, kB, on systems that report it.
 const MOST_KB: u64 = 300_000;
-/// Of each format.
+/// For each format.
 const SAMPLE: u64 = 5;
 
 #[test]
@@ -74,7 +74,11 @@ fn small_files_do_not_unpack_without_a_bound() {
             zipped(512 * MEGABYTE / 8, 512 * MEGABYTE, 512),
             unpacks,
         ),
-        ("lying.parquet", zipped(100, 800, 1024), "a page is longer than it says"),
+        (
+            "lying.parquet",
+            zipped(100, 800, 1024),
+            "a page is longer than it reports",
+        ),
         ("stated.parquet", stated, unpacks),
         ("many.parquet", columns(10_001), "10001"),
         (
@@ -100,7 +104,7 @@ fn small_files_do_not_unpack_without_a_bound() {
         ("many.csv", (header.join(",") + "\n").into_bytes(), "10001"),
     ] {
         let path = at(name);
-        assert!(bytes.len() < 2_000_000, "{name} is no bomb");
+        assert!(bytes.len() < 2_000_000, "{name} is not a bomb");
         fs::write(&path, bytes).unwrap();
         let surveyed = survey(&path).map(drop).unwrap_err().to_string();
         let read = read_table(&path).map(drop).unwrap_err().to_string();

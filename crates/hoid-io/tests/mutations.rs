@@ -29,7 +29,7 @@ fn damaged_files_are_read_or_refused() {
         refused += answers.refused;
         fs::remove_file(&path).unwrap();
     }
-    // Neither the good files nor the damage are too small to say anything.
+    // Neither the good files nor the damage are too small to carry any information.
     assert!(read > CASES / 2 && refused > CASES, "{read} read, {refused} refused");
 }
 

@@ -1,4 +1,4 @@
-//! Text packed by gzip, and tables of BIDS with a file of JSON beside them.
+//! Text packed by gzip, and tables of BIDS with a file of JSON next to them.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail at any line, its helpers as well")]
 
@@ -25,7 +25,7 @@ fn packed_tables_and_sidecars() {
         (read.record.input(), read.record.output()),
         (&[1.0, 3.0][..], &[2.0, 4.0][..])
     );
-    // BIDS: rows alone, and what they are beside them.
+    // BIDS: rows alone, and what they are next to them.
     let json = r#"{"SamplingFrequency": 50.0, "StartTime": -2.0, "Columns": ["error", "stick"]}"#;
     let options = ReadOptions {
         input: Some("error".parse().unwrap()),
@@ -51,7 +51,7 @@ fn packed_tables_and_sidecars() {
         let record = read_record(&desk.path(name), &filled).unwrap().record;
         assert_eq!(record.input(), [1.0, 3.0, 5.0], "{name}");
         assert_eq!((record.time_s(0), record.sample_time().s()), (-2.0, 0.02));
-        // Without the file beside it, it is a table without a header.
+        // Without the file next to it, it is a table without a header.
         std::fs::remove_file(desk.path("a_physio.json")).unwrap();
         let message = read_record(&desk.path(name), &options).unwrap_err().to_string();
         assert!(message.contains("the first line holds numbers"), "{message}");

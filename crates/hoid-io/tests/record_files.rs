@@ -1,4 +1,4 @@
-//! Whole files in and out: what comes back is what went in, and what is damaged is said.
+//! Whole files in and out: what comes back is what went in, and what is damaged is reported.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail at any line, its helpers as well")]
 
@@ -215,7 +215,7 @@ fn errors_name_line_column_and_remedy() {
     );
     says(
         "t,e,u\ns,deg,deg\n0,1,2\n1,1,2\n",
-        &["line 2, column t: found \"s\"", "remove it and say them with --unit"],
+        &["line 2, column t: found \"s\"", "remove it and report them with --unit"],
     );
     says(
         "t,e,u\n2024-03-01 10:00:00.00,1,2\n0.02,1,2\n",
@@ -281,8 +281,7 @@ fn other_columns_that_are_no_numbers_are_left_out_with_a_note() {
     assert!(read.notes[2].contains("column d is left out") && read.notes[2].contains("missing (empty)"));
 }
 
-/// Whatever stands in a file, the answer is a record of finite numbers or an error that names the
-/// file.
+/// Whatever is in a file, the answer is a record of finite numbers or an error that names the file.
 #[test]
 fn damaged_files_never_panic() {
     let desk = Desk::new();

@@ -66,7 +66,7 @@ fn table(rows: usize) -> OutputTable {
     }
 }
 
-/// Equal to the last bit, but for what NaN holds.
+/// Equal to the last bit, except for what NaN holds.
 fn assert_same(a: &OutputTable, b: &OutputTable) {
     assert_eq!(a.comments, b.comments);
     assert_eq!(a.schema(), b.schema());
@@ -462,7 +462,7 @@ fn what_is_no_parquet_says_so() {
         csv.contains("it starts with \"t,e,u\\n0,1,2") && csv.contains(".csv"),
         "{csv}"
     );
-    assert!(message(b"PAR1").contains("ends behind its first bytes"));
+    assert!(message(b"PAR1").contains("ends after its first bytes"));
     let whole = fs::read(fixture("snappy")).unwrap();
     assert!(message(&whole[..whole.len() / 2]).contains("its end is missing"));
     let mut long = whole.clone();

@@ -38,7 +38,7 @@ fn the_time_may_have_the_name_that_a_recorder_gives_it() {
         found.notes
     );
     assert!((read("time;e;u", 1.0).unwrap().record.time_s(39) - 0.65).abs() < 1e-3);
-    // Two times: nobody knows which.
+    // Two times: no one knows which.
     let path = directory.path().join("two.csv");
     std::fs::write(&path, "time,time_ms,e,u\n0,0,1,2\n0.01,10,1,2\n").unwrap();
     let message = read_record(&path, &ReadOptions::default()).unwrap_err().to_string();
@@ -48,7 +48,7 @@ fn the_time_may_have_the_name_that_a_recorder_gives_it() {
     );
 }
 
-/// A header, how its times are written, and what is asked for.
+/// A header, how its times are written, and what is requested.
 type Written<'a> = (&'a str, &'a dyn Fn(i64) -> String, Option<&'a str>);
 
 /// The record under a header, of 40 rows at 50 Hz whose times are written by `time`.
@@ -110,7 +110,7 @@ fn times_in_any_unit_and_form_are_the_same_record() {
         assert!(read.record.time_s(0).abs() < 1e-9, "{header} {choice:?}");
         assert_eq!(read.record.len(), 40);
     }
-    // A row number is no time, and a unit that is asked for wins over the one that is found.
+    // A row number is no time, and a unit that is requested wins over the one that is found.
     assert!(record_with("", |k| k.to_string(), None).is_err());
     assert_eq!(
         record_with("t", ms, Some("t:s")).unwrap().record.sample_time().s(),
@@ -142,7 +142,11 @@ fn a_given_frequency_wins_over_t() {
     assert_eq!(clock.record.time_s(1), 0.5);
     assert_eq!(clock.notes[0], "t is in s from its first moment");
     let none = desk.read("t,e,u\nx,1,0\n12:00:02,2,0\n", &with(2.0)).unwrap();
-    assert!(none.notes[0].contains("t is no number on line 2"), "{:?}", none.notes);
+    assert!(
+        none.notes[0].contains("t is not a number on line 2"),
+        "{:?}",
+        none.notes
+    );
     assert_eq!(desk.read("e,u\n1,2\n", &with(2.0)).unwrap().record.len(), 1);
     assert!(
         desk.error("e,u\n1,2\n", &defaults())
@@ -198,7 +202,7 @@ fn fill_bridges_and_says_so() {
     );
 }
 
-/// An outer join of two topics: each row lacks one of the two, and neither begins nor ends with both.
+/// An outer join of two topics: each row lacks one of the two, and neither starts nor ends with both.
 #[test]
 fn two_topics_in_one_table_are_read_where_both_have_values() {
     let desk = Desk::new();
@@ -250,7 +254,7 @@ fn two_topics_in_one_table_are_read_where_both_have_values() {
             (read.record.input()[k] - 10.0 * t).abs() < 1e-12 && (read.record.output()[k] - (1.0 - t)).abs() < 1e-12
         );
     }
-    // Nothing in common at all: the error says so.
+    // Nothing in common at all: the error reports it.
     assert!(
         desk.error("t,e,u\n0,1,\n1,2,\n2,,1\n3,,2\n", &ask(FILL))
             .contains("missing up to")
@@ -298,7 +302,7 @@ fn resample_goes_over_gaps_and_jitter() {
     assert!((coarse.record.input()[1] - 2.5).abs() < 1e-14);
     let slow = desk.read(&text, &ask(RESAMPLE, Some(2.0))).unwrap();
     assert!(slow.notes[0].contains("no low-pass filter"), "{:?}", slow.notes);
-    // An even record is left alone, and one with a time that jumps away is no record.
+    // An even record is left alone, and one with a time that jumps away is not a record.
     let even = "t,e,u\n0.0,1,2\n0.1,2,3\n0.2,4,5\n";
     assert_eq!(
         desk.read(even, &ask(RESAMPLE, None)).unwrap(),

@@ -22,13 +22,13 @@ use std::{
 
 use hostile::Hostile;
 
-/// What one case may take.
+/// Time limit of one case.
 const LIMIT: Duration = Duration::from_secs(2);
 /// Panics, those that are caught among them.
 static PANICS: AtomicUsize = AtomicUsize::new(0);
 
 fn main() -> ExitCode {
-    let number = |k: usize, usual: u64| std::env::args().nth(k).map_or(usual, |text| text.parse().unwrap());
+    let number = |k: usize, default: u64| std::env::args().nth(k).map_or(default, |text| text.parse().unwrap());
     let (cases, first, seed) = (number(1, 1_000_000), number(2, 0), number(3, 2026));
     panic::set_hook(Box::new(|info| {
         if PANICS.fetch_add(1, Ordering::Relaxed) < 100 {

@@ -1,12 +1,11 @@
 //! `cargo xtask slow lab [RUNS] [SEEDS]`: the page's plant against Rust over 10 000 runs, and
 //! simulated operators who track through the page's engine in injected time and are identified.
 //!
-//! Three operators: those of C1 and C2, and a gain with a lag before 4/s, each with a remnant of first
-//! order whose variance is a tenth of that of u. The operator sees e at each tick; the record has every
-//! tenth, which estimators take for held: their delay is half a sample shorter. Told: bias of each
-//! parameter in percent with its standard error, and the part of the intervals of 95 % that hold the
-//! truth. Besides, in how many runs the live estimate tells a lag, its form unknown, and how far from the
-//! truth.
+//! Three operators: those of C1 and C2, and a gain with a lag before 4/s, each with a remnant of first order whose
+//! variance is a tenth of that of u. The operator sees e at each tick; the record has every tenth, which estimators
+//! take for held: their delay is half a sample shorter. Reported: bias of each parameter in percent with its standard
+//! error, and the part of the intervals of 95 % that hold the truth. Also in how many runs the live estimate determines
+//! a lag, its form unknown, and how far from the truth.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../tests/common/page.rs"]
@@ -29,7 +28,7 @@ use hoid_model::{
 use hoid_sim::RunSeed;
 use serde_json::{Value, json};
 
-/// Wide enough that nobody reaches an end.
+/// Wide enough that no one reaches an end.
 const MAP: InputMap = InputMap {
     centre: 0.0,
     span: 1000.0,
@@ -123,7 +122,7 @@ fn tracked(engine: &mut page::Engine, person: &Person, seed: u64, remnant: f64) 
             n
         })
         .collect();
-    // An event is taken by the tick behind it: one of the delay.
+    // An event is taken by the tick after it: one of the delay.
     let delay = (operator.tau_e_s() / TICK_S).round() as usize - 1;
     let answer = engine.ask(
         &json!({"phases": task.phases, "ticks": task.ticks, "map": MAP, "target": bytes(&task.target),
@@ -133,7 +132,7 @@ fn tracked(engine: &mut page::Engine, person: &Person, seed: u64, remnant: f64) 
 }
 
 fn main() -> ExitCode {
-    let number = |k: usize, usual: u32| std::env::args().nth(k).map_or(usual, |text| text.parse().unwrap());
+    let number = |k: usize, default: u32| std::env::args().nth(k).map_or(default, |text| text.parse().unwrap());
     let (runs, seeds) = (number(1, 10_000), number(2, 100));
     let Some(mut engine) = page::Engine::start() else {
         println!("skipped: there is no node");
@@ -188,7 +187,7 @@ fn main() -> ExitCode {
                 .iter()
                 .filter(|(value, error)| (value - truth).abs() <= 1.96 * error)
                 .count();
-            // Of a logarithm the difference is the relative one.
+            // For a logarithm the difference is the relative one.
             let log = matches!(kind, Coordinate::LogOmega | Coordinate::LogZeta);
             let share = if log { 100.0 } else { 100.0 / truth.abs() };
             println!(
@@ -206,7 +205,7 @@ fn main() -> ExitCode {
         let truth = truth.map(|place| 1.0 / person.coordinates[place]);
         let holds = |(value, error): &&(f64, f64)| truth.is_some_and(|t| (value - t).abs() <= 1.96 * error);
         println!(
-            "{}\ta lag is told in {} of {seeds} runs, {} of them within 1.96 standard errors of the truth",
+            "{}\ta lag is reported in {} of {seeds} runs, {} of them within 1.96 standard errors of the truth",
             person.name,
             lags.len(),
             lags.iter().filter(holds).count()

@@ -1,10 +1,10 @@
-//! What the loop of page and events adds to a delay.
+//! Contribution of the loop of page and events to a delay.
 //!
-//! A simulated operator takes the place of the person: in the page, in real time, seeing what is
-//! drawn and answering by events of a pointer. Its gain, neuromuscular system and delay tau are known;
-//! what `hoid identify` finds on the run beyond tau is the latency of page, frames and events, as it
-//! stands in every delay that is identified on this machine. It holds neither the screen (from the
-//! buffer to the light) nor the device (from the hand to the event): these need a sensor.
+//! A simulated operator takes the place of the person: in the page, in real time, seeing what is drawn and answering by
+//! events of a pointer. Its gain, neuromuscular system and delay tau are known; what `hoid identify` finds on the run
+//! beyond tau is the latency of page, frames and events, as it is in every delay that is identified on this machine. It
+//! holds neither the screen (from the buffer to the light) nor the device (from the hand to the event): these need a
+//! sensor.
 
 use std::path::Path;
 
@@ -35,7 +35,7 @@ const REMNANT_S: f64 = 0.1;
 /// How well the neuromuscular system is known: to rounding of its hold.
 const KNOWN: f64 = 0.01;
 
-/// What a calibration found; kept in `calibration.toml` of the experiment.
+/// Result of a calibration; kept in `calibration.toml` of the experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
     /// When, in UTC.
@@ -126,7 +126,7 @@ pub fn operator(task: &Task, seed: u64) -> Result<(SimulatedOperator, Vec<f64>),
     Ok((SimulatedOperator { plant, delay: DELAY }, noise.collect()))
 }
 
-/// What the run of a calibration says; kept in the experiment.
+/// Report of the run of a calibration; kept in the experiment.
 ///
 /// # Errors
 /// [`LabError::Ident`] for a run that cannot be identified, those of files.

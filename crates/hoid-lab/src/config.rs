@@ -1,4 +1,4 @@
-//! What an experiment is: `lab.toml`.
+//! Definition of an experiment: `lab.toml`.
 //!
 //! ```toml
 //! name = "First try"
@@ -29,7 +29,7 @@ use crate::{LabError, plant::MOST_STATES};
 pub struct Config {
     /// Its name.
     pub name: String,
-    /// What a person confirms before anything is measured.
+    /// Consent of the person before any measurement.
     pub consent: String,
     /// The order of the conditions.
     pub order: Order,
@@ -37,9 +37,9 @@ pub struct Config {
     pub live: LiveFor,
     /// The recursive method of the live estimate, as `hoid track --method` has it.
     pub method: String,
-    /// What makes a run unverified besides a bit that differs.
+    /// Limits beyond which a run is unverified.
     pub limits: Limits,
-    /// What is tracked, and how often.
+    /// The tracked signal, and how often.
     pub condition: Vec<Condition>,
 }
 
@@ -47,10 +47,10 @@ pub struct Config {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Order {
-    /// That of the person's row of a balanced Latin square.
+    /// The value for the person's row of a balanced Latin square.
     #[default]
     Latin,
-    /// That of the file.
+    /// The value in the file.
     Given,
 }
 
@@ -80,7 +80,7 @@ pub enum Display {
     Preview,
 }
 
-/// What makes a run unverified besides a bit that differs.
+/// Limits beyond which a run is unverified.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Limits {
@@ -106,18 +106,18 @@ impl Default for Limits {
 pub struct Condition {
     /// Letters and digits: it is part of file names.
     pub name: String,
-    /// What the person reads before a run.
+    /// Instructions to the person before a run.
     pub text: String,
-    /// A condition C1 to C6, or a scenario file; it stands in place of the keys from
+    /// A condition C1 to C6, or a scenario file; it is in place of the keys from
     /// `controlled_element` to `disturbance`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scenario: Option<String>,
     /// The text of that file, kept with the session.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scenario_text: Option<String>,
-    /// What is controlled, in s.
+    /// The controlled element, in s.
     pub controlled_element: String,
-    /// What it becomes.
+    /// Its new form.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub last_element: Option<String>,
     /// Time of the change, s from the start of the measurement.
@@ -132,10 +132,10 @@ pub struct Condition {
     pub measurement_s: f64,
     /// Run-in before it, s.
     pub run_in_s: f64,
-    /// What the person follows.
+    /// The signal that the person tracks.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<Signal>,
-    /// What disturbs the controlled element at its input.
+    /// Disturbance of the controlled element at its input.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub disturbance: Option<Signal>,
     /// Seed of the phases; each run draws its own from it.
@@ -171,10 +171,10 @@ pub struct Signal {
 impl Default for Signal {
     /// 20 s, up to the 31st multiple, 1.5.
     fn default() -> Self {
-        let usual = MultiSine::default();
+        let default = MultiSine::default();
         Self {
-            period_s: usual.period_s,
-            largest: usual.largest,
+            period_s: default.period_s,
+            largest: default.largest,
             rms: 1.5,
         }
     }
@@ -212,9 +212,9 @@ impl Default for Condition {
 
 /// The recursive method of the live estimate: it needs no start fit, so that there is something to see
 /// from the first seconds on.
-const USUAL_METHOD: &str = "adaptive";
+const DEFAULT_METHOD: &str = "adaptive";
 
-/// What a person confirms where the file says nothing else.
+/// Default consent text.
 const CONSENT: &str = "You will follow a moving target by hand for a few short runs. The program stores where your \
 hand was, what was on the screen and when, under a made-up name, on this computer only. It stores no name, no picture \
 and no sound. You may stop at any time by the key Escape or by closing the window; what was stored can be deleted with \
@@ -228,7 +228,7 @@ impl Default for Config {
             consent: CONSENT.to_owned(),
             order: Order::default(),
             live: LiveFor::default(),
-            method: USUAL_METHOD.to_owned(),
+            method: DEFAULT_METHOD.to_owned(),
             limits: Limits::default(),
             condition: vec![Condition {
                 target: Some(Signal::default()),

@@ -1,4 +1,4 @@
-//! The task of a condition: what is controlled at each time, and what excites the loop.
+//! The task of a condition: the controlled element at each time, and what excites the loop.
 
 use hoid_model::{
     ContinuousTransferFunction, FamilyOperator, FamilyScenario, FamilyState, Form, ModelError, SampleTime,
@@ -15,9 +15,9 @@ use crate::{
 /// The task of a condition: what of a scenario is not the person.
 #[derive(Debug, Clone)]
 pub enum Course {
-    /// Of one of the conditions C1 to C6, or near one.
+    /// For one of the conditions C1 to C6, or near one.
     Reference(Box<hoid_model::scenario::ResolvedScenario>),
-    /// Of any controlled element.
+    /// For any controlled element.
     Family(Box<hoid_model::family_scenario::ResolvedFamilyScenario>),
 }
 
@@ -86,7 +86,7 @@ impl Course {
         }
     }
 
-    /// What is controlled at a time from the start of the measurement.
+    /// The controlled element at a time from the start of the measurement.
     pub fn element_at(&self, t_s: f64) -> Result<ContinuousTransferFunction, ModelError> {
         match self {
             Self::Reference(course) => course.parameters_at(t_s).controlled_element.transfer_function(),
@@ -94,7 +94,7 @@ impl Course {
         }
     }
 
-    /// What is controlled all the time; nothing where that changes.
+    /// The controlled element all the time; nothing if that changes.
     ///
     /// # Errors
     /// As [`Course::element_at`].
@@ -117,7 +117,7 @@ impl Course {
         }
     }
 
-    /// Where the leading gain stands.
+    /// Position of the leading gain.
     pub fn realisation(&self) -> hoid_model::scenario::Realisation {
         match self {
             Self::Reference(course) => course.scenario().realisation,

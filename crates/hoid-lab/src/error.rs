@@ -1,4 +1,4 @@
-//! Why an experiment cannot go on.
+//! Why an experiment cannot continue.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ pub enum LabError {
     Config {
         /// The file and what of it.
         place: String,
-        /// What was found, what was expected and the remedy.
+        /// The findings, the expected value and the remedy.
         reason: String,
     },
     /// A message of a page that is not one.
@@ -31,7 +31,7 @@ pub enum LabError {
     File {
         /// The file.
         file: String,
-        /// What the system says.
+        /// Error reported by the operating system.
         source: std::io::Error,
     },
     /// A file of a session that is not as it was written.
@@ -39,7 +39,7 @@ pub enum LabError {
     Damaged {
         /// The file.
         file: String,
-        /// What was found and expected.
+        /// The value found and the value expected.
         reason: String,
     },
     /// No port, or no random numbers.
@@ -66,7 +66,7 @@ pub enum LabError {
 }
 
 impl LabError {
-    /// What the system says of a file.
+    /// Error reported by the operating system of a file.
     pub(crate) fn file(path: &Path, source: std::io::Error) -> Self {
         Self::File {
             file: path.display().to_string(),

@@ -1,4 +1,4 @@
-//! What stands beside the sessions of an experiment: what it is, who took part, and the manifest of
+//! Files next to the sessions of an experiment: what it is, who took part, and the manifest of
 //! `hoid group`.
 
 use std::{collections::BTreeMap, path::Path};
@@ -19,14 +19,14 @@ sub-P01/ses-01/             one session of one person, who has a made-up name
   lab.toml                  the experiment, its order, browser and screen
   lab.copy.toml             the same, for when lab.toml is damaged
   runs.csv                  each run that ended: verified, or unverified and why
-  ..._run.json              the task of a run and its settings, written before it began
+  ..._run.json              the task of a run and its settings, written before it started
   ..._forcing.parquet       target and disturbance at each tick of 1 ms
   ..._ticks.csv             u (hand) and e (error) at each tick
   ..._events.csv            input events: the tick that took them, their own time stamp, when the page
-                            had them (ms from tick 0), what the device said
+                            had them (ms from tick 0), what the device reported
   ..._frames.csv            frames: their time, when they were drawn (ms from tick 0), the tick and the
                             error that they show
-  ..._live.csv              the estimate while the run went on
+  ..._live.csv              the estimate while the run continued
   ..._end.json              how the run ended, SHA-256 of ticks, events and frames
   ..._beh.parquet           the run at 100 Hz: t, e, u, f_t (target), d (disturbance), y (output),
                             e_shown (error on the screen)
@@ -67,7 +67,7 @@ fn write(path: &Path, text: &str) -> Result<(), LabError> {
 /// Writes who took part.
 ///
 /// # Errors
-/// Those of files.
+/// The errors of files.
 pub fn list(out: &Path) -> Result<(), LabError> {
     let mut people: BTreeMap<String, (usize, String)> = BTreeMap::new();
     for folder in Session::folders(out)? {
@@ -88,7 +88,7 @@ pub fn list(out: &Path) -> Result<(), LabError> {
 /// count. Nothing while none counts.
 ///
 /// # Errors
-/// Those of files.
+/// The errors of files.
 pub fn manifest(out: &Path) -> Result<(), LabError> {
     let mut runs = Vec::new();
     let mut conditions: BTreeMap<String, Condition> = BTreeMap::new();
@@ -140,7 +140,7 @@ pub fn manifest(out: &Path) -> Result<(), LabError> {
     write(&out.join(MANIFEST), &manifest.text())
 }
 
-/// What is known of a condition.
+/// Known properties of a condition.
 fn known(condition: &Condition) -> Result<ConditionSettings, LabError> {
     let course = condition.course()?;
     let lines = course

@@ -1,4 +1,4 @@
-//! A session as one archive, with what stands beside it in the experiment.
+//! A session as one archive, with what is next to it in the experiment.
 
 use std::{
     io::{Cursor, Write as _},
@@ -15,7 +15,7 @@ const BESIDE: [&str; 3] = ["README", "dataset_description.json", "participants.t
 /// The archive of a session, its paths as in the experiment. The same files give the same bytes.
 ///
 /// # Errors
-/// Those of files.
+/// The errors of files.
 pub fn archive(out: &Path, folder: &Path) -> Result<Vec<u8>, LabError> {
     let mut files: Vec<PathBuf> = BESIDE
         .iter()

@@ -1,14 +1,13 @@
 //! The experiment as its pages see it: one session at a time, one page that tracks, any number that
 //! look on.
 //!
-//! What pages say comes from the threads of their sockets, one message at a time under one lock; what
-//! is said to them goes into the queue of each. The estimate has a thread of its own, the pages of
-//! results too.
+//! Messages from pages arrive on the threads of their sockets, one at a time under one lock; messages to pages go into
+//! the queue of each. The estimate has a thread of its own, the pages of results too.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
-//! | `runs` | a run: sent, begun, taken batch by batch, ended |
-//! | `told` | what the pages are told |
+//! | `runs` | a run: sent, started, taken batch by batch, ended |
+//! | `told` | what the pages are reported |
 
 mod runs;
 mod told;
@@ -33,12 +32,12 @@ use crate::{
     live::Samples,
     replay,
     reports::{self, Pages},
-    session::{Begun, How, RunLog, Session, Stem},
+    session::{How, RunLog, RunStart, Session, Stem},
     task::Task,
     wire::{FromPage, Role, ToPage},
 };
 
-/// What goes to a page.
+/// Messages to a page.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outgoing {
     /// A message.
@@ -47,7 +46,7 @@ pub enum Outgoing {
     Binary(Vec<u8>),
 }
 
-/// What is done.
+/// The action taken.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Mode {
     /// Sessions of people.
@@ -87,10 +86,10 @@ struct Current {
     session: Option<Session>,
     /// The page that tracks.
     person: Option<u64>,
-    /// A run that was sent and has not begun.
+    /// A run that was sent and has not started.
     ready: Option<Ready>,
     run: Option<Running>,
-    /// The run that ended last: its page may not have heard of it yet, and go on for a moment.
+    /// The run that ended last: its page may not have heard of it yet, and continue for a moment.
     over: Option<usize>,
     reporting: bool,
     pages: Pages,
@@ -104,7 +103,7 @@ struct Ready {
 }
 
 struct Running {
-    begun: Begun,
+    begun: RunStart,
     stem: Stem,
     task: Task,
     log: RunLog,
@@ -112,7 +111,7 @@ struct Running {
 }
 
 impl Current {
-    /// The run that goes on, by its number.
+    /// The run that continues, by its number.
     fn running(&self, number: usize) -> Result<&Running, LabError> {
         let run = self.run.as_ref().filter(|run| run.begun.number == number);
         run.ok_or_else(|| LabError::Order(format!("run {number} is not going on")))
@@ -137,7 +136,7 @@ impl Lab {
             Mode::Calibrate => calibrate::config(),
             Mode::Sessions => config,
         };
-        // Runs that no person made stand apart.
+        // Runs that no person made are separate.
         let out = if mode == Mode::Calibrate {
             out.join("calibration")
         } else {
@@ -179,7 +178,7 @@ impl Lab {
         id
     }
 
-    /// A page is gone; a run of it is broken off, and the session goes on in the newest window that is left: a page
+    /// A page is gone; a run of it is broken off, and the session continues in the newest window that is left: a page
     /// that is loaded again may have come before the old one is known to be gone.
     pub fn leave(&self, id: u64) {
         self.shared.pages().remove(&id);
@@ -187,7 +186,7 @@ impl Lab {
         if state.person == Some(id) {
             state.person = None;
             state.ready = None;
-            // Its files cannot be closed: the session says so when it is opened next.
+            // Its files cannot be closed: the session reports it when it is opened next.
             let _ = self.shared.end_run(&mut state, How::Interrupted, BTreeMap::new());
             let left = self.shared.newest_person();
             if let Some(newest) = left {
@@ -204,8 +203,8 @@ impl Lab {
     /// Hears a page.
     ///
     /// # Errors
-    /// [`LabError::Message`] for what no page of this program says, [`LabError::Order`] for what comes
-    /// at the wrong time, those of files.
+    /// [`LabError::Message`] for what no page of this program reports, [`LabError::Order`] for what comes at the wrong
+    /// time, those of files.
     pub fn hear(&self, id: u64, message: FromPage) -> Result<(), LabError> {
         let shared = &self.shared;
         if let FromPage::Hello { role, browser } = message {
@@ -222,7 +221,7 @@ impl Lab {
                 "This window looks on; the session runs in another one.".to_owned(),
             ));
         }
-        // Neither changes how the session stands.
+        // Neither changes the state of the session.
         let quiet = matches!(message, FromPage::Next {} | FromPage::Batch { .. });
         let obeyed = shared.obey(&mut state, id, message);
         drop(state);
@@ -232,10 +231,10 @@ impl Lab {
         obeyed
     }
 
-    /// The session as one archive; nothing where there is none.
+    /// The session as one archive; nothing if there is none.
     ///
     /// # Errors
-    /// Those of files.
+    /// The errors of files.
     pub fn export(&self) -> Result<Option<(Vec<u8>, &'static str)>, LabError> {
         let Some(folder) = self.shared.session_folder() else {
             return Ok(None);
@@ -243,10 +242,10 @@ impl Lab {
         Ok(Some((export::archive(&self.shared.out, &folder)?, "application/zip")))
     }
 
-    /// The signals of a run, `3.json`; nothing where there is no such run.
+    /// The signals of a run, `3.json`; nothing if there is no such run.
     ///
     /// # Errors
-    /// Those of files.
+    /// The errors of files.
     pub fn data(&self, name: &str) -> Result<Option<(Vec<u8>, &'static str)>, LabError> {
         let number: Option<usize> = name.strip_suffix(".json").and_then(|number| number.parse().ok());
         let (Some(number), Some(folder)) = (number, self.shared.session_folder()) else {
@@ -260,7 +259,7 @@ impl Lab {
     /// A file of the pages of results, by the names that [`State::reports`](crate::wire::State::reports) has.
     ///
     /// # Errors
-    /// Those of files.
+    /// The errors of files.
     pub fn report(&self, names: &[&str]) -> Result<Option<(Vec<u8>, &'static str)>, LabError> {
         let Some(folder) = self.shared.session_folder() else {
             return Ok(None);
@@ -274,7 +273,7 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The folder of the session that goes on or is shown.
+    /// The folder of the session that continues or is shown.
     fn session_folder(&self) -> Option<PathBuf> {
         self.state().session.as_ref().map(|session| session.folder.clone())
     }
@@ -286,7 +285,9 @@ impl Shared {
     fn hello(&self, id: u64, role: Role, browser: BTreeMap<String, String>) -> Result<(), LabError> {
         let long = |(name, value): (&String, &String)| name.len() > 64 || value.len() > 512;
         if browser.len() > 32 || browser.iter().any(long) {
-            return Err(LabError::Message("the page says too much of its browser".to_owned()));
+            return Err(LabError::Message(
+                "the message of the page about its browser is too long".to_owned(),
+            ));
         }
         if let Some(page) = self.pages().get_mut(&id) {
             page.role = Some(role);
@@ -294,15 +295,15 @@ impl Shared {
         }
         let mut state = self.state();
         if role == Role::Person && state.run.is_none() {
-            // The newest window has the session; an older one is told that it has not.
+            // The newest window has the session; an older one is informed that it has not.
             let before = state.person.filter(|before| *before != id);
             self.give(&mut state, id)?;
             if let Some(before) = before {
-                let words = "The session goes on in another window; this one looks on.".to_owned();
+                let words = "The session continues in another window; this one looks on.".to_owned();
                 self.tell(&ToPage::Refused { words, elsewhere: true }, |page, _| page == before);
             }
         } else if role == Role::Person {
-            let words = "A run goes on in another window; this one looks on.".to_owned();
+            let words = "A run continues in another window; this one looks on.".to_owned();
             self.tell(&ToPage::Refused { words, elsewhere: true }, |page, _| page == id);
         }
         drop(state);
@@ -320,7 +321,7 @@ impl Shared {
             .map(|(id, _)| *id)
     }
 
-    /// The session goes on in the window `id`.
+    /// The session continues in the window `id`.
     fn give(&self, state: &mut Current, id: u64) -> Result<(), LabError> {
         state.person = Some(id);
         state.ready = None;
@@ -338,7 +339,7 @@ impl Shared {
         }
     }
 
-    /// Does what the page of the person says.
+    /// Does what the page of the person reports.
     fn obey(self: &Arc<Self>, state: &mut Current, id: u64, message: FromPage) -> Result<(), LabError> {
         match message {
             FromPage::Hello { .. } => Ok(()),
@@ -364,7 +365,7 @@ impl Shared {
             return Err(LabError::Order("without consent nothing is measured".to_owned()));
         }
         if state.run.is_some() || matches!(self.mode, Mode::Replay(_)) {
-            return Err(LabError::Order("another session goes on".to_owned()));
+            return Err(LabError::Order("another session continues".to_owned()));
         }
         state.session = Some(Session::begin(&self.out, &self.config, subject, cc0)?);
         state.pages = Pages::default();
@@ -374,7 +375,9 @@ impl Shared {
     fn resume(&self, state: &mut Current, name: &str) -> Result<(), LabError> {
         let open = self.open_sessions();
         if state.run.is_some() || !open.iter().any(|known| known == name) {
-            return Err(LabError::Order(format!("there is no session {name:?} to go on with")));
+            return Err(LabError::Order(format!(
+                "there is no session {name:?} to continue with"
+            )));
         }
         state.session = Some(Session::open(&self.out.join(name))?);
         state.pages = Pages::default();

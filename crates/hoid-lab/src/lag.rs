@@ -1,14 +1,14 @@
-//! The lag of the person while the run goes on.
+//! The lag of the person while the run continues.
 //!
-//! The tracker acts in a basis whose lag stays where it began: nothing of it says what T_I is. So the
-//! samples of the measurement since the last declared change are fitted as `hoid identify` does, each
-//! 10 s, on a thread of its own: all forms of the operator, the one that held-out data choose,
-//! and its T_I where the data determine it ([`hoid_analysis::identify`]). Of a form without a lag, or one
-//! whose interval reaches a pure integration, T_I is not determined, and no number is told.
+//! The tracker acts in a basis whose lag stays where it started: nothing of it reports what T_I is. So the samples of
+//! the measurement since the last declared change are fitted as `hoid identify` does, each 10 s, on a thread of its
+//! own: all forms of the operator, the one that held-out data choose, and its T_I where the data determine it
+//! ([`hoid_analysis::identify`]). For a form without a lag, or one whose interval reaches a pure integration, T_I is
+//! not determined, and no number is reported.
 //!
-//! A form with a lag is chosen now and then for who has none, a short lag beside a longer lead: for 13 of
-//! 60 runs of C1 and 2 of 20 of C2, 30 and 80 s long, with T_I up to 6.3 standard errors from zero. A lag
-//! of 1 s that is there is 25 of them from zero and more. So a lag counts from ten on.
+//! A form with a lag is chosen at intervals for callers that has none, a short lag next to a longer lead: for 13 of 60
+//! runs of C1 and 2 of 20 of C2, 30 and 80 s long, with T_I up to 6.3 standard errors from zero. A lag of 1 s that is
+//! there is 25 of them from zero and more. So a lag counts from ten on.
 
 use std::{
     sync::mpsc::{Receiver, Sender, channel},
@@ -21,7 +21,7 @@ use hoid_track::Sample;
 /// Shortest span of a fit, and the time between two, s.
 const SHORTEST_S: f64 = 40.0;
 const EVERY_S: f64 = 10.0;
-/// A lag is told that is so many standard errors from none.
+/// A lag is reported that is so many standard errors from none.
 const CLEAR: f64 = 10.0;
 
 /// The lag as far as it is known.
@@ -37,7 +37,7 @@ pub enum Lag {
 }
 
 impl Lag {
-    /// Of a record of one person who does not change.
+    /// For a record of one person who does not change.
     pub fn of(record: Record) -> Self {
         let found = hoid_analysis::identify(&[record]);
         let parameter = found.ok().and_then(|found| {
@@ -71,7 +71,7 @@ pub struct LagFits {
     from_s: f64,
     /// Samples at the last fit.
     fitted: usize,
-    /// A fit goes on.
+    /// A fit continues.
     busy: bool,
     last: Lag,
 }
@@ -107,7 +107,7 @@ impl LagFits {
         self.u.push(sample.u);
     }
 
-    /// Forgets what was before a change of the person, s.
+    /// Forgets the data before a change of the person, s.
     pub fn changed(&mut self, at_s: f64) {
         let past = ((at_s - self.from_s) / self.ts.s())
             .ceil()
@@ -118,11 +118,11 @@ impl LagFits {
         (self.fitted, self.last) = (0, Lag::Waiting);
     }
 
-    /// The lag by the last fit that is done; begins the next one where it is due.
+    /// The lag by the last fit that is done; starts the next one where it is due.
     pub fn lag(&mut self) -> Lag {
         while let Ok((from_s, lag)) = self.found.try_recv() {
             self.busy = false;
-            // One that began before a change is of nobody.
+            // One that started before a change is of no one.
             if from_s == self.from_s {
                 self.last = lag;
             }
@@ -202,7 +202,7 @@ mod tests {
     #[test]
     fn a_lag_that_the_data_show_is_found() {
         let Lag::Known(found) = Lag::of(record(&with_lag(60.0, 1))) else {
-            panic!("60 s of a lag of {LAG_S} s say nothing of it");
+            panic!("60 s of a lag of {LAG_S} s carry no information about it");
         };
         let error = found.standard_error.unwrap();
         assert!((found.value - LAG_S).abs() < 3.0 * error && error < 0.3, "{found}");
@@ -231,7 +231,7 @@ mod tests {
         rest.iter().for_each(|sample| fits.take(*sample));
         assert_eq!(fits.lag(), Lag::Waiting);
         assert!(fits.busy);
-        // What is being fitted is of somebody else now.
+        // What is being fitted is of a person else now.
         fits.changed(50.0);
         assert_eq!((fits.e.len(), fits.from_s), (1000, 50.0));
         let answer = fits.found.recv().unwrap();

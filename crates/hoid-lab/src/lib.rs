@@ -1,24 +1,24 @@
 //! A tracking experiment in the browser, identified while it runs, that proves itself.
 //!
-//! The page computes the controlled element at 1 ms from tables that are made here, logs every input
-//! event, tick and frame, and sends them in batches. Here they are appended to the folder of the
-//! session, followed by the tracker, and behind the run recomputed to the last bit.
+//! The page computes the controlled element at 1 ms from tables that are made here, logs every input event, tick and
+//! frame, and sends them in batches. Here they are appended to the folder of the session, followed by the tracker, and
+//! after the run recomputed to the last bit.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`config`] | [`Config`]: the experiment, `lab.toml` |
-//! | [`course`] | [`Course`](course::Course): what is controlled at each time |
+//! | [`course`] | [`Course`](course::Course): the controlled element at each time |
 //! | [`order`] | the order of the runs, by Latin squares |
 //! | [`task`] | [`Task`](task::Task): a run as tables, and its recomputation |
 //! | [`plant`] | the arithmetic of a tick, twin of the page's |
-//! | [`session`] | the folder: what is appended, what is written at once, how a session goes on |
+//! | [`session`] | the folder: what is appended, what is written at once, how a session continues |
 //! | [`verify`] | [`check`](verify::check): verified, or unverified and why |
 //! | [`record`] | a run as a record for all commands of hoid |
-//! | [`live`], [`lag`] | the estimate while the run goes on, the lag of the person besides |
-//! | [`wire`] | what page and server say to each other |
+//! | [`live`], [`lag`] | the estimate while the run continues, the lag of the person besides |
+//! | [`wire`] | what page and server report to each other |
 //! | [`lab`] | [`Lab`]: the experiment as its pages see it |
 //! | [`server`] | [`Server`]: HTTP and sockets on 127.0.0.1 |
-//! | `experiment`, `export`, `replay`, `reports` | what stands beside the sessions; archives; runs shown again; pages |
+//! | `experiment`, `export`, `replay`, `reports` | what is next to the sessions; archives; runs shown again; pages |
 //! | [`calibrate`] | what the loop of page and events adds to a delay |
 
 pub mod calibrate;

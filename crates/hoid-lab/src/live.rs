@@ -1,4 +1,4 @@
-//! The estimate while the run goes on.
+//! The estimate while the run continues.
 //!
 //! A recursion of `hoid track` takes e and u of every tenth tick on a thread of its own, fed by the
 //! batches of the page; nothing of it is in the loop. With the controlled element P known, the open
@@ -32,15 +32,15 @@ use crate::{
 
 /// Warm-up of methods that need one, s.
 const WARM_UP_S: f64 = 20.0;
-/// Delay that a method begins at, samples of 10 ms.
-const USUAL_NK: usize = 21;
-/// Where the crossover is looked for, rad/s, and in how many steps of one factor.
+/// Delay that a method starts at, samples of 10 ms.
+const DEFAULT_NK: usize = 21;
+/// Where the crossover is searched for, rad/s, and in how many steps of one factor.
 const CROSSOVERS: (f64, f64, usize) = (0.3, 15.0, 40);
 /// Relative step of the slopes.
 const SLOPE: f64 = 1e-3;
 
-/// A number with its standard error; none where it is not known.
-type Told = (Option<f64>, Option<f64>);
+/// A number with its standard error; none if it is not known.
+type ReportedValue = (Option<f64>, Option<f64>);
 
 /// The estimate at an instant.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -48,21 +48,21 @@ pub struct LiveLine {
     /// Time from the start of the measurement, s.
     pub t: f64,
     /// Gain K_e.
-    pub gain: Told,
+    pub gain: ReportedValue,
     /// Lead T_L, s.
-    pub lead_s: Told,
+    pub lead_s: ReportedValue,
     /// Lag T_I, s, where the data determine it.
-    pub lag_s: Told,
-    /// Why no lag is told.
+    pub lag_s: ReportedValue,
+    /// Why no lag is reported.
     pub lag_waiting: Option<&'static str>,
     /// Natural frequency of the neuromuscular system, rad/s.
-    pub omega_nm_rad_s: Told,
+    pub omega_nm_rad_s: ReportedValue,
     /// Delay, s.
-    pub delay_s: Told,
+    pub delay_s: ReportedValue,
     /// Crossover frequency, rad/s.
-    pub crossover_rad_s: Told,
+    pub crossover_rad_s: ReportedValue,
     /// Phase margin, deg.
-    pub phase_margin_deg: Told,
+    pub phase_margin_deg: ReportedValue,
     /// When the person changed, s, where a change was declared at this instant.
     pub changed_s: Option<f64>,
     /// Why there is no estimate yet.
@@ -83,14 +83,14 @@ pub struct LiveRun {
 }
 
 impl LiveRun {
-    /// Of a method by its name, for a task.
+    /// A live estimate with the named method, for a task.
     ///
     /// # Errors
     /// [`LabError::Ident`] for a method that cannot run live.
     pub fn new(method: &str, course: Course) -> Result<Self, LabError> {
         let ts = SampleTime::new(TICK_S * TICKS_PER_SAMPLE as f64)?;
         let method = hoid_survey::method(method)?;
-        let options = TrackOptions::usual(method, USUAL_NK);
+        let options = TrackOptions::default_for(method, DEFAULT_NK);
         let ranges = default_operator_ranges(options.structure, ts);
         let plan = TrackPlan::new(options, ranges, Criterion::Bic, ts)?;
         Ok(Self {
@@ -103,7 +103,7 @@ impl LiveRun {
         })
     }
 
-    /// Takes samples, and says how it stands behind the last of them.
+    /// Takes samples, and reports how it is after the last of them.
     pub fn take(&mut self, samples: &[Sample]) -> LiveLine {
         let mut changed_s = None;
         for sample in samples {
@@ -130,7 +130,7 @@ impl LiveRun {
         match self.lags.lag() {
             Lag::Waiting => line.lag_waiting = Some("after 40 s"),
             Lag::NotDetermined => line.lag_waiting = Some("not determined"),
-            Lag::Known(lag) => line.lag_s = told(lag),
+            Lag::Known(lag) => line.lag_s = reported(lag),
         }
         let tracker = match &self.live {
             Live::Tracking(tracker) => tracker,
@@ -142,29 +142,29 @@ impl LiveRun {
         };
         match tracker.operator() {
             Ok(operator) => {
-                line.gain = told(operator.k_e);
-                line.lead_s = told(operator.t_l_s);
-                line.omega_nm_rad_s = told(operator.omega_nm_rad_s);
-                line.delay_s = told(operator.tau_e_s);
+                line.gain = reported(operator.k_e);
+                line.lead_s = reported(operator.t_l_s);
+                line.omega_nm_rad_s = reported(operator.omega_nm_rad_s);
+                line.delay_s = reported(operator.tau_e_s);
             }
             Err(reason) => line.waiting = Some(reason.to_string()),
         }
         if let Ok(element) = self.course.element_at(self.t_s)
             && let Some((crossover, margin)) = crossover(&|omega| tracker.response(omega), &element)
         {
-            (line.crossover_rad_s, line.phase_margin_deg) = (told(crossover), told(margin));
+            (line.crossover_rad_s, line.phase_margin_deg) = (reported(crossover), reported(margin));
         }
         line
     }
 }
 
-fn told(estimate: Estimate) -> Told {
+fn reported(estimate: Estimate) -> ReportedValue {
     let finite = |v: f64| v.is_finite().then_some(v);
     (finite(estimate.value), estimate.standard_error.and_then(finite))
 }
 
-/// Crossover frequency in rad/s and phase margin in degrees, to first order; none where `|L|` does
-/// not cross one from above.
+/// Crossover frequency in rad/s and phase margin in degrees, to first order; none if `|L|` does not
+/// cross one from above.
 fn crossover(
     response: &dyn Fn(f64) -> Option<Response>,
     element: &ContinuousTransferFunction,
@@ -221,7 +221,7 @@ fn crossover(
     ))
 }
 
-/// Starts the thread of a run: it takes samples until its sender is dropped, tells each line and
+/// Starts the thread of a run: it takes samples until its sender is dropped, reports each line and
 /// appends it to `live.csv`.
 pub fn start(mut run: LiveRun, stem: &Stem, tell: impl Fn(&LiveLine) + Send + 'static) -> Sender<Samples> {
     let (sender, receiver): (Sender<Samples>, Receiver<Samples>) = channel();
@@ -315,7 +315,7 @@ pub(crate) mod tests {
         let open = scenario.initial.operator.transfer_function().unwrap();
         let open = open.series(&scenario.initial.controlled_element.transfer_function().unwrap());
         let truth = hoid_model::margins::margins(|omega| open.response(omega), (0.3, 15.0));
-        let within = |told: Told, truth: f64| {
+        let within = |told: ReportedValue, truth: f64| {
             let (value, error) = (told.0.unwrap(), told.1.unwrap());
             assert!(
                 (value - truth).abs() < 4.0 * error + 0.05 * truth.abs(),

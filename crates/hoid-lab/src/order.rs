@@ -2,8 +2,8 @@
 //!
 //! Row r of a balanced Latin square of n conditions is, by E. J. Williams (*Australian Journal of
 //! Scientific Research* A 2 (1949) 149-168), `r, r+1, r-1, r+2, r-2, ...` modulo n: each condition
-//! stands once in each place and follows each other one equally often. For an odd n a second square,
-//! the first in reverse, is needed for that: 2n rows.
+//! is once in each place and follows each other one equally often. For an odd n a second square, the
+//! first in reverse, is needed for that: 2n rows.
 
 use serde::{Deserialize, Serialize};
 

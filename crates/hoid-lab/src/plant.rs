@@ -30,7 +30,7 @@ impl Plant {
         self.b.len()
     }
 
-    /// True where the matrices fit each other and there is room for the state.
+    /// True if the matrices fit each other and there is room for the state.
     pub fn is_sound(&self) -> bool {
         let n = self.order();
         n <= MOST_STATES && self.a.len() == n * n && self.c.len() == n
@@ -60,17 +60,17 @@ impl Plant {
     }
 }
 
-/// Most states of a controlled element.
+/// Largest number of states of a controlled element.
 pub const MOST_STATES: usize = 16;
 
-/// From what a device says to u.
+/// From the output of a device to u.
 ///
 /// `w = (raw - centre)/span`, within -1 to 1; `|w| <= dead` gives 0, what is beyond is stretched so
 /// that the ends stay; `u = gain w`. The gain holds sensitivity, direction and the full deflection.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InputMap {
-    /// What the device says at rest: pixels from the left edge, or 0 of a gamepad.
+    /// Value of the device at rest: pixels from the left edge, or 0 of a gamepad.
     pub centre: f64,
     /// From there to the full deflection.
     pub span: f64,
@@ -81,7 +81,7 @@ pub struct InputMap {
 }
 
 impl InputMap {
-    /// u of what the device says.
+    /// u of what the device reports.
     pub fn u(&self, raw: f64) -> f64 {
         let w = ((raw - self.centre) / self.span).clamp(-1.0, 1.0);
         let size = if w < 0.0 { -w } else { w };
@@ -96,7 +96,7 @@ impl InputMap {
         }
     }
 
-    /// What is wrong with it.
+    /// Problems with it.
     pub fn fault(&self) -> Option<String> {
         let finite = [self.centre, self.span, self.dead, self.gain]
             .iter()

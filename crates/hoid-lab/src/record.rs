@@ -1,12 +1,11 @@
-//! A run as a record that all commands of hoid read: every tenth tick, e and u of that instant,
-//! target, disturbance and output besides, and e as it stood on the screen. t = 0 is the start of the
-//! measurement.
+//! A run as a record that all commands of hoid read: every tenth tick, e and u of that instant, target, disturbance and
+//! output in addition, and e as it was on the screen. t = 0 is the start of the measurement.
 
 use hoid_model::{Channel, Record, SampleTime};
 
 use crate::{
     LabError,
-    session::{Begun, Logged},
+    session::{Logged, RunStart},
     task::{TICK_S, TICKS_PER_SAMPLE, Task},
 };
 
@@ -14,7 +13,7 @@ use crate::{
 ///
 /// # Errors
 /// [`LabError::Model`] for a run without a sample.
-pub fn record(begun: &Begun, task: &Task, logged: &Logged) -> Result<Record, LabError> {
+pub fn record(begun: &RunStart, task: &Task, logged: &Logged) -> Result<Record, LabError> {
     // A log that is longer than its run holds ticks that never were.
     let n = logged.signals.e.len().min(logged.signals.u.len()).min(task.ticks);
     let every = |values: &[f64]| {

@@ -1,4 +1,4 @@
-//! A run as the page draws it again: its signals at 100 Hz, its live estimate, and what it is worth
+//! A run as the page draws it again: its signals at 100 Hz, its live estimate, and its reliability
 //! now.
 
 use serde_json::{Value, json};
@@ -6,16 +6,16 @@ use serde_json::{Value, json};
 use crate::{
     LabError,
     record::record,
-    session::{Begun, Logged, Stem},
+    session::{Logged, RunStart, Stem},
     verify::check,
 };
 
 /// The run as JSON.
 ///
 /// # Errors
-/// Those of files.
+/// The errors of files.
 pub fn data(stem: &Stem) -> Result<Vec<u8>, LabError> {
-    let begun = Begun::read(stem)?;
+    let begun = RunStart::read(stem)?;
     let task = begun.task(stem)?;
     let logged = Logged::read(stem)?;
     let checked = check(stem)?;
@@ -44,7 +44,7 @@ fn rounded(values: &[f64]) -> Vec<f64> {
     values.iter().map(|v| (v * 1e6).round() / 1e6).collect()
 }
 
-/// The rows of the live estimate, numbers or null, without its header; none where there was none.
+/// The rows of the live estimate, numbers or null, without its header; none if there was none.
 fn live(stem: &Stem) -> Vec<Vec<Value>> {
     let text = hoid_io::read_text(&stem.file("live.csv")).unwrap_or_default();
     let cell = |cell: &str| cell.parse::<f64>().map_or(Value::Null, Value::from);

@@ -1,6 +1,6 @@
 //! Pages about a session, made by the program `hoid` itself: what `identify`, `track` and `describe`
-//! say of each run, and what `group` says of all people so far. It runs as a process of its own, on
-//! one core, so that nothing of it can end or hold up an experiment.
+//! report about each run, and what `group` states of all people so far. It runs as a process of its
+//! own, on one core, so that nothing of it can end or hold up an experiment.
 
 use std::{
     path::{Path, PathBuf},
@@ -23,7 +23,7 @@ const GROUP: &str = "group";
 pub struct Pages(Vec<(String, String)>);
 
 impl Pages {
-    /// What they are, and where behind the address of the page.
+    /// Titles of the pages, and their paths.
     pub fn links(&self) -> Vec<(String, String)> {
         self.0.clone()
     }
@@ -72,7 +72,7 @@ fn one(program: &Path, config: &Config, stem: &Stem, name: &str) {
     let place = stem.reports().join(name);
     let mut command = hoid(program);
     command.arg(name).arg(stem.file("beh.parquet")).args(["--from", "0"]);
-    let begun = crate::session::Begun::read(stem).ok();
+    let begun = crate::session::RunStart::read(stem).ok();
     let course = begun.as_ref().and_then(|begun| begun.condition.course().ok());
     // Margins belong to one element.
     let element = course
@@ -100,7 +100,7 @@ fn one(program: &Path, config: &Config, stem: &Stem, name: &str) {
     said(&mut command, &place, name);
 }
 
-/// Runs a command; where it makes no page of its own, what it says becomes one.
+/// Runs a command; where it makes no page of its own, what it reports becomes one.
 fn said(command: &mut Command, place: &Path, name: &str) {
     let made = hoid_io::make_directory(place).map_err(LabError::from).and_then(|()| {
         command
@@ -131,7 +131,7 @@ fn said(command: &mut Command, place: &Path, name: &str) {
         escaped(&out),
         escaped(&wrong)
     );
-    // Without the page its link is not there, which says it.
+    // Without the page its link is missing, which reports it.
     let _ = hoid_io::write_atomically(&page, |file| file.write_all(html.as_bytes()));
 }
 
@@ -139,7 +139,7 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// The pages that are there.
+/// The existing pages.
 pub fn found(folder: &Path) -> Pages {
     let mut pages = Vec::new();
     for (number, stem) in Stem::all(folder).unwrap_or_default() {
@@ -166,7 +166,7 @@ pub fn found(folder: &Path) -> Pages {
 /// digits, `-`, `_` and dots that do not lead, so that no name leads out of its folder.
 ///
 /// # Errors
-/// Those of files.
+/// The errors of files.
 pub fn file(folder: &Path, out: &Path, names: &[&str]) -> Result<Option<(Vec<u8>, &'static str)>, LabError> {
     let sound = |name: &&str| {
         let known = |b: u8| b.is_ascii_alphanumeric() || b"-_.".contains(&b);

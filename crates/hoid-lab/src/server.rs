@@ -1,14 +1,13 @@
 //! The server of the page: HTTP on 127.0.0.1, and the sockets of its pages.
 //!
-//! It serves one page, its data and the pages of results, and nothing to anybody else: the address
-//! holds a random token, and a request is refused unless its `Host` is the address of the server, its
-//! `Origin`, where it has one, is that too, and it is a GET of bounded length. A socket must have an
-//! origin. Nothing that a page says names a file.
+//! It serves one page, its data and the pages of results, and nothing to anyone else: the address holds a random token,
+//! and a request is refused unless its `Host` is the address of the server, its `Origin`, where it has one, is that
+//! too, and it is a GET of bounded length. A socket must have an origin. Nothing that a page states names a file.
 //!
 //! | refused | status |
 //! |---|---|
 //! | another host or origin, no token or another one | 403 |
-//! | a path that is none | 404 |
+//! | a path that is invalid | 404 |
 //! | another method than GET | 405 |
 //! | a head of more than 16 KiB | 431 |
 //! | more than 64 connections with the token at once | 503 |
@@ -57,9 +56,9 @@ pub struct Server {
 }
 
 /// A connection that has shown the token, counted for as long as it is answered.
-struct Known(Arc<Server>);
+struct AuthorisedConnection(Arc<Server>);
 
-impl Known {
+impl AuthorisedConnection {
     /// One more, while there is room.
     fn enter(server: &Arc<Server>) -> Option<Self> {
         let before = server.known.fetch_add(1, Ordering::Relaxed);
@@ -68,7 +67,7 @@ impl Known {
     }
 }
 
-impl Drop for Known {
+impl Drop for AuthorisedConnection {
     fn drop(&mut self) {
         self.0.known.fetch_sub(1, Ordering::Relaxed);
     }
@@ -131,10 +130,10 @@ impl Server {
             if let Err(reply) = server.admits(&request) {
                 return Err((reply, stream));
             }
-            let Some(known) = Known::enter(&server) else {
+            let Some(known) = AuthorisedConnection::enter(&server) else {
                 return Err((busy("too many connections"), stream));
             };
-            // A thread that is not made takes its connection along: one to say so on.
+            // A thread that is not made takes its connection along: one to report it on.
             let other = stream.try_clone();
             let made = thread::Builder::new().spawn(move || known.0.answer(stream, &request));
             match (made, other) {
@@ -186,7 +185,7 @@ impl Server {
         Ok(())
     }
 
-    /// What an admitted request asks for.
+    /// Resource of an admitted request.
     fn routed(&self, request: &Request) -> Result<Route, Reply> {
         let parts: Vec<&str> = request.token().1.split('/').collect();
         let file = |found: Result<Option<(Vec<u8>, &'static str)>, LabError>| match found {
@@ -220,7 +219,7 @@ fn random_token() -> Result<String, LabError> {
     Ok(HEXLOWER.encode(&random))
 }
 
-/// Equal, in a time that does not tell where they differ.
+/// Equal, in a time that does not determine where they differ.
 fn same(a: &str, b: &str) -> bool {
     a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |differ, (a, b)| differ | (a ^ b)) == 0
 }

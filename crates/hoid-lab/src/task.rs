@@ -3,7 +3,7 @@
 //! The controlled element is held exactly over a tick of 1 ms (zero-order hold,
 //! [`hoid_model::held_system`]). Where it changes, its matrices are those of the continuous model at
 //! the middle of each block of ten ticks. Target and disturbance are sampled at every tick; over the
-//! first seconds of the run-in they are faded in linearly, so that nobody begins with a jump.
+//! first seconds of the run-in they are faded in linearly, so that no one starts with a jump.
 
 use std::{collections::BTreeMap, f64::consts::TAU};
 
@@ -51,7 +51,7 @@ pub struct Task {
     pub disturbance: Vec<f64>,
 }
 
-/// What the loop did.
+/// Action of the loop.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Signals {
     /// u of the hand at each tick.
@@ -65,8 +65,8 @@ impl Task {
     /// run, which draw the phases with the seed of the condition.
     ///
     /// # Errors
-    /// [`LabError::Message`] for a condition that is none, as a file may have it; [`LabError::Model`] for an element that
-    /// cannot be held.
+    /// [`LabError::Message`] for a condition that is invalid, as a file may have it; [`LabError::Model`] for an element
+    /// that cannot be held.
     pub fn new(condition: &Condition, cell: u64, replication: u64) -> Result<Self, LabError> {
         condition.check()?;
         let course = condition.course()?;
@@ -148,7 +148,7 @@ fn drawn(excitation: &Excitation, turns: &mut impl Iterator<Item = f64>) -> Resu
     Ok(ForcingFunction::new(drawn.collect())?)
 }
 
-/// A controlled element over one tick; its leading gain stands where the realisation says.
+/// A controlled element over one tick; its leading gain is where the realisation states.
 fn held(num: &[f64], den: &[f64], realisation: Realisation, tick: SampleTime) -> Result<Plant, LabError> {
     let gain = num.first().copied().unwrap_or(0.0);
     let shape: Vec<f64> = num.iter().map(|c| if gain == 0.0 { *c } else { c / gain }).collect();
@@ -220,8 +220,8 @@ mod tests {
     #[test]
     fn the_simulator_of_hoid_finds_the_same_loop() {
         // What the simulator of C4 does at 100 Hz, its u held over ten ticks each, is what the task
-        // does at 1 kHz: both holds are exact, and the element changes in the same blocks but for
-        // the middle of the block that the task takes.
+        // does at 1 kHz: both holds are exact, and the element changes in the same blocks except
+        // for the middle of the block that the task takes.
         use hoid_model::scenario::{Condition as Reference, Scenario};
         use hoid_sim::Simulator;
         let own = Condition {

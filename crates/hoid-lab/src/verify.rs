@@ -1,4 +1,4 @@
-//! What a run is worth: every tick recomputed from the logged inputs.
+//! Reliability of a run: every tick recomputed from the logged inputs.
 //!
 //! A run is *verified* when nothing of this is found, else *unverified* with the reasons:
 //!
@@ -12,12 +12,12 @@
 //! | `lab-tick` | e at a tick is not that of the plant, by a bit |
 //! | `lab-event` | an event was taken before its time stamp, or too late |
 //! | `lab-frame` | a frame was too late, or did not show the tick that it names |
-//! | `lab-changed` | a file was changed behind the end |
+//! | `lab-changed` | a file was changed after the end |
 //!
-//! u and e are compared bit for bit, but for the sign of zero, which text does not keep. e is
-//! recomputed from the u of the log, so that a false event and a false tick are told apart; the tables
-//! are those that the page was given, which are compared with those made anew from the seed to
-//! rounding (sines may differ between computers in the last bit).
+//! u and e are compared bit for bit, except for the sign of zero, which text does not keep. e is recomputed from the u
+//! of the log, so that a false event and a false tick are distinguished; the tables are those that the page was given,
+//! which are compared with those made again from the seed to rounding (sines may differ between computers in the last
+//! bit).
 
 use hoid_model::{Finding, Verdict, VerdictLevel};
 use hoid_numerics::statistics::upper_median;
@@ -25,21 +25,21 @@ use serde::Serialize;
 
 use crate::{
     LabError,
-    session::{Begun, Ended, How, Logged, Stem},
+    session::{Ended, How, Logged, RunStart, Stem},
     task::{Task, held_inputs},
 };
 
 /// Relative difference that sines of two computers may leave in a table.
 const TABLE: f64 = 1e-9;
-/// A frame is missed when it comes this many times the usual interval after the last.
+/// A frame is missed when it comes this many times the typical interval after the last.
 const MISSED: f64 = 1.5;
 
-/// What was found of a run.
+/// Findings about a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Checked {
     /// Trustworthy is verified.
     pub verdict: Verdict,
-    /// What was measured besides.
+    /// Additional measurements.
     pub measures: Measures,
 }
 
@@ -54,7 +54,7 @@ pub struct Measures {
     pub frame_ms: f64,
     /// Longest time from frame to frame, ms.
     pub longest_frame_ms: f64,
-    /// Frames that the screen would have had besides.
+    /// Frames that the screen would have had in addition.
     pub missed_frames: usize,
     /// Input events a second.
     pub input_hz: f64,
@@ -62,14 +62,14 @@ pub struct Measures {
     pub input_age_ms: f64,
     /// Root mean square of e in the measurement.
     pub rms_e: f64,
-    /// That of what was to be followed or held off.
+    /// The value for the target or disturbance.
     pub rms_forcing: f64,
     /// 100 for no error, 0 for as much as hands at rest would leave.
     pub score: f64,
 }
 
 impl Checked {
-    /// True where nothing speaks against the run.
+    /// True if nothing speaks against the run.
     pub fn is_verified(&self) -> bool {
         self.verdict.level == VerdictLevel::Trustworthy
     }
@@ -79,7 +79,7 @@ impl Checked {
         if self.is_verified() { "verified" } else { "unverified" }
     }
 
-    /// Why not, in one line; empty where it is.
+    /// Why not, in one line; empty if it is.
     pub fn reasons(&self) -> String {
         self.verdict.reasons().collect::<Vec<_>>().join("; ")
     }
@@ -88,10 +88,10 @@ impl Checked {
 /// Checks a run of a session.
 ///
 /// # Errors
-/// [`LabError`] where nothing is known of the run (`run.json`) or the system refuses a file; what is wrong
-/// in the others is a finding.
+/// [`LabError`] where nothing is known about the run (`run.json`) or the system refuses a file; what is wrong in the
+/// others is a finding.
 pub fn check(stem: &Stem) -> Result<Checked, LabError> {
-    let begun = Begun::read(stem)?;
+    let begun = RunStart::read(stem)?;
     let logged = Logged::read(stem)?;
     let ended = Ended::read(stem).unwrap_or_default();
     let mut findings: Vec<Finding> = (logged.faults.iter())
@@ -129,7 +129,7 @@ pub fn check(stem: &Stem) -> Result<Checked, LabError> {
     })
 }
 
-fn end_of(begun: &Begun, ended: Option<&Ended>, logged: &Logged) -> Option<Finding> {
+fn end_of(begun: &RunStart, ended: Option<&Ended>, logged: &Logged) -> Option<Finding> {
     let finished = ended.is_some_and(|ended| ended.how == How::Finished);
     let ticks = logged.numbers.len();
     (!finished || ticks != begun.ticks).then(|| {
@@ -138,7 +138,7 @@ fn end_of(begun: &Begun, ended: Option<&Ended>, logged: &Logged) -> Option<Findi
     })
 }
 
-fn task_of(begun: &Begun, task: &Task) -> Option<Finding> {
+fn task_of(begun: &RunStart, task: &Task) -> Option<Finding> {
     let wrong = |what: &str| {
         Some(Finding::doubt(
             "lab-task",
@@ -168,10 +168,10 @@ fn task_of(begun: &Begun, task: &Task) -> Option<Finding> {
 
 fn ticks_of(logged: &Logged) -> Option<Finding> {
     let wrong = logged.numbers.iter().enumerate().find(|(k, tick)| **tick != *k as f64);
-    wrong.map(|(k, tick)| Finding::doubt("lab-ticks", format!("tick {tick} stands in the place of tick {k}")))
+    wrong.map(|(k, tick)| Finding::doubt("lab-ticks", format!("tick {tick} is in the place of tick {k}")))
 }
 
-fn events_of(begun: &Begun, logged: &Logged) -> Option<Finding> {
+fn events_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
     let mut last = 0.0;
     for (k, event) in logged.events.iter().enumerate() {
         let whole = event.tick >= 0.0 && event.tick.fract() == 0.0 && event.raw.is_finite();
@@ -185,7 +185,7 @@ fn events_of(begun: &Begun, logged: &Logged) -> Option<Finding> {
             )
         } else if late > begun.limits.input_ms {
             let limit = begun.limits.input_ms;
-            format!("was taken {late:.1} ms behind its time stamp, expected at most {limit} ms")
+            format!("was taken {late:.1} ms after its time stamp, expected at most {limit} ms")
         } else {
             last = event.tick;
             continue;
@@ -195,7 +195,7 @@ fn events_of(begun: &Begun, logged: &Logged) -> Option<Finding> {
     None
 }
 
-fn inputs_of(begun: &Begun, logged: &Logged) -> Option<Finding> {
+fn inputs_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
     let events: Vec<(usize, f64)> = (logged.events.iter())
         .map(|event| (event.tick as usize, begun.input.u(event.raw)))
         .collect();
@@ -223,7 +223,7 @@ fn differing(made: &[f64], logged: &[f64]) -> Option<(usize, usize)> {
     Some((first, 1 + places.count()))
 }
 
-fn frames_of(begun: &Begun, logged: &Logged) -> Option<Finding> {
+fn frames_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
     let limit = begun.limits.frame_ms;
     let wrong = |k: usize, words: String| Some(Finding::doubt("lab-frame", format!("frame {} {words}", k + 1)));
     let mut last = 0.0;
@@ -245,13 +245,13 @@ fn frames_of(begun: &Begun, logged: &Logged) -> Option<Finding> {
         if !(0.0..=limit).contains(&interval) {
             return wrong(
                 k,
-                format!("came {interval:.1} ms behind the last one, expected 0 to {limit} ms"),
+                format!("came {interval:.1} ms after the last one, expected 0 to {limit} ms"),
             );
         }
         if !(0.0..=limit).contains(&age.abs()) {
             return wrong(
                 k,
-                format!("was drawn {age:.1} ms behind its own time, expected at most {limit} ms"),
+                format!("was drawn {age:.1} ms after its own time, expected at most {limit} ms"),
             );
         }
         last = frame.drawn_ms;
@@ -275,15 +275,15 @@ fn files_of(stem: &Stem, ended: &Ended) -> Result<Option<Finding>, LabError> {
         .collect();
     Ok((!changed.is_empty()).then(|| {
         let words = format!(
-            "the file of {} was changed behind the end of the run",
+            "the file of {} was changed after the end of the run",
             changed.join(" and that of ")
         );
         Finding::doubt("lab-changed", words)
     }))
 }
 
-/// Runs that no hand made are said to be such; they can be as exact as others.
-fn hands_of(begun: &Begun, ended: &Ended) -> Vec<Finding> {
+/// Runs that no hand made are reported to be such; they can be as exact as others.
+fn hands_of(begun: &RunStart, ended: &Ended) -> Vec<Finding> {
     let made = ended.counted.get("synthetic_events").copied().unwrap_or(0.0);
     let mut notes = Vec::new();
     if made > 0.0 {
@@ -296,21 +296,21 @@ fn hands_of(begun: &Begun, ended: &Ended) -> Vec<Finding> {
     notes
 }
 
-fn measures(begun: &Begun, task: &Task, logged: &Logged) -> Measures {
+fn measures(begun: &RunStart, task: &Task, logged: &Logged) -> Measures {
     let intervals: Vec<f64> = logged
         .frames
         .windows(2)
         .map(|pair| pair[1].frame_ms - pair[0].frame_ms)
         .collect();
     let frame_ms = median(&intervals);
-    let usual = if begun.refresh_ms > 0.0 {
+    let typical = if begun.refresh_ms > 0.0 {
         begun.refresh_ms
     } else {
         frame_ms
     };
     let missed = |interval: &f64| {
-        if *interval > MISSED * usual {
-            ((interval / usual).round() as usize).saturating_sub(1)
+        if *interval > MISSED * typical {
+            ((interval / typical).round() as usize).saturating_sub(1)
         } else {
             0
         }

@@ -17,17 +17,17 @@ use crate::{
 /// Largest message of a page, bytes: a second of ticks is a tenth of it.
 pub const LARGEST: usize = 1 << 20;
 
-/// Who a page is for.
+/// Audience of a page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
     /// The person who tracks.
     Person,
-    /// Who looks on.
+    /// Observers.
     Experimenter,
 }
 
-/// What a page says. Variants without fields have braces, so that they take no unknown ones.
+/// Content of a page. Variants without fields have braces, so that they take no unknown ones.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
 #[allow(missing_docs)]
@@ -40,9 +40,9 @@ pub enum FromPage {
     },
     /// The person has read the text.
     Consent { subject: String, agreed: bool, cc0: bool },
-    /// The person goes on with a session.
+    /// The person continues with a session.
     Resume { session: String },
-    /// The next run is asked for.
+    /// The next run is requested.
     Next {},
     /// Tick 0 of the run that was sent.
     Begin {
@@ -53,7 +53,7 @@ pub enum FromPage {
         refresh_ms: f64,
         zero_ms: f64,
     },
-    /// What happened since the last batch.
+    /// Events since the last batch.
     Batch { number: usize, batch: Batch },
     /// The run reached its end.
     Finish {
@@ -63,16 +63,16 @@ pub enum FromPage {
     },
     /// The run was broken off.
     Abort { number: usize },
-    /// The pages about the session are asked for.
+    /// The pages about the session are requested.
     Reports {},
 }
 
-/// What the server says.
+/// Report of the server.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "kebab-case")]
 #[allow(missing_docs)]
 pub enum ToPage<'a> {
-    /// How the session stands.
+    /// State of the session.
     State(Box<State>),
     /// A run; its tables follow.
     Run {
@@ -87,32 +87,32 @@ pub enum ToPage<'a> {
         tables: Vec<usize>,
         operator: Option<&'a SimulatedOperator>,
     },
-    /// What a run is worth.
+    /// Reliability of a run.
     Verdict { done: &'a Done, measures: &'a Measures },
-    /// The estimate while a run goes on.
+    /// The estimate while a run continues.
     Live { number: usize, line: &'a LiveLine },
-    /// What was asked for cannot be; `elsewhere` where the session is in another window.
+    /// The request is refused; `elsewhere` if the session is in another window.
     Refused { words: String, elsewhere: bool },
-    /// The session goes on in this window, whose other window is gone.
+    /// The session continues in this window, whose other window is gone.
     Yours {},
 }
 
-/// How a session stands.
+/// State of a session.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct State {
     /// `consent`, `runs`, `finished` or `replay`.
     pub phase: &'static str,
     /// Name of the experiment.
     pub name: String,
-    /// What is to be confirmed.
+    /// Items to be confirmed.
     pub consent: String,
     /// When the person sees the live estimate.
     pub live: LiveFor,
-    /// True where a simulated operator takes the place of the person.
+    /// True if a simulated operator takes the place of the person.
     pub calibrate: bool,
     /// The session, as `sub-P01/ses-01`.
     pub session: Option<String>,
-    /// Sessions that can go on.
+    /// Sessions that can be resumed.
     pub open: Vec<String>,
     /// Runs that ended.
     pub done: Vec<Done>,
@@ -124,11 +124,11 @@ pub struct State {
     pub condition: Option<Condition>,
     /// Whether it is a training run.
     pub training: bool,
-    /// The run that goes on, where one does.
+    /// The run that continues, where one does.
     pub running: Option<usize>,
     /// True while pages are being made.
     pub reporting: bool,
-    /// Pages that were made: what they are, and where.
+    /// Pages that were written: titles and paths.
     pub reports: Vec<(String, String)>,
     /// Answers of the calibration.
     pub calibration: Vec<(String, String)>,

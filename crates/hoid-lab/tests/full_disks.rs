@@ -1,7 +1,7 @@
-//! Disks of 64 kB to 4 MB that fill at any instant of a session: what was told as logged is there, runs that were
+//! Disks of 64 kB to 4 MB that fill at any instant of a session: what was reported as logged is there, runs that were
 //! verified still are, and the session opens.
 //!
-//! A disk is a `tmpfs` of that size, which Linux lets an administrator mount; elsewhere the test says that it skips.
+//! A disk is a `tmpfs` of that size, which Linux lets an administrator mount; elsewhere the test shows that it skips.
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used)]
 
@@ -83,16 +83,16 @@ fn batches(task: &Task) -> Vec<Batch> {
         .collect()
 }
 
-/// What was told before the disk was full.
+/// What was reported before the disk was full.
 #[derive(Default)]
-struct Told {
+struct LoggedBefore {
     /// Ticks that were logged, of each run.
     ticks: Vec<(Stem, usize)>,
     verified: Vec<Stem>,
 }
 
-/// A session whose disk is full from a batch on, for so many batches.
-fn session(out: &Path, full: usize, until: usize, told: &mut Told) -> Option<Session> {
+/// A session whose disk is full from a batch on, for a given number of batches.
+fn session(out: &Path, full: usize, until: usize, told: &mut LoggedBefore) -> Option<Session> {
     let ballast = out.join("ballast");
     let mut session = Session::begin(out, &config(), "P01", false).ok()?;
     let mut instant = 0_usize;
@@ -153,7 +153,7 @@ fn a_disk_that_fills_loses_nothing_that_was_told() {
             eprintln!("skipped: no disk of its own can be mounted here");
             return;
         };
-        let mut told = Told::default();
+        let mut told = LoggedBefore::default();
         let session = session(at.path(), full, until, &mut told);
         let elsewhere = tempfile::tempdir().unwrap();
         let _ = fs::remove_file(at.path().join("ballast"));
@@ -193,7 +193,7 @@ fn a_disk_that_fills_loses_nothing_that_was_told() {
                 broken += 1;
             }
         }
-        // And it goes on.
+        // And it continues.
         assert!(again.new_number().is_ok());
         again.save().unwrap();
     }
@@ -203,7 +203,8 @@ fn a_disk_that_fills_loses_nothing_that_was_told() {
     );
 }
 
-/// The disk is full while a person tracks: the page is told at once, the run does not count, and the session goes on.
+/// The disk is full while a person tracks: the page is reported at once, the run does not count, and the session
+/// continues.
 #[test]
 fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
     let at = tempfile::tempdir().unwrap();
@@ -220,10 +221,10 @@ fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
     let told =
         "run-01_ticks.csv: No space left on device (os error 28). The run was ended and does not count; make room";
     assert!(said.contains(told), "{said}");
-    // What the page has sent meanwhile is of no account, and the pages see that nothing goes on.
+    // What the page has sent meanwhile is of no account, and the pages see that nothing continues.
     person.track(1, 3000..3100).unwrap();
     assert_eq!(person.state()["running"], Value::Null);
-    // As long as it is full none begins.
+    // As long as it is full none starts.
     let said = person.next(2).unwrap_err();
     assert!(said.contains("No space left") && said.contains("make room"), "{said}");
     fs::remove_file(&ballast).unwrap();
@@ -231,10 +232,10 @@ fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
     let number = 1 + Stem::all(&folder).unwrap().last().unwrap().0;
     person.next(number).unwrap();
     person.track(number, 0..4000).unwrap();
-    // A run that cannot be closed is no verified one.
+    // A run that cannot be closed is not a verified one.
     fill(&ballast);
     let said = person.finish(number).unwrap_err();
-    assert!(said.contains("make room on the disk and begin it again"), "{said}");
+    assert!(said.contains("make room on the disk and start it again"), "{said}");
     assert_eq!(person.state()["next"], 0);
     fs::remove_file(&ballast).unwrap();
     person.next(number + 1).unwrap();

@@ -1,5 +1,5 @@
-//! The page computes what Rust computes, to the last bit. Where there is no node it is said and left
-//! out; `cargo xtask slow lab` does ten thousand runs.
+//! The page computes what Rust computes, to the last bit. Where there is no node it is reported and
+//! left out; `cargo xtask slow lab` does ten thousand runs.
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
 #[path = "common/page.rs"]

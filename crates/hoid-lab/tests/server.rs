@@ -60,7 +60,7 @@ fn served_by(server: Server) -> At {
 }
 
 impl At {
-    /// The reply to a request as it stands.
+    /// The reply to a request unchanged.
     fn raw(&self, request: &[u8]) -> String {
         let mut stream = TcpStream::connect(&self.host).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
@@ -172,7 +172,7 @@ impl Page {
         while self.hear("state")["phase"] != "runs" {}
     }
 
-    /// Begins the next run; its number.
+    /// Starts the next run; its number.
     fn begin(&mut self) -> u64 {
         self.say(&json!({"type": "next"}));
         let number = self.hear("run")["number"].as_u64().unwrap();
@@ -242,7 +242,7 @@ fn a_window_that_is_closed_breaks_its_run_off() {
         .unwrap()
         .target;
     person.say(&batch(number, 0, &target));
-    // A second window does not take a run that goes on.
+    // A second window does not take a run that continues.
     let mut second = at.page();
     second.say(&json!({"type": "hello", "role": "person"}));
     assert!(
@@ -251,7 +251,7 @@ fn a_window_that_is_closed_breaks_its_run_off() {
             .unwrap()
             .contains("another window")
     );
-    // With the first one gone the session goes on in it.
+    // With the first one gone the session continues in it.
     drop(person);
     second.hear("yours");
     loop {
@@ -323,7 +323,7 @@ fn one_experiment_has_one_server() {
     assert!(second.is_err_and(|error| error.to_string().contains("another process works on")));
 }
 
-/// Connections that send a byte now and then, as many as the system gives: they give way to the page.
+/// Connections that send a byte at intervals, as many as the system gives: they give way to the page.
 #[test]
 fn slow_strangers_do_not_shut_the_page_out() {
     let dir = tempfile::tempdir().unwrap();
@@ -347,9 +347,10 @@ fn slow_strangers_do_not_shut_the_page_out() {
     assert_eq!(status(&reply), "200");
 }
 
-/// A thousand connections of strangers, each of which begins again as soon as it is closed: silence, half a head,
-/// heads without the token or without an end, sockets, bytes of any kind. The page is answered each time. (Within a second where the list of connections that
-/// the system holds does not overflow, which a test cannot demand of a busy machine.)
+/// A thousand connections of strangers, each of which starts again as soon as it is closed: silence, half a head, heads
+/// without the token or without an end, sockets, bytes of any kind. The page is answered each time. (Within a second
+/// where the list of connections that the system holds does not overflow, which a test cannot demand of a busy
+/// machine.)
 #[test]
 fn a_thousand_hostile_connections_do_not_shut_the_page_out() {
     let dir = tempfile::tempdir().unwrap();

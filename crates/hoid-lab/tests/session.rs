@@ -1,4 +1,4 @@
-//! A session without a page: batches as a page sends them, what becomes of them, and what is found
+//! A session without a page: batches as a page sends them, what becomes of them, and the findings
 //! when something of them is changed.
 #![allow(clippy::unwrap_used)]
 
@@ -10,7 +10,7 @@ use std::{collections::BTreeMap, fs, path::Path};
 use hoid_lab::{
     config::{Condition, Config, Signal},
     plant::InputMap,
-    session::{Batch, Begun, Event, Frame, How, RunLog, Session, Stem},
+    session::{Batch, Event, Frame, How, RunLog, RunStart, Session, Stem},
     task::{Task, held_inputs},
     verify::{Checked, check},
 };
@@ -40,7 +40,7 @@ const MAP: InputMap = InputMap {
     gain: 3.0,
 };
 
-fn begun(session: &Session, number: usize) -> (Begun, Task) {
+fn begun(session: &Session, number: usize) -> (RunStart, Task) {
     run::begun(session, number, MAP).unwrap()
 }
 
@@ -106,7 +106,7 @@ fn a_run_is_verified_and_its_record_is_read_by_hoid() {
     assert_eq!(session.next(), Some(1));
     assert_eq!(checked.measures.ticks, 4000);
     assert!((checked.measures.input_hz - 125.0).abs() < 1.0);
-    let begun = Begun::read(&stem).unwrap();
+    let begun = RunStart::read(&stem).unwrap();
     let logged = hoid_lab::session::Logged::read(&stem).unwrap();
     let record = hoid_lab::record::record(&begun, &begun.task(&stem).unwrap(), &logged).unwrap();
     let path = stem.file("beh.parquet");
@@ -164,12 +164,12 @@ fn what_is_changed_makes_a_run_unverified_for_its_own_reason() {
 #[test]
 fn another_target_or_element_is_found() {
     for change in [
-        |begun: &mut Begun| begun.replication += 1,
-        |begun: &mut Begun| begun.phases[0].plant.b[0] *= 1.001,
+        |begun: &mut RunStart| begun.replication += 1,
+        |begun: &mut RunStart| begun.phases[0].plant.b[0] *= 1.001,
     ] {
         let dir = tempfile::tempdir().unwrap();
         let (_, stem, _) = finished(dir.path());
-        let mut begun = Begun::read(&stem).unwrap();
+        let mut begun = RunStart::read(&stem).unwrap();
         let task = begun.task(&stem).unwrap();
         change(&mut begun);
         begun.write(&stem, &task).unwrap();
@@ -254,8 +254,8 @@ fn people_have_their_rows_and_pseudonyms_are_checked() {
     }
 }
 
-/// Files cut at any byte, flipped or deleted, as by power cuts and full disks: the session opens, its
-/// damaged runs are unverified, and it can go on.
+/// Files cut at any byte, flipped or deleted, as by power cuts and full disks: the session opens, its damaged runs are
+/// unverified, and it can continue.
 #[test]
 fn every_session_opens_whatever_was_cut_or_lost() {
     let dir = tempfile::tempdir().unwrap();
@@ -319,7 +319,7 @@ fn numbers_of_files_are_no_places() {
     fs::write(&ticks, format!("{text}{last}\n{last}\n")).unwrap();
     let checked = check(&stem).unwrap();
     assert!(
-        checked.reasons().contains("tick 3999 stands in the place of tick 4000"),
+        checked.reasons().contains("tick 3999 is in the place of tick 4000"),
         "{}",
         checked.reasons()
     );
@@ -341,7 +341,7 @@ fn numbers_of_files_are_no_places() {
     let other = facts.replacen("condition = 0", "condition = 9", 1);
     assert_ne!(facts, other);
     fs::write(&toml, &other).unwrap();
-    // As long as the copy says what was to be the session opens.
+    // As long as the copy shows what was to be the session opens.
     assert_eq!(Session::open(&session.folder).unwrap().facts, session.facts);
     fs::write(session.folder.join("lab.copy.toml"), other).unwrap();
     let said = Session::open(&session.folder).unwrap_err().to_string();
@@ -358,7 +358,7 @@ fn reading_a_session_changes_no_file() {
     fs::write(&runs, &cut).unwrap();
     assert_eq!(Session::read(&session.folder).unwrap().done.len(), 1);
     assert_eq!(fs::read_to_string(&runs).unwrap(), cut);
-    // The next line stands behind the last whole one.
+    // The next line is after the last whole one.
     let mut session = Session::open(&session.folder).unwrap();
     let (stem, log) = run(&mut session, usize::MAX);
     drop(log);

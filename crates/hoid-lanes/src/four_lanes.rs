@@ -129,8 +129,9 @@ pub fn with_four_lanes<T: FourLaneTask>(task: T) -> T::Output {
 impl InstructionSet {
     /// As [`with_four_lanes`] in these registers; `None` when this processor does not have them.
     ///
-    /// Four numbers fill half of a register of AVX-512, so that [`InstructionSet::Avx512`] stands
-    /// for AVX2 here. [`InstructionSet::Scalar`] gives the registers of a processor without either.
+    /// Four numbers fill half of a register of AVX-512, so that [`InstructionSet::Avx512`]
+    /// represents AVX2 here. [`InstructionSet::Scalar`] gives the registers of a processor without
+    /// either.
     pub fn with_four_lanes<T: FourLaneTask>(self, task: T) -> Option<T::Output> {
         match self {
             Self::Best => Some(with_four_lanes(task)),

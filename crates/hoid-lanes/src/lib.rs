@@ -1,9 +1,8 @@
 //! Runs of a recursion in the lanes of vector registers, with the bits of each run alone.
 //!
-//! A recursion `y(t) = x(t) - f y(t-1)` waits at each sample for its own last result, so that one
-//! run leaves most of a processor idle, and no vector instruction can shorten it: sample t + 1
-//! cannot begin before sample t has ended. Several runs can go at a time, one in each lane of a
-//! register:
+//! A recursion `y(t) = x(t) - f y(t-1)` waits at each sample for its own last result, so that one run leaves most of a
+//! processor idle, and no vector instruction can shorten it: sample t + 1 cannot start before sample t has ended.
+//! Several runs can go at a time, one in each lane of a register:
 //!
 //! `[y_1(t) .. y_L(t)] = [x_1(t) .. x_L(t)] - [f_1 .. f_L] [y_1(t-1) .. y_L(t-1)]`, lane by lane.
 //!
@@ -50,7 +49,7 @@
 //! # Ok::<(), &str>(())
 //! ```
 //!
-//! | item | what it is |
+//! | item | meaning |
 //! |---|---|
 //! | [`Number`] | an f64, or several in lanes |
 //! | [`LaneTask`], [`InstructionSet::with_lanes`] | a computation over numbers, and its run in the lanes of the chosen registers |

@@ -1,6 +1,6 @@
 //! A number in each lane of two registers.
 //!
-//! Two, because the result of an operation takes several cycles while the next operation can begin
+//! Two, because the result of an operation takes several cycles while the next operation can start
 //! in each: two independent registers fill the latency of a recursion.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};

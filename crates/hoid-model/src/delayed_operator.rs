@@ -2,7 +2,7 @@
 //!
 //! `H(s) = (K_e + K_e_dot s) omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}` with
 //! `tau = l Ts + delta`, `0 <= delta < Ts`, is
-//! `q^-nk (b0 + b1 q^-1 + b2 q^-2)/(1 + f1 q^-1 + f2 q^-2)` with `nk = l + 1` behind a zero-order
+//! `q^-nk (b0 + b1 q^-1 + b2 q^-2)/(1 + f1 q^-1 + f2 q^-2)` with `nk = l + 1` after a zero-order
 //! hold, by the formulas of [`hoid_core::held_operator`]. delta = 0 gives b2 = 0 and the hold of
 //! [`crate::operator`].
 //!
@@ -14,7 +14,7 @@ use hoid_core::held_operator::held_operator_delayed;
 
 use crate::{ModelError, OperatorParameters, SampleTime};
 
-/// `q^-nk (b0 + b1 q^-1 + b2 q^-2) / (1 + f1 q^-1 + f2 q^-2)`: the operator with any delay behind a
+/// `q^-nk (b0 + b1 q^-1 + b2 q^-2) / (1 + f1 q^-1 + f2 q^-2)`: the operator with any delay after a
 /// zero-order hold.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DelayedOperator {
@@ -140,7 +140,7 @@ pub fn whole_samples(tau_e_s: f64, sample_time: SampleTime) -> Result<usize, Mod
     Ok(if near { nearest } else { samples.floor() } as usize)
 }
 
-/// The fraction delta in s behind the whole samples, of parameters that have a meaning.
+/// The fraction delta in s after the whole samples, of parameters that have a meaning.
 fn fraction(whole_samples: usize, parameters: [f64; 5], sample_time: SampleTime) -> Result<f64, ModelError> {
     let quantities = [
         "error gain K_e",
@@ -166,7 +166,7 @@ fn fraction(whole_samples: usize, parameters: [f64; 5], sample_time: SampleTime)
         return Err(ModelError::OutOfRange {
             quantity: "delay tau_e in s",
             found: tau,
-            expected: "a time within the sample that is asked for",
+            expected: "a time within the sample that is requested",
         });
     }
     // A whole number of samples, or one more, up to rounding.
@@ -312,7 +312,7 @@ mod tests {
             };
             for j in 0..5 {
                 // Inside the sample: the whole ones have derivatives on one side only, tested
-                // beside.
+                // alongside.
                 if j == 4 && [0.0, 0.28, 0.29].contains(&p[4]) {
                     continue;
                 }

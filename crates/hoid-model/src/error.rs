@@ -5,21 +5,21 @@ use thiserror::Error;
 use crate::UnknownName;
 
 /// Why a model, a record or a conversion could not be made. Each message names the quantity, what
-/// was found, what was expected, and where it helps, the remedy.
+/// was found, the expected value, and where it helps, the remedy.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ModelError {
     /// A number outside the range that has a meaning.
     #[error("{quantity} is {found}, expected {expected}")]
     OutOfRange {
-        /// What the number is, with its symbol and unit.
+        /// Definition of the number, with its symbol and unit.
         quantity: &'static str,
         /// The value given.
         found: f64,
-        /// The range that has a meaning.
+        /// The valid range.
         expected: &'static str,
     },
-    /// A name that stands for nothing.
+    /// A name without a meaning.
     #[error(transparent)]
     UnknownName(#[from] UnknownName),
     /// A sample that is NaN or infinite.
@@ -49,7 +49,7 @@ pub enum ModelError {
     /// Parameters of an operator that do not make one.
     #[error("{reason}")]
     Operator {
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// A record without a sample.
@@ -67,7 +67,7 @@ pub enum ModelError {
     /// A channel that the record does not have.
     #[error("the record has no channel {name}; it has {available}")]
     NoSuchChannel {
-        /// The name asked for.
+        /// The requested name.
         name: String,
         /// The names that exist.
         available: String,
@@ -77,9 +77,9 @@ pub enum ModelError {
     Decimation {
         /// Label of the record.
         label: String,
-        /// What was found.
+        /// The findings.
         found: String,
-        /// What would do.
+        /// The expected value.
         expected: String,
     },
     /// Two records that do not follow each other.
@@ -87,9 +87,9 @@ pub enum ModelError {
     Joined {
         /// Label of the second record.
         label: String,
-        /// What differs.
+        /// The differences.
         found: String,
-        /// What is needed.
+        /// Requirements.
         expected: &'static str,
     },
     /// A time span that holds no samples of the record.
@@ -109,7 +109,7 @@ pub enum ModelError {
     Orders {
         /// The orders as given.
         found: String,
-        /// What is wrong, and the remedy.
+        /// The problem, and the remedy.
         expected: String,
     },
     /// A transfer function that the method cannot treat.
@@ -117,7 +117,7 @@ pub enum ModelError {
     TransferFunction {
         /// The transfer function as given.
         found: String,
-        /// What is wrong, and the remedy.
+        /// The problem, and the remedy.
         expected: String,
     },
     /// A discrete model without a continuous one.
@@ -128,7 +128,7 @@ pub enum ModelError {
         "noise level P_n = {demanded} = var(n)/var(u) cannot be reached with remnant order {order}: the largest reachable level is {largest:.4}; ask for less or use the definition var(u_n)/var(u)"
     )]
     UnreachableNoiseLevel {
-        /// The level asked for.
+        /// The requested level.
         demanded: f64,
         /// Order of the remnant filter.
         order: usize,
@@ -156,7 +156,7 @@ pub enum NotConvertible {
     /// Polynomials of no operator of the family.
     #[error("the polynomials are those of no operator of the family: {reason}")]
     NotOfTheFamily {
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// A pole on the closed negative real axis has no real logarithm.
@@ -210,7 +210,7 @@ pub enum NotConvertible {
     NotARemnantFilter {
         /// Order m.
         order: usize,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
 }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::numbers::{DASH, with_uncertainty};
 
-/// A number with its standard error; `None` where the data give none (a delay that was fixed, a
+/// A number with its standard error; `None` if the data give none (a delay that was fixed, a
 /// singular information matrix).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Estimate {

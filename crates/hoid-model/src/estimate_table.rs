@@ -11,10 +11,10 @@ use crate::{
 };
 
 /// Writes a row for each name, estimate and unit (empty for none), each with a line feed in front
-/// but for the first.
+/// except for the first.
 ///
 /// # Errors
-/// Those of the formatter.
+/// The errors of the formatter.
 ///
 /// ```
 /// use hoid_model::{estimate_table::write_rows, uncertainty::Estimate};

@@ -1,24 +1,23 @@
-//! A fault of recorded data: what it is, where, how large, and what was done about it.
+//! A fault of recorded data: kind, place, size, and the actions taken about it.
 //!
-//! A [`Fault`] is a place in one channel of a record (or in all of them) where the numbers cannot be
-//! what the channel did. How faults are found is told where that is done; here stands what is said of
-//! one, so that a file, a fit and a stream say it alike. [`fault_findings`] turns faults into what a
-//! [`Verdict`](crate::Verdict) is made of: a fault that was mended is worth a note, one that is still
-//! in the data a doubt.
+//! A [`Fault`] is a place in one channel of a record (or in all of them) where the numbers cannot be what the channel
+//! did. How faults are found is reported where that is done; this text describes one, so that a file, a fit and a
+//! stream report it alike. [`fault_findings`] turns faults into what a [`Verdict`](crate::Verdict) is made of: a fault
+//! that was repaired is worth a note, one that is still in the data a doubt.
 
 use std::fmt;
 
 use crate::Finding;
 
-/// What is wrong.
+/// The problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum FaultKind {
-    /// One or few samples that those before and behind them rule out.
+    /// One or few samples that those before and after them rule out.
     Spike,
     /// A constant that the channel jumps to and back from.
     Dropout,
-    /// A channel that holds its value while the others go on.
+    /// A channel that holds its value while the others continue.
     Frozen,
     /// A stretch in which nothing happens in any channel.
     Idle,
@@ -49,17 +48,17 @@ crate::named_choice!(FaultKind, "kind of fault", 10, {
     Sign => "sign",
 });
 
-/// What is to be done about faults.
+/// How faults are handled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum FaultHandling {
-    /// They are told, and the data stay as they are.
+    /// They are reported, and the data stay as they are.
     Report,
     /// Short ones are bridged, the record is cut at long ones.
     #[default]
     Bridge,
     /// The record is cut at all of them.
     Cut,
-    /// They are not looked for.
+    /// They are not searched for.
     Keep,
 }
 
@@ -70,14 +69,14 @@ crate::named_choice!(FaultHandling, "handling of faults", 4, {
     Keep => "keep",
 });
 
-/// What was done about a fault.
+/// Processing applied to a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum FaultAction {
-    /// It is told; the data are as they were.
+    /// It is reported; the data are as they were.
     Reported,
-    /// Its samples were replaced by what those around them say; a wrap was unwrapped.
+    /// Its samples were replaced by what those around them report; a wrap was unwrapped.
     Bridged,
-    /// The record ends before it and another begins behind it.
+    /// The record ends before it and another starts after it.
     Cut,
 }
 
@@ -90,28 +89,28 @@ crate::named_choice!(FaultAction, "action on a fault", 3, {
 /// One fault.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Fault {
-    /// What it is.
+    /// Its definition.
     pub kind: FaultKind,
     /// The channel; empty for all channels and for the time.
     pub channel: String,
     /// Time of its first sample, s.
     pub from_s: f64,
-    /// Time of the sample behind its last, s.
+    /// Time of the sample after its last, s.
     pub to_s: f64,
     /// How many samples.
     pub samples: usize,
     /// How large, in the unit of the channel: by how much a spike or a step is off, the modulus of a
     /// wrap, the length of what is frozen or idle in s, the factor of a scale, the sample time in s.
     pub size: f64,
-    /// The size in robust standard deviations of what the statistic of this kind leaves of good data;
-    /// none where the kind has no such statistic.
+    /// The size in robust standard deviations of what the statistic of this kind leaves of good data; none if the kind
+    /// has no such statistic.
     pub deviations: Option<f64>,
-    /// What was done.
+    /// The actions taken.
     pub action: FaultAction,
 }
 
 impl Fault {
-    /// What can be done about it by hand.
+    /// Remedy by hand.
     pub fn remedy(&self) -> &'static str {
         match self.kind {
             FaultKind::TimeUnit => "t must be in s: divide a t in ms by 1000, or give the sampling frequency with --fs",
@@ -149,7 +148,9 @@ impl fmt::Display for Fault {
             FaultKind::Scale => write!(f, "{channel} is {size} times larger than elsewhere, {span}")?,
             FaultKind::TimeUnit => write!(f, "a sample time of {size} s: no person is recorded so")?,
             FaultKind::Exchanged => {
-                f.write_str("input and output look exchanged: the output answers at once, and is answered late")?;
+                f.write_str(
+                    "input and output seem exchanged: the output responds immediately, and the input responds late",
+                )?;
             }
             FaultKind::Sign => f.write_str("the output answers the input with the wrong sign")?,
         }
@@ -164,7 +165,7 @@ impl fmt::Display for Fault {
     }
 }
 
-/// A number of so many significant digits, without trailing zeros.
+/// A number of a given number of significant digits, without trailing zeros.
 fn short(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
@@ -182,13 +183,13 @@ fn short(value: f64, digits: usize) -> String {
     }
 }
 
-/// Faults of one kind that are told one by one; more are counted.
+/// Faults of one kind that are reported one by one; more are counted.
 const TOLD: usize = 3;
-/// Share of the samples that may be mended before the rest is doubted.
+/// Share of the samples that may be repaired before the rest is doubted.
 pub const MOST_MENDED: f64 = 0.2;
 
-/// What faults say of a result: a note where all of a kind were mended, a doubt where they were not,
-/// and a doubt where more than [`MOST_MENDED`] of the samples are gone.
+/// Information of faults about a result: a note where all of a kind were repaired, a doubt where
+/// they were not, and a doubt where more than [`MOST_MENDED`] of the samples are gone.
 pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
     let mut all = Vec::new();
     for kind in FaultKind::ALL {
@@ -207,23 +208,23 @@ pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
             let words = words.join("; ");
             all.push(match (left, kind) {
                 (false, _) => Finding::note("faults", words),
-                // In wrong seconds no parameter means what it says.
+                // In wrong seconds no parameter means what its name states.
                 (true, FaultKind::TimeUnit) => Finding::undetermined("faults", words),
                 (true, _) => Finding::doubt("faults", words),
             });
         }
     }
-    let mended: usize = faults
+    let repaired: usize = faults
         .iter()
         .filter(|fault| fault.action != FaultAction::Reported && fault.kind != FaultKind::Wrap)
         .map(|fault| fault.samples)
         .sum();
-    // What is idle is no part of the run.
+    // What is idle is not a part of the run.
     let idle: usize = (faults.iter())
         .filter(|fault| fault.action == FaultAction::Cut && fault.kind == FaultKind::Idle)
         .map(|fault| fault.samples)
         .sum();
-    let share = (mended - idle) as f64 / samples.saturating_sub(idle).max(1) as f64;
+    let share = (repaired - idle) as f64 / samples.saturating_sub(idle).max(1) as f64;
     if share > MOST_MENDED {
         all.push(Finding::doubt(
             "faults",
@@ -278,9 +279,9 @@ mod tests {
         let many = vec![spike(FaultAction::Bridged); 300];
         let found = fault_findings(&many, 1000);
         assert!(
-            found[0].words.ends_with("and 297 more of this kind"),
+            found[0].message.ends_with("and 297 more of this kind"),
             "{}",
-            found[0].words
+            found[0].message
         );
         assert_eq!(found[1].severity, Severity::Doubt);
         let idle = Fault {

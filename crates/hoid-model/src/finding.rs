@@ -1,4 +1,4 @@
-//! What can make a result doubtful, in words and in a form for programs.
+//! Findings that make a result doubtful, as text and in a form for programs.
 //!
 //! A [`Finding`] is one observation about a result: how a search ended, a parameter at its bound,
 //! methods that do not agree, a quantity that the data do not determine. It has a kind (a name that
@@ -11,18 +11,18 @@
 //! | [`Severity::Doubt`] | doubtful |
 //! | [`Severity::Undetermined`] | not determined |
 //!
-//! Whoever judges something new adds findings; nobody else decides what they amount to.
+//! Code that judges something new adds findings; no other code decides what they amount to.
 
 use std::fmt;
 
 /// How much a finding weighs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum Severity {
-    /// Worth knowing; the result stands.
+    /// Worth knowing; the result remains valid.
     Note,
     /// The result may be wrong.
     Doubt,
-    /// The data do not say what was asked.
+    /// The data do not determine the requested quantity.
     Undetermined,
 }
 
@@ -35,46 +35,47 @@ crate::named_choice!(Severity, "severity", 3, {
 /// One observation about a result.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Finding {
-    /// What was observed, as a name for programs: `not-converged`, `delay-at-bound`.
+    /// The observation, as a name for programs: `not-converged`, `delay-at-bound`.
     #[serde(deserialize_with = "crate::interned::name")]
     pub kind: crate::interned::Name,
     /// How much it weighs.
     pub severity: Severity,
     /// The observation in a sentence, with its numbers, without a full stop.
-    pub words: String,
+    #[serde(rename = "words")]
+    pub message: String,
 }
 
 impl Finding {
-    /// A finding that the result stands in spite of.
-    pub fn note(kind: &'static str, words: impl Into<String>) -> Self {
-        Self::new(kind, Severity::Note, words)
+    /// A finding that the result is in spite of.
+    pub fn note(kind: &'static str, message: impl Into<String>) -> Self {
+        Self::new(kind, Severity::Note, message)
     }
 
     /// A finding that makes the result doubtful.
-    pub fn doubt(kind: &'static str, words: impl Into<String>) -> Self {
-        Self::new(kind, Severity::Doubt, words)
+    pub fn doubt(kind: &'static str, message: impl Into<String>) -> Self {
+        Self::new(kind, Severity::Doubt, message)
     }
 
     /// A finding that leaves the question open.
-    pub fn undetermined(kind: &'static str, words: impl Into<String>) -> Self {
-        Self::new(kind, Severity::Undetermined, words)
+    pub fn undetermined(kind: &'static str, message: impl Into<String>) -> Self {
+        Self::new(kind, Severity::Undetermined, message)
     }
 
-    fn new(kind: &'static str, severity: Severity, words: impl Into<String>) -> Self {
+    fn new(kind: &'static str, severity: Severity, message: impl Into<String>) -> Self {
         Self {
             kind,
             severity,
-            words: words.into(),
+            message: message.into(),
         }
     }
 }
 
-/// What a result is worth.
+/// Reliability of a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum VerdictLevel {
     /// Nothing speaks against it.
     Trustworthy,
-    /// Something does; the reasons say what.
+    /// Something does; the reasons report what.
     Doubtful,
     /// The data do not determine it.
     NotDetermined,
@@ -89,7 +90,7 @@ crate::named_choice!(VerdictLevel, "verdict", 3, {
 /// The level, and the findings it rests on, the gravest first.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Verdict {
-    /// What the result is worth.
+    /// Verdict on the result.
     pub level: VerdictLevel,
     findings: Vec<Finding>,
 }
@@ -107,12 +108,12 @@ impl Verdict {
     }
 
     /// The verdict of these findings and more.
-    pub fn and(self, more: impl IntoIterator<Item = Finding>) -> Self {
+    pub fn append(self, more: impl IntoIterator<Item = Finding>) -> Self {
         Self::of(self.findings.into_iter().chain(more).collect())
     }
 
     /// The verdict of these findings behind others, from which they may follow.
-    pub fn behind(self, first: impl IntoIterator<Item = Finding>) -> Self {
+    pub fn prepend(self, first: impl IntoIterator<Item = Finding>) -> Self {
         Self::of(first.into_iter().chain(self.findings).collect())
     }
 
@@ -121,19 +122,22 @@ impl Verdict {
         &self.findings
     }
 
-    /// What speaks against the result: the findings that are more than notes.
+    /// Findings against the result: the findings that are more than notes.
     pub fn reasons(&self) -> impl Iterator<Item = &str> {
         let weighs = |finding: &&Finding| finding.severity > Severity::Note;
         self.findings
             .iter()
             .filter(weighs)
-            .map(|finding| finding.words.as_str())
+            .map(|finding| finding.message.as_str())
     }
 
-    /// What is worth knowing besides.
+    /// Additional notes.
     pub fn notes(&self) -> impl Iterator<Item = &str> {
         let light = |finding: &&Finding| finding.severity == Severity::Note;
-        self.findings.iter().filter(light).map(|finding| finding.words.as_str())
+        self.findings
+            .iter()
+            .filter(light)
+            .map(|finding| finding.message.as_str())
     }
 }
 
@@ -166,9 +170,12 @@ mod tests {
         assert_eq!(doubtful.level, VerdictLevel::Doubtful);
         assert_eq!(doubtful.reasons().collect::<Vec<_>>(), ["the search did not converge"]);
         let all = Verdict::of(vec![note.clone(), doubt.clone(), open.clone()]);
-        assert_eq!(Verdict::of(vec![note.clone()]).and([doubt.clone(), open.clone()]), all);
+        assert_eq!(
+            Verdict::of(vec![note.clone()]).append([doubt.clone(), open.clone()]),
+            all
+        );
         let second = Finding::doubt("second", "what follows from it");
-        let led = Verdict::of(vec![note, second.clone()]).behind([doubt.clone()]);
+        let led = Verdict::of(vec![note, second.clone()]).prepend([doubt.clone()]);
         assert_eq!(led.findings()[..2], [doubt, second]);
         assert_eq!(all.level, VerdictLevel::NotDetermined);
         assert_eq!(

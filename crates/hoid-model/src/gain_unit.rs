@@ -1,9 +1,9 @@
 //! Units of an operator's gains.
 //!
 //! A gain is a ratio of the output u to the input e, so that its unit is that of u by that of e. It
-//! is told only where both channels say theirs; a recording without units has gains without units.
-//! An operator `K (1 + T_L s) / (1 + T_I s)` has the gain `K` in u/e, the gain of the rate of the
-//! error `K_e_dot = K T_L` in u s/e, and the ratio `K / T_I` in u/(e s).
+//! is reported only where both channels show theirs; a recording without units has gains without
+//! units. An operator `K (1 + T_L s) / (1 + T_I s)` has the gain `K` in u/e, the gain of the rate
+//! of the error `K_e_dot = K T_L` in u s/e, and the ratio `K / T_I` in u/(e s).
 
 use crate::Record;
 
@@ -12,7 +12,7 @@ use crate::Record;
 pub struct GainUnit(Option<(String, String)>);
 
 impl GainUnit {
-    /// The units of a record: none where one of the two is not declared.
+    /// The units of a record: none if one of the two is not declared.
     pub fn of(record: &Record) -> Self {
         let units = record
             .input_channel()
@@ -21,8 +21,8 @@ impl GainUnit {
         Self(declared.map(|(e, u)| (e.to_owned(), u.to_owned())))
     }
 
-    /// Unit of a parameter, of its name and of the unit `own` that it has beside that of the gain
-    /// ("s" of K_e_dot, "1/s" of K/T_I, "deg/deg" or "" of K). What is no gain keeps its own.
+    /// Unit of a parameter, of its name and of the unit `own` that it has next to that of the gain
+    /// ("s" of K_e_dot, "1/s" of K/T_I, "deg/deg" or "" of K). What is not a gain keeps its own.
     ///
     /// ```
     /// # use hoid_model::{Channel, GainUnit, Record, SampleTime};
@@ -41,7 +41,7 @@ impl GainUnit {
         }
         match (&self.0, own) {
             (None, _) => String::new(),
-            // Of like units a ratio has none, and time is left.
+            // For like units a ratio has none, and time is left.
             (Some((e, u)), "s" | "1/s") if e == u => own.to_owned(),
             (Some((e, u)), "s") => format!("{u} s/{e}"),
             (Some((e, u)), "1/s") => format!("{u}/({e} s)"),

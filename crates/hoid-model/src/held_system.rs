@@ -17,7 +17,7 @@ use num_complex::Complex64;
 
 use crate::{ModelError, SampleTime};
 
-/// A held system; its state is that of `1/den`, the numerator stands in the output.
+/// A held system; its state is that of `1/den`, the numerator is in the output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldSystem {
     order: usize,
@@ -104,7 +104,7 @@ impl HeldSystem {
         &self.transition
     }
 
-    /// What the input v(k) adds to the state; all of it where the input is not late.
+    /// Contribution of the input v(k) to the state; all of it where the input is not late.
     pub fn input(&self) -> &[f64] {
         &self.now
     }
@@ -212,7 +212,7 @@ mod tests {
         // Two independent exponentials: nalgebra's by Pade, the family's by its series.
         let x = [4.0, 0.6, 0.2, 11.0_f64.ln(), 0.25_f64.ln(), 0.1437];
         let operator = FamilyOperator::new(Form::Lead2Lag, true, &x).unwrap();
-        let held = operator.hold(ts()).unwrap();
+        let held = operator.zoh(ts()).unwrap();
         let transfer = operator.transfer_function().unwrap();
         let late = (0.1437 * 60.0_f64).fract();
         let ours = HeldSystem::new(transfer.num(), transfer.den(), late, ts()).unwrap();

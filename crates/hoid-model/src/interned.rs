@@ -38,7 +38,7 @@ pub fn interned(name: &str) -> Option<Name> {
 /// Reads a name: `#[serde(deserialize_with = "hoid_model::interned::name")]`.
 ///
 /// # Errors
-/// Those of the reader, and for a name that is too long.
+/// The errors of the reader, and for a name that is too long.
 pub fn name<'de, D: Deserializer<'de>>(reader: D) -> Result<Name, D::Error> {
     let text = String::deserialize(reader)?;
     interned(&text).ok_or_else(|| {

@@ -1,5 +1,5 @@
-//! What hoid identifies, and the mathematics that needs no data: records, polynomial models, exact
-//! discretisation, the operator's parameters and the task in which an operator is measured.
+//! Models of hoid and mathematics that needs no data: records, polynomial models, exact discretisation, the operator's
+//! parameters and the task in which an operator is measured.
 //!
 //! A person who tracks a target sees the error e and answers with the control u. The operator model
 //! is a gain, a lead, a delay and the neuromuscular dynamics,
@@ -36,7 +36,7 @@
 //!
 //! Notation and units are those of the symbol table in the documentation (`docs/src/symbols.md`).
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`record`] | [`Record`]: evenly sampled input, output and what else was measured |
 //! | [`polynomial`] | polynomials in `q^-1`, their roots and stability |
@@ -59,7 +59,7 @@
 //! | [`margins`] | crossover frequency, phase and gain margin |
 //! | [`remnant_gain`] | the gain K_n that gives a demanded noise level |
 //! | [`GainUnit`] | the units of gains, of what the channels are measured in |
-//! | [`Finding`], [`Verdict`] | what makes a result doubtful, and what it is worth |
+//! | [`Finding`], [`Verdict`] | what makes a result doubtful, and its reliability |
 //! | [`named_choice!`], [`NamedChoice`] | the names that users type |
 
 mod error;

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 /// A choice with a name that users type. [`named_choice!`](crate::named_choice) implements it.
 pub trait NamedChoice: Copy + PartialEq + Sized + 'static {
-    /// What is chosen, for messages: "structure".
+    /// The choice, for messages: "structure".
     const WHAT: &'static str;
     /// All choices, in the order in which they are listed.
     const CHOICES: &'static [Self];
@@ -34,11 +34,11 @@ pub trait NamedChoice: Copy + PartialEq + Sized + 'static {
     }
 }
 
-/// A name that stands for nothing.
+/// A name without a meaning.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("there is no {what} {found}; expected {expected}")]
 pub struct UnknownName {
-    /// What was to be chosen.
+    /// The quantity to be chosen.
     pub what: &'static str,
     /// The name given.
     pub found: String,

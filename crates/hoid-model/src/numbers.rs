@@ -4,7 +4,7 @@
 //! significant digits and the value with the same decimals (ISO/IEC Guide 98-3, 7.2.6). Numbers
 //! without a standard error get five significant digits.
 
-/// Stands where there is no number.
+/// Used where there is no number.
 pub const DASH: &str = "\u{2013}";
 
 /// Two-sided 95 % point of the normal distribution.
@@ -18,8 +18,8 @@ const LAST_DIGITS: f64 = 16.0 * f64::EPSILON;
 /// Digits of a number that is known to its last ones.
 const ALL_DIGITS: i32 = 15;
 
-/// Value and standard error as text, both with the decimals that two significant digits of the
-/// error need; the value with all its digits where its error is in the last ones. A dash for what is not finite.
+/// Value and standard error as text, both with the decimals that two significant digits of the error need; the value
+/// with all its digits where its error is in the last ones. A dash for non-finite values.
 pub fn with_uncertainty(value: f64, standard_error: Option<f64>) -> (String, String) {
     if !value.is_finite() {
         return (DASH.to_owned(), DASH.to_owned());
@@ -49,12 +49,12 @@ pub fn interval(value: f64, standard_error: Option<f64>, factor: f64) -> String 
     }
 }
 
-/// A number without standard error: five significant digits. A dash for what is not finite.
+/// A number without standard error: five significant digits. A dash for non-finite values.
 pub fn plain(value: f64) -> String {
     significant(value, DIGITS_ALONE)
 }
 
-/// A number with `digits` significant digits; a dash for what is not finite.
+/// A number with `digits` significant digits; a dash for non-finite values.
 pub fn significant(value: f64, digits: i32) -> String {
     if !value.is_finite() {
         return DASH.to_owned();
@@ -70,7 +70,7 @@ pub fn significant(value: f64, digits: i32) -> String {
     }
 }
 
-/// A number with a fixed number of decimals; a dash for what is not finite.
+/// A number with a fixed number of decimals; a dash for non-finite values.
 pub fn fixed(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
         return DASH.to_owned();

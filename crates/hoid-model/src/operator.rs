@@ -3,7 +3,7 @@
 //! `H(s) = K_e (T_L s + 1) e^{-s tau_e} omega_nm^2 / (s^2 + 2 zeta_nm omega_nm s + omega_nm^2)`
 //! (eq. 2)
 //!
-//! Behind a zero-order hold this is exactly `(b0 + b1 q^-1) q^-nk / (1 + f1 q^-1 + f2 q^-2)` with
+//! After a zero-order hold this is exactly `(b0 + b1 q^-1) q^-nk / (1 + f1 q^-1 + f2 q^-2)` with
 //! `nk = tau_e/Ts + 1` (eq. 11), by the formulas of [`hoid_core::held_operator`].
 
 use hoid_core::held_operator::held_operator;
@@ -52,8 +52,8 @@ impl OperatorParameters {
     /// which is zero when it is not named.
     ///
     /// # Errors
-    /// [`ModelError::Operator`] for a name that is not there, is lacking, or stands beside one that
-    /// says the same.
+    /// [`ModelError::Operator`] for a name that does not exist, is lacking, or is next to one that
+    /// states the same.
     pub fn of_names(pairs: &[(String, f64)]) -> Result<Self, ModelError> {
         const NAMES: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
         let wrong = |reason: String| ModelError::Operator { reason };
@@ -114,7 +114,7 @@ impl OperatorParameters {
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] when omega_nm is not positive, a parameter is not finite, or the
-    /// delay is no whole number of samples.
+    /// delay is not a whole number of samples.
     pub fn discretise(&self, sample_time: SampleTime) -> Result<DiscreteOperator, ModelError> {
         let checks = [
             ("error gain K_e", self.k_e, true),
@@ -160,7 +160,7 @@ impl DiscreteOperator {
         if self.nk == 0 {
             return Err(NotConvertible::NoDelay);
         }
-        let c = self.held.unhold(self.sample_time)?;
+        let c = self.held.inverse_zoh(self.sample_time)?;
         // K_e and omega_nm hang on 1 + f1 + f2, a difference of numbers of size 1: below this
         // nothing of it is left.
         let at_one = (1.0 + self.held.f1 + self.held.f2).abs();
@@ -359,7 +359,7 @@ mod tests {
             NotConvertible::ZeroGain
         ));
         assert!(matches!(reason([1.0, 0.0], [-1.9, 0.92], 0), NotConvertible::NoDelay));
-        // An unstable complex pair converts; the result says that it is not stable.
+        // An unstable complex pair converts; the result reports that it is not stable.
         let unstable = model([0.044, -0.043], [-1.95, 1.01], 29).parameters().unwrap();
         assert!(!unstable.is_stable());
     }

@@ -1,9 +1,9 @@
 //! Polynomials and their roots.
 //!
 //! Coefficients are stored in one order, `p[0] + p[1] x + ... + p[n] x^n` with `x = q^-1` for
-//! discrete time; transfer functions in s store descending powers and say so. Roots come from the
-//! eigenvalues of the balanced companion matrix (Edelman and Murakami, 1995) and one Newton step
-//! each.
+//! discrete time; transfer functions in s store descending powers and report it. Roots come from
+//! the eigenvalues of the balanced companion matrix (Edelman and Murakami, 1995) and one Newton
+//! step each.
 
 use hoid_core::stability::roots_inside;
 use nalgebra::DMatrix;
@@ -29,7 +29,7 @@ pub fn value(p: &[f64], x: Complex64) -> Complex64 {
 }
 
 /// Monic polynomial `z^n + p[1] z^{n-1} + ... + p[n]` with these roots, `p[0] = 1`. Complex roots
-/// must come in conjugate pairs; what is left of the imaginary parts by rounding is dropped.
+/// must come in conjugate pairs; the remainder of the imaginary parts by rounding is dropped.
 pub fn from_roots(roots: &[Complex64]) -> Vec<f64> {
     let mut p = vec![Complex64::new(1.0, 0.0)];
     for root in roots {
@@ -126,8 +126,7 @@ fn newton_step(p: &[f64], z: Complex64) -> Complex64 {
 }
 
 /// Monic `[p_1, ..., p_n]` with each root outside the unit circle replaced by the inverse of its
-/// conjugate, which leaves the shape of the spectrum as it is. `None` where the roots cannot be
-/// found.
+/// conjugate, which leaves the shape of the spectrum as it is. `None` if the roots cannot be found.
 pub fn reflected_inside(coefficients: &[f64]) -> Option<Vec<f64>> {
     if roots_inside(coefficients, 1.0) {
         return Some(coefficients.to_vec());

@@ -29,7 +29,7 @@ impl Channel {
     }
 }
 
-/// What to take out of input and output before a fit.
+/// Trend to remove from input and output before a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Detrend {
     /// Nothing: the data as they are.
@@ -244,7 +244,7 @@ impl Record {
         };
         if (first - second).abs() > 1e-6 * first {
             return Err(refuse(
-                format!("a sample time of {second} s behind {first} s"),
+                format!("a sample time of {second} s after {first} s"),
                 "the same: read both at one rate",
             ));
         }

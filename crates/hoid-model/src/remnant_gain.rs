@@ -1,4 +1,4 @@
-//! The remnant gain K_n that gives a demanded noise level P_n (appendix A of the reference text).
+//! The remnant gain K_n that gives a demanded noise level P_n (appendix A of the thesis).
 //!
 //! With `S = 1/(1 + H_HO H_CE)`, unit white noise drawn once a sample (its power spreads evenly
 //! over 0 to pi/Ts), and
@@ -28,7 +28,7 @@ use crate::{
     ContinuousTransferFunction, ModelError, SampleTime, margins::closed_loop_is_stable, remnant::RemnantFilter,
 };
 
-/// What the noise level P_n compares.
+/// Reference of the noise level P_n.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum NoiseDefinition {
     /// `var(u_n)/var(u)`: the part of the operator's output that is due to the remnant, fed back

@@ -25,7 +25,7 @@ impl SampleTime {
     /// 0.01 s, the sample time of the reference task.
     pub const HUNDREDTH: Self = Self(0.01);
 
-    /// 1/60 s, that of a usual screen and of recorded experiments.
+    /// 1/60 s, that of a typical screen and of recorded experiments.
     pub const SIXTIETH: Self = Self(1.0 / 60.0);
 
     /// A sample time in s.

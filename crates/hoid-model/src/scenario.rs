@@ -1,7 +1,7 @@
 //! Scenarios: who controls what, with which noise, and how it changes.
 //!
-//! The reference text's two states of adaptation (Table 2) and its six conditions (Table 4.4) are
-//! here as data:
+//! The thesis's two states of adaptation (Table 2) and its six conditions (Table 4.4) are here as
+//! data:
 //!
 //! | condition | operator and controlled element | rate of change G |
 //! |---|---|---|
@@ -29,7 +29,7 @@ use crate::{
 /// asks for all the memory.
 const MOST_SAMPLES: usize = 100_000_000;
 
-/// A state of adaptation: the operator and what they control.
+/// A state of adaptation: the operator and the controlled element.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OperatingState {
     /// The operator.
@@ -73,7 +73,7 @@ impl OperatingState {
     }
 }
 
-/// The conditions of the reference text.
+/// The conditions of the thesis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[allow(missing_docs)]
 pub enum Condition {
@@ -101,7 +101,7 @@ pub enum RemnantStrength {
     Level {
         /// Noise level P_n.
         level: f64,
-        /// What P_n is a ratio of.
+        /// Reference of P_n.
         definition: NoiseDefinition,
     },
     /// The gain K_n itself, before and after the change.
@@ -157,14 +157,14 @@ impl Default for RemnantSetting {
     }
 }
 
-/// Where K_c stands in the state-space form of the controlled element.
+/// Where K_c is in the state-space form of the controlled element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Realisation {
     /// In the input matrix: the output x is continuous when K_c jumps.
     #[default]
     Input,
-    /// In the output matrix, as the controllable canonical form of the reference text has it: x
-    /// jumps when K_c jumps.
+    /// In the output matrix, as the controllable canonical form of the thesis has it: x jumps when
+    /// K_c jumps.
     Output,
 }
 
@@ -219,7 +219,7 @@ pub struct ResolvedScenario {
 }
 
 impl Scenario {
-    /// A condition of the reference text with the default remnant.
+    /// A condition of the thesis with the default remnant.
     pub fn condition(condition: Condition) -> Self {
         let (s1, s2) = (OperatingState::s1(), OperatingState::s2());
         let (initial, last, rate) = match condition {

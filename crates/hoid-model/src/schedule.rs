@@ -31,8 +31,8 @@ pub enum Schedule {
     },
 }
 
-/// Transitions are as good as over after so many of their time constants 1/G: e^-40 is below half a
-/// last digit.
+/// Transitions are as good as over after a given number of their time constants 1/G: e^-40 is below
+/// half a last digit.
 const OVER: f64 = 40.0;
 /// Least interval between two changes, in time constants 1/G.
 const SHORTEST: f64 = 1.0;

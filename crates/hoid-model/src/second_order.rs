@@ -18,7 +18,7 @@
 //! replaces the matrix exponential and logarithm of the extended matrix (eq. B.7); it gives the
 //! same numbers. The inverse exists when no pole in z lies on the closed negative real axis (then
 //! the logarithm is the principal one). Source: N. J. Higham, *Functions of Matrices*, 2008,
-//! sections 2.4 and B.16 (divided differences); eq. B.3-B.10 of the reference text.
+//! sections 2.4 and B.16 (divided differences); eq. B.3-B.10 of the thesis.
 
 use hoid_core::divided_differences::DividedDifferences;
 
@@ -37,7 +37,7 @@ pub struct SecondOrder {
     pub a2: f64,
 }
 
-/// `(b0 + b1 q^-1) q^-1 / (1 + f1 q^-1 + f2 q^-2)`: a second-order system behind a zero-order hold.
+/// `(b0 + b1 q^-1) q^-1 / (1 + f1 q^-1 + f2 q^-2)`: a second-order system after a zero-order hold.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeldSecondOrder {
     /// First coefficient of B.
@@ -56,7 +56,7 @@ impl SecondOrder {
     /// # Errors
     /// [`ModelError::OutOfRange`] when the result is not finite (an unstable pole so fast that its
     /// exponential overflows, or a coefficient that is not a finite number).
-    pub fn hold(self, sample_time: SampleTime) -> Result<HeldSecondOrder, ModelError> {
+    pub fn zoh(self, sample_time: SampleTime) -> Result<HeldSecondOrder, ModelError> {
         let ts = sample_time.s();
         let poles = DividedDifferences::at(-self.a1 * ts, self.a2 * ts * ts);
         let b0 = self.b0 * ts * poles.phi1 + self.b1 * ts * ts * poles.phi2;
@@ -89,7 +89,7 @@ impl HeldSecondOrder {
     ///
     /// # Errors
     /// [`NotConvertible::NegativeRealPole`], [`NotConvertible::NotFinite`].
-    pub fn unhold(self, sample_time: SampleTime) -> Result<SecondOrder, NotConvertible> {
+    pub fn inverse_zoh(self, sample_time: SampleTime) -> Result<SecondOrder, NotConvertible> {
         for (name, value) in [("f1", self.f1), ("f2", self.f2), ("b0", self.b0), ("b1", self.b1)] {
             if !value.is_finite() {
                 return Err(NotConvertible::NotFinite {
@@ -147,7 +147,7 @@ impl HeldStates {
     }
 }
 
-/// Direct feedthrough beside the strictly proper part: `d + (b0 s + b1)/(s^2 + a1 s + a2)`,
+/// Direct feedthrough next to the strictly proper part: `d + (b0 s + b1)/(s^2 + a1 s + a2)`,
 /// numerator and denominator by descending powers.
 ///
 /// The held system has the numerator `d + (d f1 + b0_d) q^-1 + (d f2 + b1_d) q^-2`.
@@ -174,14 +174,14 @@ pub fn hold_biproper(
         a1,
         a2,
     };
-    let held = proper.hold(sample_time)?;
+    let held = proper.zoh(sample_time)?;
     Ok(([d, d * held.f1 + held.b0, d * held.f2 + held.b1], [held.f1, held.f2]))
 }
 
 /// The inverse of [`hold_biproper`]: numerator and monic denominator by descending powers of s.
 ///
 /// # Errors
-/// As [`HeldSecondOrder::unhold`].
+/// As [`HeldSecondOrder::inverse_zoh`].
 pub fn unhold_biproper(
     num: [f64; 3],
     f: [f64; 2],
@@ -194,7 +194,7 @@ pub fn unhold_biproper(
         f1: f[0],
         f2: f[1],
     };
-    let proper = held.unhold(sample_time)?;
+    let proper = held.inverse_zoh(sample_time)?;
     Ok((
         [d, proper.b0 + d * proper.a1, proper.b1 + d * proper.a2],
         [1.0, proper.a1, proper.a2],
@@ -307,7 +307,7 @@ mod tests {
     #[test]
     fn agrees_with_the_matrix_exponential_for_all_pole_cases() {
         for case in cases() {
-            let exact = case.hold(ts()).unwrap();
+            let exact = case.zoh(ts()).unwrap();
             let matrix = by_matrix_exponential(case, 0.01);
             // The matrix way loses digits in b1 and f2 by cancellation: 1e-13 of the largest
             // coefficient.
@@ -328,7 +328,7 @@ mod tests {
     #[test]
     fn unhold_inverts_hold_for_all_pole_cases() {
         for case in cases() {
-            let back = case.hold(ts()).unwrap().unhold(ts()).unwrap();
+            let back = case.zoh(ts()).unwrap().inverse_zoh(ts()).unwrap();
             // A held system knows its poles to eps/(Ts |p1 - p2|) and, at a double pole, to
             // sqrt(eps)/Ts; the coefficients a1, a2, which are symmetric, keep more. Fast poles
             // leave e^{p Ts} small and keep fewer digits.
@@ -349,7 +349,7 @@ mod tests {
         for case in cases() {
             let general = ContinuousTransferFunction::new(&[case.b0, case.b1], &[1.0, case.a1, case.a2]).unwrap();
             let general = discretise(&general, ts(), Method::ZeroOrderHold).unwrap();
-            let exact = case.hold(ts()).unwrap();
+            let exact = case.zoh(ts()).unwrap();
             let size = exact.b0.abs() + exact.b1.abs();
             for (a, b) in [(exact.b0, general.num()[1]), (exact.b1, general.num()[2])] {
                 assert!((a - b).abs() < 1e-12 * size, "{case:?}: {a} and {b}");
@@ -382,9 +382,9 @@ mod tests {
     #[test]
     fn a_pole_at_the_origin_stays_there() {
         let integrator = with_poles(Complex64::new(0.0, 0.0), Complex64::new(-6.0, 0.0));
-        let held = integrator.hold(ts()).unwrap();
+        let held = integrator.zoh(ts()).unwrap();
         assert!((1.0 + held.f1 + held.f2).abs() < 1e-15);
-        assert!(held.unhold(ts()).unwrap().a2.abs() < 1e-9);
+        assert!(held.inverse_zoh(ts()).unwrap().a2.abs() < 1e-9);
     }
 
     #[test]
@@ -396,18 +396,18 @@ mod tests {
             f2,
         };
         assert!(matches!(
-            held(-0.4, -0.05).unhold(ts()),
+            held(-0.4, -0.05).inverse_zoh(ts()),
             Err(NotConvertible::NegativeRealPole { pole }) if (pole + 0.1).abs() < 1e-12
         ));
-        assert!(held(0.9, 0.2).unhold(ts()).is_err());
-        assert!(held(-0.5, 0.0).unhold(ts()).is_err());
-        assert!(held(0.0, 0.0).unhold(ts()).is_err());
+        assert!(held(0.9, 0.2).inverse_zoh(ts()).is_err());
+        assert!(held(-0.5, 0.0).inverse_zoh(ts()).is_err());
+        assert!(held(0.0, 0.0).inverse_zoh(ts()).is_err());
         assert!(matches!(
-            held(f64::NAN, 0.2).unhold(ts()),
+            held(f64::NAN, 0.2).inverse_zoh(ts()),
             Err(NotConvertible::NotFinite { .. })
         ));
         // A complex pair always converts, also with f1 > 0.
-        assert!(held(0.5, 0.9).unhold(ts()).is_ok());
+        assert!(held(0.5, 0.9).inverse_zoh(ts()).is_ok());
     }
 
     #[test]
@@ -424,6 +424,6 @@ mod tests {
     #[test]
     fn overflow_is_an_error() {
         let absurd = with_poles(Complex64::new(1e6, 0.0), Complex64::new(1e6, 0.0));
-        assert!(absurd.hold(ts()).is_err());
+        assert!(absurd.zoh(ts()).is_err());
     }
 }

@@ -1,8 +1,8 @@
 //! Model structures and their orders (Table 5.1).
 //!
 //! The general family is `A(q^-1) u(t) = B(q^-1)/F(q^-1) e(t-nk) + C(q^-1)/D(q^-1) eps(t)` (eq. 5.1
-//! times A). A structure says which polynomials are there. Orders follow the field's software: nb
-//! counts the coefficients `b0 ... b_{nb-1}` of B, the others count the coefficients behind the
+//! times A). A structure shows which polynomials are there. Orders follow the field's software: nb
+//! counts the coefficients `b0 ... b_{nb-1}` of B, the others count the coefficients after the
 //! leading one, nk is the delay of b0 in samples.
 //!
 //! This is the one list of structures: the command line, plans and Python take their names from it.
@@ -83,7 +83,7 @@ impl Structure {
 
     /// The orders with which the structure comes nearest to the human operator (two poles, b0 and
     /// b1) with a remnant of first order: `ARX(na=2, nb=2)`, `BJ(nb=2, nc=0, nd=1, nf=2)`. A
-    /// structure without poles or input takes orders that are usual for it.
+    /// structure without poles or input takes orders that are typical for it.
     pub fn operator_orders(self, nk: usize) -> Orders {
         let base = Orders {
             nb: 2,
@@ -120,7 +120,7 @@ impl Structure {
         }
     }
 
-    /// The name as it stands in tables and figures: `ARX`, `BJ`.
+    /// The name as it is in tables and figures: `ARX`, `BJ`.
     pub fn label(self) -> String {
         match self {
             Self::General => self.name().to_owned(),
@@ -129,7 +129,7 @@ impl Structure {
     }
 }
 
-// In the order of Table 5.1, and the general form behind them.
+// In the order of Table 5.1, and the general form after them.
 crate::named_choice!(Structure, "structure", 11, {
     Fir => "fir",
     Ar => "ar",
@@ -202,7 +202,7 @@ impl Orders {
     /// Checks the orders against the structure.
     ///
     /// # Errors
-    /// [`ModelError::Orders`] with what is wrong.
+    /// [`ModelError::Orders`] with the problem.
     pub fn check(&self, structure: Structure) -> Result<(), ModelError> {
         let refuse = |expected: String| {
             Err(ModelError::Orders {
@@ -271,7 +271,7 @@ impl fmt::Display for Orders {
 /// Theta in the order of these names: every coefficient once.
 ///
 /// # Errors
-/// What is wrong, as the end of a sentence that begins with the name of the option.
+/// The problem, as the end of a sentence that starts with the name of the option.
 pub fn theta_of(names: &[String], start: &BTreeMap<String, f64>) -> Result<Vec<f64>, String> {
     if let Some(unknown) = start.keys().find(|name| !names.contains(name)) {
         return Err(format!(

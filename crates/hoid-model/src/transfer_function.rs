@@ -46,7 +46,7 @@ impl ContinuousTransferFunction {
         })
     }
 
-    /// The same dynamics behind a pure delay.
+    /// The same dynamics after a pure delay.
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] when the delay is negative or not finite.

@@ -2,16 +2,16 @@
 //! E. Benoit, *Bulletin géodésique* 2 (1924) 67-77; G. H. Golub and C. F. Van Loan, *Matrix
 //! Computations*, 2013, section 4.2).
 //!
-//! Matrices are N by N, of which the first n rows and columns count. [`solve`] takes each known part
-//! away as it comes. [`forward`] and [`backward`] add up what is known and take it away at once: both
-//! together are [`solve`] but for rounding.
+//! Matrices are N by N, of which the first n rows and columns count. [`solve`] takes each known part away as it comes.
+//! [`forward`] and [`backward`] add up what is known and take it away at once: both together are [`solve`] except for
+//! rounding.
 
-/// L in the place of the lower triangle of A; false where A is not positive definite.
+/// L in the place of the lower triangle of A; false if A is not positive definite.
 pub fn factor<const N: usize>(a: &mut [[f64; N]; N], n: usize) -> bool {
     factor_above(a, n, 0.0)
 }
 
-/// L in the place of the lower triangle of A; false where the square of a number on its diagonal is
+/// L in the place of the lower triangle of A; false if the square of a number on its diagonal is
 /// not above the least.
 pub fn factor_above<const N: usize>(a: &mut [[f64; N]; N], n: usize, least: f64) -> bool {
     for i in 0..n {

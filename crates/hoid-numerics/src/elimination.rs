@@ -12,8 +12,8 @@
 /// Columns that are made at a time.
 const WIDE: usize = 4;
 
-/// The solution in the place of b, of the first n of N unknowns; false where A is not positive definite.
-/// Only the upper triangle of A is read; what is left in it is no result. N is a multiple of four.
+/// The solution in the place of b, of the first n of N unknowns; false if A is not positive definite. Only the upper
+/// triangle of A is read; what is left in it is not a result. N is a multiple of four.
 #[inline(always)]
 pub fn solve<const N: usize>(a: &mut [[f64; N]; N], n: usize, b: &mut [f64; N]) -> bool {
     const { assert!(N.is_multiple_of(WIDE)) };

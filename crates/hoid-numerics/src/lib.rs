@@ -1,6 +1,6 @@
 //! Small numerics that the crates of hoid share, each written once.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`statistics`] | mean, variance, root mean square; quantiles by three definitions |
 //! | [`products`] | the product of two vectors |
@@ -9,7 +9,7 @@
 //!
 //! The order of operations of each function is part of what it promises: sums run from the first to
 //! the last, nothing is contracted, and roots are those of `libm`, so that results are the same to
-//! the last bit on every machine. Two functions that differ in nothing but rounding say so.
+//! the last bit on every machine. Two functions that differ in nothing but rounding report it.
 //!
 //! `no_std`, without allocation; the feature `alloc` adds the statistics that put values in order
 //! first. Matrices whose size is known at run time only are those of nalgebra, and sums over records

@@ -9,9 +9,9 @@
 //! | [`nearest_quantile`] | `x_k`, k the whole number nearest to `(n-1) p` | type 7 without interpolation |
 //! | [`upper_quantile`] | `x_k`, k the largest whole number not above `n p` | right-continuous inverse of the distribution of the values, type 1 but where `n p` is whole |
 //!
-//! The first is what tables and figures say. The others give one of the values and need no order of
-//! all of them: scales of many samples, and thresholds whose results depend on that definition. Their
-//! medians are the same, the upper one of the two in the middle.
+//! The first is what tables and figures report. The others give one of the values and need no order of all of them:
+//! scales of many samples, and thresholds whose results depend on that definition. Their medians are the same, the
+//! upper one of the two in the middle.
 //!
 //! Order is that of [`f64::total_cmp`].
 
@@ -102,7 +102,7 @@ pub fn finite_sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     finite
 }
 
-/// The value below which this share of the finite values lies, by linear interpolation; `None` where
+/// The value below which this share of the finite values lies, by linear interpolation; `None` if
 /// none is finite.
 #[cfg(feature = "alloc")]
 pub fn quantile_of(values: &[f64], share: f64) -> Option<f64> {

@@ -27,7 +27,7 @@ fn vector(values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     Ok(array.as_slice()?.to_vec())
 }
 
-/// Channels of a record that a call needs besides input and output.
+/// Channels of a record that a call needs other than input and output.
 #[derive(Debug, Clone, Copy)]
 pub enum Wanted<'a> {
     All,

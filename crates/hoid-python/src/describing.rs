@@ -15,7 +15,7 @@ use crate::{
     controlled_element::ControlledElement,
     errors::{Outcome, bad_option},
     faults::{UsedRecord, faults_of, used_records},
-    figures::{self, Pair, VerdictParts, error_or_nan, pair, verdict},
+    figures::{self, ValueWithError, VerdictParts, error_or_nan, pair, verdict},
     files, names,
 };
 
@@ -80,8 +80,8 @@ impl PyDescription {
         self.0.to_json()
     }
 
-    /// The records as they were described: which of those given each is a part of, the record, and what was
-    /// done to it.
+    /// The records as they were described: which of those given each is a part of, the record, and the processing of
+    /// it.
     fn records<'py>(&self, py: Python<'py>) -> PyResult<Vec<UsedRecord<'py>>> {
         used_records(py, &self.0.data)
     }
@@ -119,9 +119,9 @@ impl PyDescription {
         Ok(Some(all))
     }
 
-    /// Share of the power of u off the lines, and with the part at the lines.
+    /// Share of the power of u at non-excited frequencies, and with the part at the lines.
     #[getter]
-    fn remnant(&self) -> (Pair, Pair) {
+    fn remnant(&self) -> (ValueWithError, ValueWithError) {
         let function = &self.0.found.function;
         (pair(function.off_line_share), pair(function.noise_ratio))
     }

@@ -28,7 +28,7 @@ import_exception!(pyhoid.errors, FileMissingError);
 import_exception!(pyhoid.errors, FormatError);
 import_exception!(pyhoid.errors, StudyStateError);
 
-/// What a call gives, or why it fails.
+/// Result of a call, or why it fails.
 pub type Outcome<T> = Result<T, Failure>;
 
 /// An exception to raise; `?` converts every error of the libraries into one.
@@ -125,7 +125,7 @@ impl From<AnalysisError> for Failure {
     }
 }
 
-/// How an estimator is asked for.
+/// How an estimator is requested.
 fn estimator(name: &str) -> String {
     match name {
         OPERATOR => format!("structure=\"{OPERATOR}\""),

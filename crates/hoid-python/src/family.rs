@@ -13,7 +13,7 @@ use crate::{
     controlled_element::ControlledElement,
     errors::Outcome,
     faults::{UsedRecord, faults_of, used_records},
-    figures::{self, Pair, VerdictParts, pair, response_columns, verdict},
+    figures::{self, ValueWithError, VerdictParts, pair, response_columns, verdict},
     fit::PyFit,
 };
 
@@ -65,7 +65,8 @@ fn loop_intervals<'py>(py: Python<'py>, measures: Option<LoopMeasures>) -> PyRes
 /// Every crossing, the smallest phase margin, the gain margin, and whether the closed loop is stable.
 fn shape_parts<'py>(py: Python<'py>, shape: &LoopShape) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
-    let crossovers: Vec<(Pair, Pair)> = shape.crossovers.iter().map(|(w, m)| (pair(*w), pair(*m))).collect();
+    let crossovers: Vec<(ValueWithError, ValueWithError)> =
+        shape.crossovers.iter().map(|(w, m)| (pair(*w), pair(*m))).collect();
     all.set_item("crossovers", crossovers)?;
     all.set_item(
         "smallest_phase_margin_deg",
@@ -114,7 +115,7 @@ impl PyOperatorFit {
         self.0.fit.title()
     }
 
-    /// Those of the common operator, or of the operator of each record.
+    /// The entries of the common operator, or of the operator of each record.
     #[getter]
     fn parameters(&self) -> Vec<Vec<ParameterParts>> {
         let of = |parameters: &Vec<Parameter>| parameters.iter().map(parameter).collect();
@@ -210,7 +211,7 @@ impl PyOperatorFit {
         };
         let (all, mut rows) = (PyDict::new(py), Vec::new());
         for found in &agreement.rows {
-            let with_error = |(value, error): (f64, f64)| -> Pair { (value, Some(error)) };
+            let with_error = |(value, error): (f64, f64)| -> ValueWithError { (value, Some(error)) };
             let row = PyDict::new(py);
             row.set_item("coordinate", found.coordinate.name())?;
             for method in [
@@ -238,8 +239,8 @@ impl PyOperatorFit {
         Ok(Some(all))
     }
 
-    /// Magnitude in dB and phase in deg at these frequencies, each with its standard error (NaN where there is
-    /// none), of the operator of a record.
+    /// Magnitude in dB and phase in deg at these frequencies, each with its standard error (NaN if there is none), of
+    /// the operator of a record.
     fn frequency_response<'py>(
         &self,
         py: Python<'py>,
@@ -343,14 +344,13 @@ impl PyOperatorFit {
         figures::termination(py, self.0.fit.termination)
     }
 
-    /// Channel of the excitation; none where there was none.
+    /// Channel of the excitation; none if there was none.
     #[getter]
     fn excitation(&self) -> Option<&str> {
         self.0.excitation.as_deref()
     }
 
-    /// The records as they were fitted: which of those given each is a part of, the record, and what was done
-    /// to it.
+    /// The records as they were fitted: which of those given each is a part of, the record, and the processing of it.
     fn records<'py>(&self, py: Python<'py>) -> PyResult<Vec<UsedRecord<'py>>> {
         used_records(py, &self.0.data)
     }
@@ -361,7 +361,7 @@ impl PyOperatorFit {
         faults_of(py, &self.0.data)
     }
 
-    /// Writes the page about the operator into a directory; what comes out of a pickle has its records beside it.
+    /// Writes the page about the operator into a directory; what results of a pickle has its records next to it.
     #[pyo3(signature = (records, directory, *, title))]
     fn report(
         &self,

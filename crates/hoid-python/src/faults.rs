@@ -1,4 +1,4 @@
-//! What was found in the records of a fit, and what was done to them.
+//! Findings in the records of a fit, and the processing of them.
 
 use hoid_analysis::{FoundFault, Recordings};
 use hoid_io::Step;
@@ -9,7 +9,7 @@ use crate::arrays::parts;
 /// Which of the given records it belongs to, and its parts.
 type Of<'py> = (usize, Bound<'py, PyDict>);
 
-/// What was found in recordings: which of those given, and what.
+/// Findings in recordings: which of those given, and what.
 pub fn faults_of<'py>(py: Python<'py>, data: &Recordings) -> PyResult<Vec<Of<'py>>> {
     let all = data.origins.iter().zip(&data.accounts);
     all.flat_map(|(origin, account)| account.found().into_iter().map(|found| (*origin, found)))
@@ -31,7 +31,7 @@ fn parts_of(py: Python<'_>, found: FoundFault) -> PyResult<Bound<'_, PyDict>> {
     Ok(one)
 }
 
-/// Which of the given records a record is of, its parts, and what was done to it.
+/// Which of the given records a record is of, its parts, and the processing of it.
 pub type UsedRecord<'py> = (usize, Bound<'py, PyDict>, Vec<String>);
 
 /// The records as they were fitted.

@@ -27,13 +27,13 @@ pub fn track_fault<'py>(py: Python<'py>, fault: &hoid_track::TrackFault) -> PyRe
 }
 
 /// Value and standard error.
-pub type Pair = (f64, Option<f64>);
+pub type ValueWithError = (f64, Option<f64>);
 
-pub fn pair(e: Estimate) -> Pair {
+pub fn pair(e: Estimate) -> ValueWithError {
     (e.value, e.standard_error)
 }
 
-/// The standard error for an array: NaN where there is none.
+/// The standard error for an array: NaN if there is none.
 pub fn error_or_nan(e: Estimate) -> f64 {
     e.standard_error.unwrap_or(f64::NAN)
 }
@@ -63,7 +63,7 @@ pub fn orders<'py>(py: Python<'py>, o: &Orders) -> PyResult<Bound<'py, PyDict>> 
     Ok(all)
 }
 
-/// The operator, or the reason why there is none; None where the orders cannot represent one.
+/// The operator, or the reason why there is none; None if the orders cannot represent one.
 pub fn operator<'py>(
     py: Python<'py>,
     found: &Result<OperatorEstimate, NotConvertible>,
@@ -150,7 +150,7 @@ pub fn ljung_box<'py>(py: Python<'py>, test: Option<&LjungBox>) -> PyResult<Opti
     Ok(Some(all))
 }
 
-/// Magnitude in dB and phase in deg of points, each with its standard error (NaN where there is none).
+/// Magnitude in dB and phase in deg of points, each with its standard error (NaN if there is none).
 pub fn response_columns<'py>(py: Python<'py>, points: &[ResponsePoint]) -> [Bound<'py, PyArray1<f64>>; 4] {
     let column = |of: &dyn Fn(&ResponsePoint) -> f64| array(py, points.iter().map(of).collect());
     [

@@ -14,10 +14,11 @@ use crate::{
     names,
 };
 
-/// The parts of a record, what was done to the numbers of the file, and notes on reading it.
-type Read<'py> = (Bound<'py, PyDict>, Vec<String>, Vec<String>);
+/// The parts of a record, the processing applied to the numbers of the file, and notes on reading
+/// it.
+type ReadParts<'py> = (Bound<'py, PyDict>, Vec<String>, Vec<String>);
 
-/// The record of a file, or the records between what is masked.
+/// The record of a file, or the records between the masked parts.
 #[pyfunction]
 #[pyo3(signature = (path, *, input, output, time, trial, all_trials, sampling_frequency, start, stop, resample, fill, detrend, drop_repeated, unit, scale, offset, decimate,
     new_sampling_frequency, run_in, mask, shortest))]
@@ -45,7 +46,7 @@ pub fn read<'py>(
     run_in: f64,
     mask: Vec<String>,
     shortest: f64,
-) -> Outcome<Vec<Read<'py>>> {
+) -> Outcome<Vec<ReadParts<'py>>> {
     let options = ReadOptions {
         input: match input {
             Some(column) => Some(column.parse()?),
@@ -156,7 +157,7 @@ pub fn detrended<'py>(py: Python<'py>, record: &Bound<'py, PyAny>, how: &str) ->
     Ok(parts(py, record.detrended(how))?)
 }
 
-/// The record at a lower rate, and what was done; None where nothing was.
+/// The record at a lower rate, and the actions taken; None if nothing was.
 #[pyfunction]
 #[pyo3(signature = (record, decimate))]
 pub fn decimated<'py>(

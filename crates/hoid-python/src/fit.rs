@@ -17,7 +17,7 @@ use crate::{
     controlled_element::ControlledElement,
     errors::{DataError, Outcome},
     faults::{UsedRecord, faults_of, used_records},
-    figures::{self, Pair, VerdictParts, pair},
+    figures::{self, ValueWithError, VerdictParts, pair},
     names,
 };
 
@@ -115,7 +115,7 @@ impl PyFit {
     fn margins_with(&self, element: &ControlledElement) -> Outcome<MarginEstimates> {
         let element = element.transfer_function()?;
         let (low, high) = MANUAL_CONTROL_RANGE_RAD_S;
-        // The sampled model says nothing above half the sampling frequency.
+        // The sampled model carries no information above half the sampling frequency.
         let high = high.min(self.fit.model().sample_time().nyquist_rad_s());
         Ok(self.fit.margins(|omega| element.response(omega), (low, high)))
     }
@@ -159,7 +159,7 @@ impl PyFit {
         }
     }
 
-    /// Of a part of another result its model alone, from which it comes back; none of a result by itself.
+    /// For a part of another result its model alone, from which it comes back; none of a result by itself.
     fn state(&self) -> Option<String> {
         if self.whole.is_some() {
             return None;
@@ -196,7 +196,7 @@ impl PyFit {
     }
 
     #[getter]
-    fn parameters(&self) -> Vec<(String, Pair)> {
+    fn parameters(&self) -> Vec<(String, ValueWithError)> {
         self.fit
             .parameters()
             .into_iter()
@@ -219,7 +219,7 @@ impl PyFit {
 
     /// A, B, C, D and F by ascending powers of q^-1.
     ///
-    /// A, C, D and F begin with 1, B with the zeros of its delay.
+    /// A, C, D and F start with 1, B with the zeros of its delay.
     #[getter]
     fn polynomials<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let model = self.fit.model();
@@ -279,17 +279,16 @@ impl PyFit {
             .collect()
     }
 
-    /// The level of u in each record of the fit as it was read; empty where none was estimated.
+    /// The level of u in each record of the fit as it was read; empty if none was estimated.
     #[getter]
-    fn levels(&self) -> Vec<Option<Pair>> {
+    fn levels(&self) -> Vec<Option<ValueWithError>> {
         let without = |whole: &&Whole| each!(whole, found => found.is_without_means());
         let data = self.whole.as_ref().filter(without).and_then(|_| self.data());
         let accounts = data.into_iter().flat_map(|data| &data.accounts);
         accounts.map(|account| account.level.map(pair)).collect()
     }
 
-    /// The records as they were fitted: which of those given each is a part of, the record, and what was done
-    /// to it.
+    /// The records as they were fitted: which of those given each is a part of, the record, and the processing of it.
     fn records<'py>(&self, py: Python<'py>) -> PyResult<Vec<UsedRecord<'py>>> {
         let data = self.data().map(|data| used_records(py, data));
         data.unwrap_or_else(|| Ok(Vec::new()))
@@ -317,7 +316,7 @@ impl PyFit {
         Ok(figures::quality(py, &quality)?)
     }
 
-    /// What it is worth; of a part of another result, by these records alone.
+    /// The verdict on it; of a part of another result, by these records alone.
     fn verdict(&self, py: Python<'_>, records: Vec<Bound<'_, PyAny>>) -> Outcome<VerdictParts> {
         if let Some(whole) = &self.whole {
             return Ok(each!(whole, found => figures::verdict(&found.verdict)));
@@ -364,8 +363,8 @@ impl PyFit {
         Ok(all)
     }
 
-    /// Magnitude in dB and phase in deg at these frequencies, each with its standard error (NaN
-    /// where there is none).
+    /// Magnitude in dB and phase in deg at these frequencies, each with its standard error (NaN if
+    /// there is none).
     fn frequency_response<'py>(
         &self,
         py: Python<'py>,

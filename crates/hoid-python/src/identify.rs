@@ -3,8 +3,8 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use hoid_analysis::{
-    AnalysisError, Asked, BatchEstimator, Identification, Identified, Recordings, Request,
-    json::{Answer, state},
+    AnalysisError, BatchEstimator, Identification, Identified, Recordings, Request, ResolvedRequest,
+    json::{BatchResult, state},
     registry::estimators,
 };
 use hoid_ident::settings::{Kind, MethodSpec, Setting};
@@ -17,7 +17,7 @@ use crate::{
     family::PyOperatorFit,
     files,
     fit::{PartRead, PyFit},
-    interrupt::{self, Standing},
+    interrupt::{self, RunStatus},
     names,
     time_varying::PyTimeVaryingFit,
 };
@@ -25,8 +25,8 @@ use crate::{
 /// Samples times models from which a fit is long enough to get a thread of its own, for interrupts.
 const LONG: usize = 50_000;
 
-/// Fits a model to records: the fit, and remarks on how it was asked for. The package has brought all options
-/// into the form of texts.
+/// Fits a model to records: the fit, and remarks on how it was requested. The package has brought all options into the
+/// form of texts.
 #[pyfunction]
 #[pyo3(signature = (records, *, structure, method, options, faults, decimate, progress))]
 #[allow(clippy::too_many_arguments)]
@@ -48,15 +48,15 @@ pub fn identify<'py>(
         faults: names::choice::<FaultHandling>("faults", faults)?,
         rate: files::decimation(decimate)?,
     };
-    let (asked, notes) = request.asked()?;
+    let (asked, notes) = request.resolve()?;
     let progress = progress.as_ref();
     let fit = match asked {
-        Asked::Operator(how) => Answer::Operator(run(py, how, records, 1, progress)?),
-        Asked::Remnant(how) => Answer::Remnant(run(py, how, records, 10, progress)?),
-        Asked::Change(how) => Answer::Change(run(py, how, records, 10, progress)?),
-        Asked::Polynomials(how) => {
+        ResolvedRequest::Operator(how) => BatchResult::Operator(run(py, how, records, 1, progress)?),
+        ResolvedRequest::Remnant(how) => BatchResult::Remnant(run(py, how, records, 10, progress)?),
+        ResolvedRequest::Change(how) => BatchResult::Change(run(py, how, records, 10, progress)?),
+        ResolvedRequest::Polynomials(how) => {
             let models = how.estimator.ranges(records[0].sample_time())?.combinations()?.len();
-            Answer::Polynomials(run(py, how, records, models, progress)?)
+            BatchResult::Polynomials(run(py, how, records, models, progress)?)
         }
     };
     Ok((native(py, fit)?, notes))
@@ -65,7 +65,7 @@ pub fn identify<'py>(
 /// A result that `to_json` wrote.
 #[pyfunction]
 pub fn from_json<'py>(py: Python<'py>, text: &str) -> Outcome<Bound<'py, PyAny>> {
-    Ok(native(py, Answer::from_json(text)?)?)
+    Ok(native(py, BatchResult::from_json(text)?)?)
 }
 
 /// A part of a result that its `state` wrote.
@@ -76,12 +76,12 @@ pub fn from_state(text: &str) -> PyResult<PyFit> {
 }
 
 /// The class of a result.
-fn native(py: Python<'_>, answer: Answer) -> PyResult<Bound<'_, PyAny>> {
+fn native(py: Python<'_>, answer: BatchResult) -> PyResult<Bound<'_, PyAny>> {
     Ok(match answer {
-        Answer::Operator(found) => Bound::new(py, PyOperatorFit(found))?.into_any(),
-        Answer::Remnant(found) => Bound::new(py, PyFit::of_grey_box(found))?.into_any(),
-        Answer::Change(found) => Bound::new(py, PyTimeVaryingFit(found))?.into_any(),
-        Answer::Polynomials(found) => Bound::new(py, PyFit::of_polynomials(found))?.into_any(),
+        BatchResult::Operator(found) => Bound::new(py, PyOperatorFit(found))?.into_any(),
+        BatchResult::Remnant(found) => Bound::new(py, PyFit::of_grey_box(found))?.into_any(),
+        BatchResult::Change(found) => Bound::new(py, PyTimeVaryingFit(found))?.into_any(),
+        BatchResult::Polynomials(found) => Bound::new(py, PyFit::of_polynomials(found))?.into_any(),
     })
 }
 
@@ -98,8 +98,8 @@ where
     E::Fit: Send + 'static,
 {
     let samples: usize = records.iter().map(Record::len).sum();
-    let work = move |standing: &Arc<Standing>| -> Result<_, AnalysisError> {
-        interrupt::told(standing, || how.run(Recordings::of_records(records)))
+    let work = move |status: &Arc<RunStatus>| -> Result<_, AnalysisError> {
+        interrupt::told(status, || how.run(Recordings::of_records(records)))
     };
     if samples * models < LONG && progress.is_none() {
         py.detach(|| work(&Arc::default())).map_err(Failure::from)

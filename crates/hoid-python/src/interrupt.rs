@@ -19,15 +19,15 @@ use crate::errors::{Failure, Outcome, bad_option};
 /// Time between two checks for signals.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// What the work and the waiting thread share.
+/// Common parts of the work and the waiting thread.
 #[derive(Debug, Default)]
-pub struct Standing {
+pub struct RunStatus {
     stopped: AtomicBool,
     done: AtomicU64,
     total: AtomicU64,
 }
 
-impl Standing {
+impl RunStatus {
     /// False once the work has to stop.
     pub fn goes_on(&self) -> bool {
         !self.stopped.load(Ordering::Relaxed)
@@ -38,17 +38,17 @@ impl Standing {
         self.done.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// This much of the whole work is done.
+    /// Completed share of the work.
     pub fn set(&self, done: u64, total: u64) {
         self.total.store(total, Ordering::Relaxed);
         self.done.store(done, Ordering::Relaxed);
     }
 }
 
-/// Does work that says how far it is, and tells the waiting thread.
-pub fn told<T>(standing: &Arc<Standing>, work: impl FnOnce() -> T) -> T {
-    let standing = Arc::clone(standing);
-    progress::watched(move |step| standing.set(step.done as u64, step.total as u64), work)
+/// Does work that reports how far it is, and informs the waiting thread.
+pub fn told<T>(status: &Arc<RunStatus>, work: impl FnOnce() -> T) -> T {
+    let status = Arc::clone(status);
+    progress::watched(move |step| status.set(step.done as u64, step.total as u64), work)
 }
 
 /// Runs the work without the interpreter and returns its result.
@@ -61,24 +61,24 @@ pub fn run<T: Send + 'static, E: Send + 'static + Into<Failure>>(
     total: u64,
     progress: Option<&Bound<'_, PyAny>>,
     patient: bool,
-    work: impl FnOnce(&Arc<Standing>) -> Result<T, E> + Send + 'static,
+    work: impl FnOnce(&Arc<RunStatus>) -> Result<T, E> + Send + 'static,
 ) -> Outcome<T> {
-    let standing = Arc::new(Standing::default());
-    standing.set(0, total);
+    let status = Arc::new(RunStatus::default());
+    status.set(0, total);
     let (send, receive) = channel();
-    let shared = Arc::clone(&standing);
+    let shared = Arc::clone(&status);
     let thread = std::thread::Builder::new().name("hoid".to_owned());
     thread
         .spawn(move || {
-            // After an interrupt nobody listens any more.
+            // After an interrupt no one listens any more.
             let _ = send.send(work(&shared));
         })
         .map_err(|error| bad_option(format!("the system cannot start a thread: {error}")))?;
     let mut told = u64::MAX;
     let mut tell = || -> PyResult<()> {
-        let done = standing.done.load(Ordering::Relaxed);
+        let done = status.done.load(Ordering::Relaxed);
         if let Some(progress) = progress.filter(|_| done != told) {
-            progress.call1((done, standing.total.load(Ordering::Relaxed)))?;
+            progress.call1((done, status.total.load(Ordering::Relaxed)))?;
             told = done;
         }
         py.check_signals()
@@ -102,7 +102,7 @@ pub fn run<T: Send + 'static, E: Send + 'static + Into<Failure>>(
                 if interrupted.is_none()
                     && let Err(error) = tell()
                 {
-                    standing.stopped.store(true, Ordering::Relaxed);
+                    status.stopped.store(true, Ordering::Relaxed);
                     if !patient {
                         return Err(error.into());
                     }

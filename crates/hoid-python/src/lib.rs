@@ -4,7 +4,7 @@
 //! arguments into plain form (floats, contiguous arrays, dictionaries) and wraps the results. Long
 //! work runs without the interpreter.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `arrays` | arrays and records in and out |
 //! | `errors` | errors of the libraries as exceptions, by kind |

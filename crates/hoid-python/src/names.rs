@@ -1,4 +1,4 @@
-//! The words of Python, those of the command line, and what they stand for in the libraries.
+//! The words of Python, those of the command line, and what they represent in the libraries.
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
@@ -35,7 +35,7 @@ pub fn choice<T: NamedChoice>(option: &str, found: &str) -> Outcome<T> {
     word(option, found, &words)
 }
 
-/// What can be left out of a record.
+/// Parts that can be left out of a record.
 pub fn quality_issue_kind(found: &str) -> Outcome<QualityIssueKind> {
     let kinds = [
         QualityIssueKind::Missing,
@@ -70,7 +70,7 @@ pub fn remnant_discretisation(found: &str) -> Outcome<RemnantDiscretisation> {
     choice("discretisation", found)
 }
 
-/// The keyword of an option: its name, but for a word that Python keeps for itself.
+/// The keyword of an option: its name, except for a word that Python keeps for itself.
 pub fn keyword(name: &'static str) -> &'static str {
     match name {
         "lambda" => "forgetting_factor",

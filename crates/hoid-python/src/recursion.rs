@@ -41,7 +41,7 @@ pub fn request(options: &Bound<'_, PyDict>) -> Outcome<TrackRequest> {
     let orders: BTreeMap<String, (usize, usize)> = get(options, "orders")?.unwrap_or_default();
     let start: Option<BTreeMap<String, f64>> = get(options, "start")?;
     let from_nothing = get(options, "from_nothing")?.unwrap_or(false);
-    let usual = TrackRequest::of(method(options)?);
+    let default = TrackRequest::of(method(options)?);
     Ok(TrackRequest {
         structure: text("structure")?.map(|name| names::structure(&name)).transpose()?,
         orders: names::named_orders(&orders)?,
@@ -49,15 +49,15 @@ pub fn request(options: &Bound<'_, PyDict>) -> Outcome<TrackRequest> {
         start: match start {
             Some(start) => RequestedStart::Coefficients(start),
             None if from_nothing => RequestedStart::Nothing,
-            None => RequestedStart::Usual,
+            None => RequestedStart::Default,
         },
-        criterion: text("criterion")?.map_or(Ok(usual.criterion), |name| names::criterion(&name))?,
-        largest: get(options, "largest")?.unwrap_or(usual.largest),
+        criterion: text("criterion")?.map_or(Ok(default.criterion), |name| names::criterion(&name))?,
+        largest: get(options, "largest")?.unwrap_or(default.largest),
         at_rad_s: get(options, "at")?.unwrap_or_default(),
         controlled_element: get::<ControlledElement>(options, "controlled_element")?
             .map(|element| element.transfer_function())
             .transpose()?,
-        ..usual
+        ..default
     })
 }
 
@@ -99,7 +99,7 @@ fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
     Ok(method)
 }
 
-/// Of an earlier name of a recursive method that of now, and the sentence that says so.
+/// For an earlier name of a recursive method the current one, and the sentence that reports it.
 #[pyfunction]
 pub fn renamed_method(name: &str) -> Option<(&'static str, String)> {
     hoid_survey::renamed(name)

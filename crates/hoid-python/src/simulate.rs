@@ -71,8 +71,8 @@ pub fn simulate<'py>(
             let has_remnant = remnant_order.is_some() || remnant_time_constant.is_some();
             if has_remnant || noise_level.is_some() || noise_definition.is_some() {
                 return Err(bad_option(
-                    "remnant_order, remnant_time_constant, noise_level and noise_definition are of the reference text's \
-                     remnant: in a scenario with a form the tables [[remnant]] say it",
+                    "remnant_order, remnant_time_constant, noise_level and noise_definition are of the thesis's \
+                     remnant: in a scenario with a form the tables [[remnant]] specify it",
                 ));
             }
             if let Some(ts) = sample_time {
@@ -156,7 +156,7 @@ pub fn margins<'py>(
     Ok(all)
 }
 
-/// Those of an operator of the family, with the gains of the parts of its remnant.
+/// The entries of an operator of the family, with the gains of the parts of its remnant.
 fn family_margins<'py>(py: Python<'py>, scenario: &FamilyScenario, last: bool) -> Outcome<Bound<'py, PyDict>> {
     let state = if last { &scenario.last } else { &scenario.initial };
     let all = figures::plain_margins(py, &state.margins()?)?;

@@ -20,7 +20,7 @@ fn left(py: Python<'_>, outcome: StudyOutcome) -> Outcome<Left> {
     Ok((outcome.finished, outcome.estimates, outcome.tables))
 }
 
-/// What the user should know, as warnings of Python.
+/// Warnings for the user, as warnings of Python.
 pub fn warn(py: Python<'_>, notes: &[String]) -> PyResult<()> {
     for note in notes {
         let text = CString::new(note.replace('\0', " "))?;
@@ -189,7 +189,7 @@ pub fn merge_shards(py: Python<'_>, shards: Vec<PathBuf>, directory: PathBuf, cs
 /// Index page, number of tables and figures, tally of the claims.
 type Reproduced = (PathBuf, usize, Option<[usize; 5]>);
 
-/// Makes the tables, figures and claims of the reference text; `None` after an interrupt.
+/// Makes the tables, figures and claims of the thesis; `None` after an interrupt.
 #[pyfunction]
 #[pyo3(signature = (directory, *, only, replications, jobs, progress))]
 pub fn reproduce(

@@ -1,8 +1,8 @@
-//! `pyhoid.info`: what is in a file, as `hoid info --json` tells it.
+//! `pyhoid.info`: what is in a file, as `hoid info --json` reports it.
 
 use std::path::PathBuf;
 
-use hoid_analysis::{Advice, Known, Look, Role};
+use hoid_analysis::{Advice, Look, LookOptions, Role};
 use hoid_io::{ColumnSurvey, QualityIssue, SamplingSurvey, ValueSurvey};
 use pyo3::{prelude::*, types::PyDict};
 
@@ -29,7 +29,7 @@ pub fn info<'py>(
         }
         None => None,
     };
-    let known = Known {
+    let known = LookOptions {
         input,
         output,
         excitation,
@@ -37,7 +37,7 @@ pub fn info<'py>(
         time: time.map(str::parse).transpose()?,
         trial: trial.map(str::parse).transpose()?,
         sampling_hz: sampling_frequency,
-        ..Known::default()
+        ..LookOptions::default()
     };
     let look = py.detach(|| Look::at(&path, &known))?;
     let found = &look.survey;
@@ -54,7 +54,7 @@ pub fn info<'py>(
     Ok(all)
 }
 
-/// What the file looks like, and how it is to be read.
+/// Layout of the file, and the keywords to read it.
 fn looked<'py>(py: Python<'py>, look: &Look) -> PyResult<Bound<'py, PyDict>> {
     let role = |role: &Role| -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);

@@ -9,7 +9,7 @@ use crate::{
     arrays::{self, Wanted, array, matrix},
     errors::Outcome,
     faults::{UsedRecord, faults_of, used_records},
-    figures::{self, Pair, VerdictParts, error_or_nan, pair},
+    figures::{self, ValueWithError, VerdictParts, error_or_nan, pair},
 };
 
 /// The package wraps it in `pyhoid.TimeVaryingFit`.
@@ -52,7 +52,7 @@ impl PyTimeVaryingFit {
 
     /// Name, estimate, unit and remark of each parameter.
     #[getter]
-    fn parameters(&self) -> Vec<(String, Pair, &'static str, Option<String>)> {
+    fn parameters(&self) -> Vec<(String, ValueWithError, &'static str, Option<String>)> {
         let one = |p: hoid_ident::ChangeParameter| (p.name, pair(p.estimate), p.unit, p.remark.map(|r| r.to_string()));
         self.0.fit.parameters().into_iter().map(one).collect()
     }
@@ -98,7 +98,7 @@ impl PyTimeVaryingFit {
 
     /// The level of u in each record, where it was estimated.
     #[getter]
-    fn levels(&self) -> Vec<Option<Pair>> {
+    fn levels(&self) -> Vec<Option<ValueWithError>> {
         self.0
             .data
             .accounts
@@ -107,8 +107,7 @@ impl PyTimeVaryingFit {
             .collect()
     }
 
-    /// The records as they were fitted: which of those given each is a part of, the record, and what was done
-    /// to it.
+    /// The records as they were fitted: which of those given each is a part of, the record, and the processing of it.
     fn records<'py>(&self, py: Python<'py>) -> PyResult<Vec<UsedRecord<'py>>> {
         used_records(py, &self.0.data)
     }

@@ -69,7 +69,7 @@ impl PyTrace {
         Ok(self.0.to_json()?)
     }
 
-    /// The record as it was tracked: which of those given it is, the record, and what was done to it.
+    /// The record as it was tracked: which of those given it is, the record, and the processing of it.
     fn records<'py>(&self, py: Python<'py>) -> PyResult<Vec<UsedRecord<'py>>> {
         used_records(py, &self.0.data)
     }
@@ -115,7 +115,7 @@ impl PyTrace {
         Ok(all)
     }
 
-    /// What the guard found, and what it did.
+    /// Events found by the guard, and what it did.
     #[getter]
     fn faults<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         self.0
@@ -182,7 +182,7 @@ impl PyTrace {
         Some(PyFit::new(fit, self.0.choice.clone(), 1))
     }
 
-    /// What the trace is worth.
+    /// Verdict on the trace.
     #[getter]
     fn verdict(&self) -> figures::VerdictParts {
         figures::verdict(&self.0.verdict)

@@ -21,7 +21,10 @@ const LONGEST_WARM_UP: usize = 10_000_000;
 type Saved<'py> = (Option<Bound<'py, PyDict>>, Bound<'py, PyArray1<f64>>);
 
 /// Crossover and margin, or the reason why not.
-type OpenLoopParts = (Option<(figures::Pair, figures::Pair)>, Option<&'static str>);
+type OpenLoopParts = (
+    Option<(figures::ValueWithError, figures::ValueWithError)>,
+    Option<&'static str>,
+);
 
 /// The package derives `pyhoid.Tracker` from it.
 #[pyclass(name = "Tracker", module = "pyhoid._pyhoid", subclass)]
@@ -30,7 +33,7 @@ pub struct PyTracker {
     live: Live,
     choice: Option<Choice>,
     sample_time: SampleTime,
-    /// What lowers a high rate: error, control, target.
+    /// Decimator of error, control and target.
     decimator: Option<Decimator<3>>,
 }
 
@@ -122,7 +125,7 @@ impl PyTracker {
         let plan = asked.plan(tracked)?;
         if plan.options().method.smooths() {
             return Err(bad_option(
-                "smooth belongs to pyhoid.track: what is still to come cannot say anything of a stream",
+                "smooth belongs to pyhoid.track: a stream has no future samples",
             ));
         }
         if !(1..=LONGEST_WARM_UP).contains(&warm_up) {
@@ -221,7 +224,7 @@ impl PyTracker {
         matches!(self.live, Live::Tracking(_))
     }
 
-    /// Why the last start fit failed, or why the warm-up began again.
+    /// Why the last start fit failed, or why the warm-up started again.
     #[getter]
     fn trouble(&self) -> Option<String> {
         match &self.live {
@@ -235,7 +238,7 @@ impl PyTracker {
         self.sample_time.s()
     }
 
-    /// How a high rate is lowered; None where it is not.
+    /// How a high rate is lowered; None if it is not.
     #[getter]
     fn decimation(&self) -> Option<String> {
         self.decimator.as_ref().map(|decimator| decimator.done().to_string())
@@ -277,7 +280,7 @@ impl PyTracker {
     }
 
     #[getter]
-    fn parameters(&self) -> Outcome<Vec<(String, figures::Pair)>> {
+    fn parameters(&self) -> Outcome<Vec<(String, figures::ValueWithError)>> {
         let tracker = self.tracker()?;
         let estimates = tracker.parameters().into_iter().map(figures::pair);
         Ok(tracker.parameter_names().into_iter().zip(estimates).collect())
@@ -294,7 +297,7 @@ impl PyTracker {
         self.plan.options().at_rad_s.clone()
     }
 
-    /// What the person controls.
+    /// The controlled element.
     #[getter]
     fn controlled_element(&self) -> Option<String> {
         let element = self.plan.options().controlled_element.as_ref();
@@ -302,7 +305,7 @@ impl PyTracker {
     }
 
     /// Gain in dB and phase in deg at a frequency in rad/s, each with its standard error.
-    fn response(&self, omega: f64) -> Outcome<Option<(figures::Pair, figures::Pair)>> {
+    fn response(&self, omega: f64) -> Outcome<Option<(figures::ValueWithError, figures::ValueWithError)>> {
         let found = self.tracker()?.response(omega);
         Ok(found.map(|r| (figures::pair(r.gain_db()), figures::pair(r.phase_deg()))))
     }
@@ -355,7 +358,7 @@ impl PyTracker {
         Ok(all)
     }
 
-    /// What the guard found or did at the last sample, its times in s before that sample.
+    /// Event of the guard at the last sample, its times in s before that sample.
     #[getter]
     fn event<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Live::Tracking(tracker) = &self.live else {
@@ -365,7 +368,7 @@ impl PyTracker {
         event.map(|fault| figures::track_fault(py, &fault)).transpose()
     }
 
-    /// True while the guard lets the estimate stand still.
+    /// True while the guard lets the estimate stay constant.
     #[getter]
     fn paused(&self) -> bool {
         matches!(&self.live, Live::Tracking(tracker) if tracker.is_paused())

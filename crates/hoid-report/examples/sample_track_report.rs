@@ -72,7 +72,7 @@ fn lines(fits: &[Fit]) -> Vec<BatchLine<'_>> {
 }
 
 fn tracked(method: Method, record: &Record) -> Result<Trace, Box<dyn Error>> {
-    let structure = method.usual_structure();
+    let structure = method.default_structure();
     let mut options = TrackOptions::new(method, structure, structure.operator_orders(29));
     options.start = StartAt::Span(Some(SPANS[0]));
     Ok(track(record, &options, 1)?)

@@ -9,8 +9,8 @@ pub fn html(text: impl Into<String>) -> Value {
     Value::from_safe_string(text.into())
 }
 
-/// Name and unit of an operator parameter for the page; gains have units only where the record says
-/// them, as [`hoid_model::GainUnit`] tells.
+/// Name and unit of an operator parameter for the page; gains have units only where the record
+/// shows them, as [`hoid_model::GainUnit`] reports.
 pub fn symbol(name: &str) -> (Value, &'static str) {
     let (symbol, unit) = match name {
         "K_e" => ("<i>K</i><sub>e</sub>", ""),

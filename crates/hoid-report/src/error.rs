@@ -5,7 +5,7 @@ use hoid_study::StudyError;
 use thiserror::Error;
 
 /// Everything that stops a report. A model that does not convert or a record that cannot be
-/// validated is no error: the page shows the reason in its place.
+/// validated is not an error: the page shows the reason in its place.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ReportError {
@@ -38,7 +38,7 @@ pub enum ReportError {
     /// A study that failed.
     #[error(transparent)]
     Study(Box<StudyError>),
-    /// A figure that cannot be made in the format that was asked for.
+    /// A figure that cannot be made in the format that was requested.
     #[error("the figure cannot be written in this format: {reason}")]
     Figure {
         /// Why.
@@ -47,7 +47,7 @@ pub enum ReportError {
     /// The page template could not be filled: a defect of this crate.
     #[error("the page template could not be filled: {reason}; please report this as a defect")]
     Template {
-        /// What the template engine said.
+        /// Report of the template engine.
         reason: String,
     },
 }

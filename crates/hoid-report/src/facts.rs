@@ -1,10 +1,10 @@
-//! What stands in the table of settings of every page.
+//! Contents of the table of settings of every page.
 
 use hoid_analysis::{Account, Setting};
 use hoid_io::{QualityIssue, Step};
 use hoid_model::Fault;
 
-/// What was done and with what: version, records, settings, what was done to the records and what is wrong with them.
+/// The processing and its inputs: version, records, settings, the processing of the records and the problems of them.
 pub fn facts(names: &[String], settings: &[Setting], accounts: &[Account]) -> Vec<(String, String)> {
     let records = if names.len() == 1 { "record" } else { "records" };
     let mut rows = vec![

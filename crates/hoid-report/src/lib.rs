@@ -35,9 +35,9 @@
 //! # }
 //! ```
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
-//! | [`Answer`], [`sentence`] | the head of a page: verdict, the answer in words, parameters with errors |
+//! | [`FitSummary`], [`sentence`] | the head of a page: verdict, the answer as text, parameters with errors |
 //! | [`Report`], [`ModelSection`], [`model_figure`] | one self-contained HTML page about one or several fitted models |
 //! | [`Report::of_operator`], [`operator_figure`], [`sentence_of_operator`] | the page of the operator of a person |
 //! | [`TrackReport`], [`TraceSection`], [`BatchLine`], [`batch_fit`], [`default_batch_fits`] | one such page about recursive estimates over a record |
@@ -51,12 +51,12 @@
 //!
 //! Nothing here prints, and the same data give the same bytes.
 
-mod answer;
 mod cells;
 mod comparison;
 mod error;
 mod facts;
 pub mod figures;
+mod fit_summary;
 mod group;
 mod model_figure;
 mod model_section;
@@ -67,10 +67,10 @@ mod report;
 mod tables;
 mod track;
 
-pub use answer::{Answer, AnswerRow, sentence};
 pub use comparison::comparison_figure;
 pub use error::ReportError;
 pub use facts::facts;
+pub use fit_summary::{FitSummary, ParameterRow, sentence};
 pub use group::{
     FrequencyTables, GroupReport, GroupTables, PeopleTable, group_figures, people_table, write_group_pages,
 };

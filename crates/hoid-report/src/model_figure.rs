@@ -12,7 +12,7 @@ use crate::{
 /// A polynomial model in a figure.
 pub fn model_figure(fit: &Fit, records: &[Record], described: Option<&Description>) -> String {
     let title = fit.title();
-    // What is behind the semicolon does not fit below a figure of one column.
+    // What is after the semicolon does not fit below a figure of one column.
     let title = title.split(';').next().unwrap_or(&title).to_owned();
     let delay_s = fit.orders().nk as f64 * fit.model().sample_time().s();
     match described {

@@ -1,4 +1,4 @@
-//! One model of a page: the fit, its records and what is known beside them.
+//! One model of a page: the fit, its records and what is known next to them.
 
 use hoid_ident::{
     Choice, Fit, MarginEstimates,
@@ -17,7 +17,7 @@ pub struct ModelSection<'a> {
     pub records: &'a [Record],
     /// The search that chose its orders, if there was one.
     pub candidates: Option<&'a Choice>,
-    /// The operator behind the records, where it is known (simulation).
+    /// The operator after the records, where it is known (simulation).
     pub truth: Option<OperatorParameters>,
     /// Margins of the loop of this model and the controlled element, where that is known.
     pub margins: Option<MarginEstimates>,

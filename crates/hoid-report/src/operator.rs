@@ -9,7 +9,7 @@ use hoid_ident::{
 use hoid_model::{Complex64, ContinuousTransferFunction, FamilyOperator, GainUnit, uncertainty::Estimate};
 
 use crate::{
-    Answer, AnswerRow, ModelSection, Picture, Report, facts,
+    FitSummary, ModelSection, ParameterRow, Picture, Report, facts,
     figures::{ModelCurve, describing},
     model_figure, sentence,
 };
@@ -63,7 +63,7 @@ pub fn operator_figure(found: &Identified) -> String {
     }
 }
 
-/// The answer of an operator in words.
+/// The answer of an operator as text.
 pub fn sentence_of_operator(found: &Identified) -> Option<String> {
     let known = found.fit.operator(0).parameters.iter().filter(|p| p.determined);
     let element = found.controlled_element.as_ref();
@@ -75,7 +75,7 @@ pub fn sentence_of_operator(found: &Identified) -> Option<String> {
     )
 }
 
-/// What a parameter is that the data do not determine; nothing for one that they do.
+/// Mark of a parameter that the data do not determine; empty otherwise.
 pub fn undetermined(p: &Parameter) -> &'static str {
     match (p.determined, p.prior_share > 0.5) {
         (true, _) => "",
@@ -95,9 +95,9 @@ fn remark(p: &Parameter) -> String {
 }
 
 /// The head of a page.
-fn answer(found: &Identified) -> Answer {
+fn answer(found: &Identified) -> FitSummary {
     let gain = found.data.records.first().map(GainUnit::of).unwrap_or_default();
-    let row = |p: &Parameter| AnswerRow {
+    let row = |p: &Parameter| ParameterRow {
         name: p.name.clone(),
         unit: gain.unit(&p.name, p.unit),
         estimate: p.determined.then_some(Estimate {
@@ -107,7 +107,7 @@ fn answer(found: &Identified) -> Answer {
         interval: p.interval,
         remark: remark(p),
     };
-    Answer {
+    FitSummary {
         verdict: found.fit.verdict.clone(),
         sentence: sentence_of_operator(found),
         parameters: found.fit.operator(0).parameters.iter().map(row).collect(),
@@ -156,7 +156,7 @@ fn through_describing_function(fit: &FamilyFit, described: &Description) -> Pict
         svg: picture(fit, described),
         caption:
             "The describing function at the lines of the excitation, with 95 % by its scatter, and the operator: by \
-                  prediction error, the mean over its forms with their 95 % band; in the form in front fitted at the lines, and by \
+                  prediction error, the mean over its forms with their 95 % band; in the best form fitted at the lines, and by \
                   instrumental variables (RIV-BJ) where these converge."
                 .to_owned(),
     }

@@ -23,7 +23,7 @@ pub(crate) fn render(name: &str, values: Value) -> Result<String, ReportError> {
     render_with(&[], name, values)
 }
 
-/// The page of a template, which may be one of `own`: name and text of templates beside those of
+/// The page of a template, which may be one of `own`: name and text of templates next to those of
 /// this crate, whose parts and style they can use.
 ///
 /// # Errors
@@ -59,7 +59,7 @@ pub fn write_page(directory: &Path, name: &str, html: &str) -> Result<PathBuf, R
     Ok(path)
 }
 
-/// Writes a page as `report.html` into a directory, which is made if it is not there.
+/// Writes a page as `report.html` into a directory, which is made if it is missing.
 ///
 /// # Errors
 /// [`ReportError::Io`] when it cannot be written.

@@ -1,9 +1,9 @@
 //! A result as a table for a paper: estimates with errors and intervals, in LaTeX (`.tex`, booktabs), Markdown
 //! (`.md`), or as data (CSV and the other formats of tables).
 //!
-//! The table is read from the object of the result ([`hoid_analysis::json`]), so that it says what the JSON says. In LaTeX
-//! and Markdown a value has the digits that two digits of its error need; as data every number has all of its own, an
-//! error in a column behind its value.
+//! The table is read from the object of the result ([`hoid_analysis::json`]), so that it reports what the JSON states.
+//! In LaTeX and Markdown a value has the digits that two digits of its error need; as data every number has all of its
+//! own, an error in a column after its value.
 
 use std::path::Path;
 
@@ -46,7 +46,7 @@ struct Row {
 }
 
 impl PaperTable {
-    /// The table of a result, by its object; `None` where nothing in it is an estimate.
+    /// The table of a result, by its object; `None` if nothing in it is an estimate.
     pub fn of(object: &Map<String, Value>) -> Option<Self> {
         let text = |key: &str| object.get(key).and_then(Value::as_str).unwrap_or_default();
         let level = object.get("verdict").and_then(|verdict| verdict["level"].as_str());
@@ -77,10 +77,10 @@ impl PaperTable {
         }
     }
 
-    /// Writes it, whole or not at all, in the format that the extension stands for.
+    /// Writes it, whole or not at all, in the format that the extension represents.
     ///
     /// # Errors
-    /// Those of [`PaperTable::check`] and of writing.
+    /// The errors of [`PaperTable::check`] and of writing.
     pub fn write(&self, path: &Path) -> Result<(), IoError> {
         match Markup::of(path) {
             Some(markup) => {
@@ -177,7 +177,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or(f64::NAN)
 }
 
-/// Parameters, those of the operator where they stand apart, and the loop.
+/// Parameters, those of the operator its position apart, and the loop.
 fn of_estimates(object: &Map<String, Value>) -> Vec<Column> {
     let none = Value::Null;
     let at = |object: &Map<String, Value>, key: &str| object.get(key).cloned().unwrap_or_default();

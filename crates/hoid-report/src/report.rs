@@ -8,7 +8,7 @@ use hoid_model::Record;
 use minijinja::{Value, context};
 
 use crate::{
-    Answer, ReportError, cells,
+    FitSummary, ReportError, cells,
     figures::{self, BodeModel, TrueResponse},
     model_section::{ModelSection, known_operator},
     page, tables,
@@ -17,19 +17,19 @@ use crate::{
 /// Records of a model whose time response is drawn.
 const MOST_TIME_RESPONSES: usize = 4;
 
-/// What the page is about.
+/// Subject of the page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report<'a> {
     /// Heading of the page.
     pub title: String,
-    /// What was done and with what, as name and value: command, versions, records, span, seed.
+    /// The processing and its inputs, as name and value: command, versions, records, span, seed.
     pub settings: Vec<(String, String)>,
     /// The models, one section each.
     pub models: Vec<ModelSection<'a>>,
     /// Remarks for the reader, such as warnings of the command.
     pub notes: Vec<String>,
-    /// What the fit says, on top of the page.
-    pub answer: Option<Answer>,
+    /// Results of the fit, on top of the page.
+    pub answer: Option<FitSummary>,
     /// Figures that answer what was asked, before all others.
     pub pictures: Vec<Picture>,
 }
@@ -39,7 +39,7 @@ pub struct Report<'a> {
 pub struct Picture {
     /// The figure, as SVG text.
     pub svg: String,
-    /// What is seen, in a sentence.
+    /// Caption, in a sentence.
     pub caption: String,
 }
 
@@ -96,7 +96,7 @@ impl Report<'_> {
             title => self.title.clone(),
             settings => page::facts(&self.settings),
             notes => self.notes.clone(),
-            answer => self.answer.as_ref().map(Answer::to_value),
+            answer => self.answer.as_ref().map(FitSummary::to_value),
             pictures => self.pictures.iter().map(Picture::to_value).collect::<Vec<Value>>(),
             comparison => tables::comparison(&self.models, &qualities),
             bode => Value::from_safe_string(self.bode()),

@@ -1,5 +1,5 @@
 //! The tables of the page as values for the template. Where a number does not exist there is a dash
-//! and, beside it, the reason.
+//! and, next to it, the reason.
 
 use hoid_ident::{
     Choice, Fit, InitialState, MarginEstimates,

@@ -65,15 +65,14 @@ fn page<'a>(models: Vec<ModelSection<'a>>) -> String {
     report.to_html().unwrap()
 }
 
-/// The text behind the first `<h2 id=...>` with this name, up to the next section.
+/// The text after the first `<h2 id=...>` with this name, up to the next section.
 fn section_of<'a>(html: &'a str, name: &str) -> &'a str {
     let start = html.find(&format!("\">{name}</h2>")).unwrap();
     let end = html[start..].find("</section>").unwrap();
     &html[start..start + end]
 }
 
-/// What every page must keep: nothing from outside, no NaN, no two equal ids, references that
-/// exist.
+/// Properties of every page: nothing from outside, no NaN, no two equal ids, references that exist.
 fn check_page(html: &str) {
     let without_namespace = html.replace("xmlns=\"http://www.w3.org/2000/svg\"", "");
     for outside in ["http", "src=", "<link", "<script", "@import", "url(\"", "//cdn"] {
@@ -265,7 +264,7 @@ fn an_exact_fit_says_why_it_has_no_standard_errors() {
     assert!(fit.covariance().is_none());
     let html = page(vec![section("exact", &fit, &records)]);
     check_page(&html);
-    assert!(html.contains("residuals are zero up to rounding and say nothing about the noise"));
+    assert!(html.contains("residuals are zero up to rounding and carry no information about the noise"));
 }
 
 #[test]

@@ -22,7 +22,7 @@ fn run() -> Record {
 }
 
 fn options(method: Method) -> TrackOptions {
-    let structure = method.usual_structure();
+    let structure = method.default_structure();
     let mut options = TrackOptions::new(method.clone(), structure, structure.operator_orders(29));
     options.start = StartAt::Span(Some(SPANS[0]));
     options
@@ -58,8 +58,7 @@ fn report<'a>(record: &'a Record, traces: Vec<TraceSection<'a>>) -> TrackReport<
     }
 }
 
-/// What every page must keep: nothing from outside, no NaN, no two equal ids, references that
-/// exist.
+/// Properties of every page: nothing from outside, no NaN, no two equal ids, references that exist.
 fn check_page(html: &str) {
     let without_namespace = html.replace("xmlns=\"http://www.w3.org/2000/svg\"", "");
     for outside in ["http", "src=", "<link", "<script", "@import", "url(\"", "//cdn"] {
@@ -253,7 +252,7 @@ fn short_records_and_averages_have_their_page() {
     // Shorter than 10 s: errors over the whole record.
     assert!(html.contains("with <i>t</i> &ge; 0 s"));
     assert!(html.contains("101 rows, behind by 0.5 s"));
-    assert!(html.contains("nothing at the end of [-3, -1] s: the trace begins later"));
+    assert!(html.contains("nothing at the end of [-3, -1] s: the trace starts later"));
     // One row alone.
     let one = track(&record, &options, 800).unwrap();
     assert_eq!(one.len(), 1);
@@ -283,12 +282,12 @@ fn a_batch_fit_beside_a_delay_that_changed_has_the_delay_of_its_span() {
         .run(RunSeed::default(), false)
         .unwrap();
     let mut with_delay = options(hoid_survey::multiple_model());
-    with_delay.orders = hoid_survey::multiple_model().usual_orders(29);
+    with_delay.orders = hoid_survey::multiple_model().default_orders(29);
     with_delay.method.set("track_delay", "0.2..0.4").unwrap();
     let trace = track(&record, &with_delay, 8).unwrap();
     let (_, fit) = batch_fit(&trace, &record, SPANS[1]).unwrap();
     assert!((34..=36).contains(&fit.orders().nk), "{}", fit.orders());
-    // The trace has no row there that says otherwise: the start's.
+    // The trace has no row there that specifies otherwise: the start's.
     assert_eq!(batch_fit(&trace, &record, SPANS[0]).unwrap().1.orders().nk, 29);
 }
 

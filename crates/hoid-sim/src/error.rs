@@ -3,7 +3,7 @@
 use hoid_model::ModelError;
 use thiserror::Error;
 
-/// What can go wrong in a simulation.
+/// Errors of a simulation.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SimError {
@@ -57,9 +57,9 @@ pub enum SimError {
         expected: usize,
     },
     /// An instruction set that this processor does not have.
-    #[error("this processor does not have the instruction set that was asked for; use InstructionSet::Best")]
+    #[error("this processor does not have the instruction set that was requested; use InstructionSet::Best")]
     NoSuchInstructionSet,
-    /// Noise that is no number.
+    /// Noise that is not a number.
     #[error("the noise at sample {index} is {value}, expected a finite number")]
     NoiseNotFinite {
         /// Index of the sample, from 0.

@@ -20,7 +20,7 @@
 //! # Ok::<(), hoid_sim::SimError>(())
 //! ```
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `simulator` | [`Simulator`]: a scenario made ready, and its runs |
 //! | `operator_run` | [`OperatorRun`]: the operator alone, a sample at a time |

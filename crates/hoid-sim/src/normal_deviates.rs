@@ -63,7 +63,7 @@ fn edges() -> [f64; LAYERS + 1] {
     edges
 }
 
-/// Gives the number that stands for the middle of a layer, and then the largest.
+/// Gives the number that represents the middle of a layer, and then the largest.
 struct Middle(u64);
 
 impl TryRng for Middle {
@@ -102,7 +102,7 @@ impl Buffered {
         }
     }
 
-    /// What is left of what was drawn, in numbers.
+    /// The remainder of what was drawn, in numbers.
     #[inline(always)]
     fn drawn(&self) -> &[[u8; 8]] {
         self.bytes[self.at..].as_chunks().0

@@ -1,17 +1,17 @@
 //! The operator of a scenario alone, a sample at a time: for a loop that is closed elsewhere.
 //!
-//! What [`Simulator`] does of `u = y(k - tau_e/Ts) + n`, with the same random numbers: a loop that
-//! answers u as its controlled element does gives the same run to the last bit. The control of a
-//! sample does not hang on the error of the same sample, for the operator's response holds e over a
-//! sample first.
+//! Simulates, as [`Simulator`] does in a loop, `u = y(k - tau_e/Ts) + n`, with the same random
+//! numbers: a loop that answers u as its controlled element does gives the same run to the last
+//! bit. The control of a sample does not hang on the error of the same sample, for the operator's
+//! response holds e over a sample first.
 
 use crate::{RunSeed, Simulator, cascade::MOST};
 
-/// Most samples of an operator that goes on from what was saved, eight hours at 1 kHz: its random numbers are drawn
+/// Most samples of an operator that continues from what was saved, eight hours at 1 kHz: its random numbers are drawn
 /// again, and what claims to stand farther on must not take all memory.
 const MOST_SAMPLES: f64 = 3e7;
 
-/// The number of a sample as it was saved; `None` where it is no such number.
+/// The number of a sample as it was saved; `None` if it is no such number.
 pub(crate) fn saved_sample(k: f64) -> Option<usize> {
     ((0.0..=MOST_SAMPLES).contains(&k) && k.fract() == 0.0).then_some(k as usize)
 }
@@ -77,7 +77,7 @@ impl OperatorRun {
         self.respond();
     }
 
-    /// Where it stands, as numbers.
+    /// Its position, as numbers.
     pub fn saved(&self) -> Vec<f64> {
         let mut numbers = vec![self.k as f64];
         numbers.extend(self.operator);
@@ -86,8 +86,8 @@ impl OperatorRun {
         numbers
     }
 
-    /// Goes on from where an operator of the same scenario and run stood ([`OperatorRun::saved`]), with the same
-    /// digits. False where the numbers are of another; then nothing has changed.
+    /// Continues from where an operator of the same scenario and run was ([`OperatorRun::saved`]), with the same
+    /// digits. False if the numbers are of another; then nothing has changed.
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
         let Some(([k], rest)) = numbers.split_first_chunk::<1>() else {
             return false;
@@ -106,7 +106,7 @@ impl OperatorRun {
         true
     }
 
-    /// What stands in the ring for the sample that is next.
+    /// Contents of the ring for the sample that is next.
     fn respond(&mut self) {
         let [of_output, of_rate] = self.matrices().operator_output;
         let last = self.memory.len() - 1;
@@ -118,7 +118,7 @@ impl OperatorRun {
         all[self.k.min(all.len() - 1)]
     }
 
-    /// The white noise of the sample that is next; behind the end of the scenario it goes on.
+    /// The white noise of the sample that is next; after the end of the scenario it continues.
     fn white(&mut self) -> f64 {
         if self.k >= self.noise.len() {
             self.noise = self.run.white_noise(2 * self.k + 1);
@@ -174,7 +174,7 @@ mod tests {
         }
     }
 
-    /// An operator goes on in another, behind the end of its scenario too.
+    /// An operator continues in another, after the end of its scenario too.
     #[test]
     fn a_saved_operator_goes_on_with_the_same_digits() {
         let mut scenario = Scenario::condition(Condition::C4);

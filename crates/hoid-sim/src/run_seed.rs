@@ -40,7 +40,8 @@ impl RunSeed {
         normal_deviates(self.generator(REMNANT), noise);
     }
 
-    /// Numbers from `[0, 1)`, each equally likely, for who draws persons or phases of a run.
+    /// Numbers from `[0, 1)`, each equally likely, for callers that draws persons or phases of a
+    /// run.
     pub fn uniform(&self, n: usize) -> Vec<f64> {
         self.uniform_of(UNIFORM, n)
     }

@@ -13,8 +13,8 @@
 //! heard.
 //!
 //! Operator and controlled element are in controllable canonical form (states: output and rate of
-//! `1/den`). The operator's gains stand in its output matrix; those of the controlled element where
-//! [`Realisation`] says. When parameters change, the matrices of each sample are those of the
+//! `1/den`). The operator's gains are in its output matrix; those of the controlled element where
+//! [`Realisation`] states. When parameters change, the matrices of each sample are those of the
 //! continuous model with the values at that sample.
 
 use std::ops::Range;
@@ -57,7 +57,7 @@ pub(crate) struct Matrices {
 
 /// A held system by rows, `[a x_0 + b x_1 + g u, d x_1 - c x_0 - h u]`: the bits of
 /// [`HeldStates::step`]. Were both rows sums, the compiler would pack the states into one register,
-/// and each sample would wait for the shuffles besides.
+/// and each sample would wait for the shuffles in addition.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Rows {
     plus: [f64; 3],
@@ -235,7 +235,7 @@ impl Simulator {
     }
 
     /// The samples of `range`, from noise into e, u, x and n that hold the lanes of each sample
-    /// beside each other.
+    /// next to each other.
     #[inline(always)]
     fn pass<R: Number>(&self, state: &mut LoopState<R>, range: Range<usize>, noise: &[f64], out: [&mut [f64]; 4]) {
         match self.cascade.order() {
@@ -374,7 +374,7 @@ fn first_not_finite(values: &[f64]) -> Option<usize> {
     values.iter().position(|v| !v.is_finite())
 }
 
-/// Where the loop stands between two samples.
+/// Where the loop is between two samples.
 struct LoopState<R> {
     operator: [R; 2],
     element: [R; 2],

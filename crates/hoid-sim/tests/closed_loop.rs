@@ -392,7 +392,7 @@ fn a_diverging_loop_is_an_error_and_not_a_row_of_nan() {
         definition: NoiseDefinition::Response,
     };
     assert!(Simulator::new(&scenario).is_err());
-    // Silence has no level to reach: the unstable loop can be looked at until it overflows.
+    // Silence has no level to reach: the unstable loop can be examined until it overflows.
     let silent = with_unstable_operator(with_level(Condition::C2, 0.0));
     assert!(Simulator::new(&silent).is_ok());
     let good = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();

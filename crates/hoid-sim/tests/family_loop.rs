@@ -38,7 +38,7 @@ fn lead_lag(tau_e_s: f64) -> FamilyOperator {
 }
 
 /// A person on a single integrator with a disturbance.
-fn usual() -> FamilyScenario {
+fn typical() -> FamilyScenario {
     let state = FamilyState {
         operator: lead_lag(0.15),
         controlled_element: element(&[1.0], &[1.0, 0.0]),
@@ -231,7 +231,7 @@ fn is_what_integration_of_the_differential_equations_gives() {
             11.0 + 0.2,
         ),
     ] {
-        let mut scenario = usual();
+        let mut scenario = typical();
         let x = [&head[..], &tail, &[tau_samples * ts]].concat();
         scenario.initial = FamilyState {
             operator: FamilyOperator::new(form, true, &x).unwrap(),
@@ -258,18 +258,18 @@ fn coefficient(values: &[f64], omega_rad_s: f64, ts: f64) -> Complex64 {
 #[test]
 fn the_describing_function_is_the_operator_behind_a_hold() {
     let mut operators = vec![lead_lag(0.1437)];
-    // Without neuromuscular part e passes at once, behind the hold's half sample.
+    // Without neuromuscular part e passes at once, after the hold's half sample.
     operators.push(FamilyOperator::new(Form::LeadLag, false, &[2.0, 0.3, 0.2, 0.15]).unwrap());
     operators.push(FamilyOperator::new(Form::Gain, false, &[2.0, 0.15]).unwrap());
     operators.push(FamilyOperator::new(Form::Gain, false, &[2.0, 0.002]).unwrap());
     for operator in operators {
-        let mut scenario = usual();
+        let mut scenario = typical();
         scenario.initial.operator = operator.clone();
         scenario.last = scenario.initial.clone();
         scenario.run_in_s = 80.0;
         let record = FamilySimulator::new(&scenario).unwrap().run(seed(1), false).unwrap();
         let ts = scenario.sample_time.s();
-        let held = operator.hold(scenario.sample_time).unwrap();
+        let held = operator.zoh(scenario.sample_time).unwrap();
         for line in scenario.disturbance.function.sinusoids() {
             let omega = line.omega_rad_s;
             let found = coefficient(record.output(), omega, ts) / coefficient(record.input(), omega, ts);
@@ -290,7 +290,7 @@ fn the_describing_function_is_the_operator_behind_a_hold() {
 fn parameters_that_change_are_those_in_force() {
     // A step of all parameters at once: from then on the loop of the last state, from where the
     // first has left it. The slow way: both states in one run, each with its own recursion.
-    let mut scenario = usual();
+    let mut scenario = typical();
     let x = [6.0, 0.4, 0.3, 9.0_f64.ln(), 0.3_f64.ln(), 0.15];
     scenario.last.operator = FamilyOperator::new(Form::LeadLag, true, &x).unwrap();
     scenario.schedule = hoid_model::schedule::Schedule::Sigmoid {
@@ -304,7 +304,7 @@ fn parameters_that_change_are_those_in_force() {
     assert!((record.channel("T_I").unwrap()[2399] - 1.0 / 0.3).abs() < 1e-12);
     // The response of the last state continues what was heard before.
     let only = |state: &FamilyState| {
-        let held = state.operator.hold(sixty()).unwrap();
+        let held = state.operator.zoh(sixty()).unwrap();
         (held.nk, held.b, held.f)
     };
     let (nk, b, f) = only(&scenario.last);
@@ -379,7 +379,7 @@ fn parts() -> Vec<Vec<RemnantPart>> {
 #[test]
 fn each_remnant_has_its_share_of_the_variance() {
     for (kind, remnant) in parts().into_iter().enumerate() {
-        let mut scenario = usual();
+        let mut scenario = typical();
         scenario.run_in_s = 20.0;
         let silent = FamilySimulator::new(&scenario).unwrap();
         scenario.remnant = remnant;
@@ -417,7 +417,7 @@ fn each_remnant_has_its_share_of_the_variance() {
 fn remnants_are_of_their_kind() {
     let kinds = parts();
     let remnant_of = |parts: &Vec<RemnantPart>| {
-        let mut scenario = usual();
+        let mut scenario = typical();
         scenario.measurement_s = 400.0;
         scenario.remnant = parts.clone();
         FamilySimulator::new(&scenario).unwrap().run(seed(9), false).unwrap()
@@ -450,7 +450,7 @@ fn remnants_are_of_their_kind() {
 
 #[test]
 fn the_stick_drifts_and_records_are_offset() {
-    let mut scenario = usual();
+    let mut scenario = typical();
     let plain = FamilySimulator::new(&scenario).unwrap().signals(seed(4)).unwrap();
     scenario.stick = Stick {
         offset_e: 0.3,
@@ -486,7 +486,7 @@ fn the_stick_drifts_and_records_are_offset() {
 
 #[test]
 fn runs_are_named_by_their_seed() {
-    let mut scenario = usual();
+    let mut scenario = typical();
     scenario.remnant = parts().remove(3);
     let simulator = FamilySimulator::new(&scenario).unwrap();
     let again = FamilySimulator::new(&scenario).unwrap();
@@ -508,7 +508,7 @@ fn runs_are_named_by_their_seed() {
 #[test]
 fn what_has_no_run_is_refused() {
     let refused = |change: &dyn Fn(&mut FamilyScenario)| {
-        let mut scenario = usual();
+        let mut scenario = typical();
         change(&mut scenario);
         FamilySimulator::new(&scenario).unwrap_err()
     };
@@ -548,7 +548,7 @@ fn what_has_no_run_is_refused() {
 #[test]
 fn a_target_that_is_seen_moves_the_control_before_there_is_an_error() {
     // e = f - y and y = P u, so that at each line of f in the steady state U = Y E + F R e^{j omega preview}.
-    let mut scenario = usual();
+    let mut scenario = typical();
     scenario.disturbance = Excitation::default();
     scenario.target = MultiSine::default().excitation().unwrap();
     scenario.target.random_phases = false;
@@ -571,7 +571,7 @@ fn a_target_that_is_seen_moves_the_control_before_there_is_an_error() {
         let omega = line.omega_rad_s;
         let of = |name: &str| coefficient(record.channel(name).unwrap(), omega);
         let held = |operator: &FamilyOperator| {
-            let held = operator.hold(ts).unwrap();
+            let held = operator.zoh(ts).unwrap();
             let back = Complex64::from_polar(1.0, -omega * ts.s());
             let f = [&[1.0][..], &held.f].concat();
             polynomial::value(&held.b, back) / polynomial::value(&f, back) * back.powi(held.nk as i32)

@@ -148,32 +148,32 @@ fn ranges_without_people_are_refused() {
         )
         .unwrap_err()
     };
-    let usual = Population::default();
+    let typical = Population::default();
     let nobody = draw(Population {
         tau_e_s: Range::new(2.0, 3.0),
-        ..usual
+        ..typical
     });
     assert!(nobody.to_string().contains("widen the ranges"), "{nobody}");
     for bad in [
         Population {
             lead_s: Range::new(2.0, 1.0),
-            ..usual
+            ..typical
         },
         Population {
             zeta_nm: Range::new(0.0, 1.0),
-            ..usual
+            ..typical
         },
         Population {
             integrates: 1.5,
-            ..usual
+            ..typical
         },
         Population {
             remnant_share: Range::new(0.1, 0.95),
-            ..usual
+            ..typical
         },
         Population {
             largest_sensitivity: f64::NAN,
-            ..usual
+            ..typical
         },
     ] {
         assert!(matches!(draw(bad), SimError::Model(_)), "{bad:?}");
@@ -182,5 +182,5 @@ fn ranges_without_people_are_refused() {
         between_runs: -0.1,
         ..Task::default()
     };
-    assert!(Person::draw(&usual, &spread, Plant::Integrator, None, kind, 1, 1).is_err());
+    assert!(Person::draw(&typical, &spread, Plant::Integrator, None, kind, 1, 1).is_err());
 }

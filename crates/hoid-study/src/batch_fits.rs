@@ -26,7 +26,7 @@ pub(crate) struct BatchFits {
 }
 
 impl BatchFits {
-    /// All fits that these estimators need of these runs. None when `go_on` says no before one of
+    /// All fits that these estimators need of these runs. None when `go_on` states no before one of
     /// them.
     pub fn of(
         estimators: &[(&EstimatorCell, Task)],
@@ -54,7 +54,7 @@ impl BatchFits {
         Some(Self { requested, fits })
     }
 
-    /// The fit of a run that an estimator (by its place) needs; none where it needs none.
+    /// The fit of a run that an estimator (by its place) needs; none if it needs none.
     pub fn of_run(&self, estimator: usize, run: usize) -> Option<&Result<Fit, String>> {
         let request = (*self.requested.get(estimator)?)?;
         self.fits.get(request)?.get(run)

@@ -1,6 +1,6 @@
 //! One block of a study: some replications of a cell, with all estimators of the cell.
 
-use hoid_analysis::{AnalysisError, Asked, Recordings};
+use hoid_analysis::{AnalysisError, Recordings, ResolvedRequest};
 use hoid_ident::{Fit, IdentError};
 use hoid_model::Record;
 use hoid_sim::{RunSeed, Simulator};
@@ -52,7 +52,7 @@ pub(crate) fn blocks(plan: &Plan) -> Vec<Block> {
     all
 }
 
-/// Runs a block. `done` is called with the number of estimates made; none when `go_on` says no.
+/// Runs a block. `done` is called with the number of estimates made; none when `go_on` states no.
 pub(crate) fn run_block(
     plan: &Plan,
     schemas: &Schemas,
@@ -109,8 +109,8 @@ struct CellRun<'a> {
 }
 
 impl<'a> CellRun<'a> {
-    /// Estimates of these runs. None when `go_on` says no; it is called before each estimator, some
-    /// of which take a tenth of a second.
+    /// Estimates of these runs. None when `go_on` states no; it is called before each estimator,
+    /// some of which take a tenth of a second.
     fn estimate_all(
         &mut self,
         simulator: &Simulator,
@@ -180,7 +180,7 @@ impl<'a> CellRun<'a> {
             Task::Track(options) => {
                 let kept = self.plan.trace_every.unwrap_or(ERRORS_EVERY);
                 let every = greatest_common_divisor(kept, ERRORS_EVERY);
-                // The recursion reports what went wrong with its start fit.
+                // The recursion reports the error of its start fit.
                 let start = fit.and_then(|fit| fit.as_ref().ok());
                 let trace = track_from(record, options, every, start).map_err(text)?;
                 self.rows.track_row(&trace, record);
@@ -193,26 +193,31 @@ impl<'a> CellRun<'a> {
     }
 
     /// As `hoid identify` does it with the recording.
-    fn analyse(&mut self, asked: &Asked, record: &Record, estimator: &'a EstimatorCell) -> Result<(), String> {
+    fn analyse(
+        &mut self,
+        asked: &ResolvedRequest,
+        record: &Record,
+        estimator: &'a EstimatorCell,
+    ) -> Result<(), String> {
         let text = |error: AnalysisError| error.to_string();
         let recording = Recordings::of_records([record.clone()]);
         match asked {
-            Asked::Operator(how) => {
+            ResolvedRequest::Operator(how) => {
                 let found = how.run(recording).map_err(text)?;
                 self.rows.operator_row(&found)?;
                 self.rows.verdict(&found.verdict);
             }
-            Asked::Change(how) => {
+            ResolvedRequest::Change(how) => {
                 let found = how.run(recording).map_err(text)?;
                 self.rows.change_row(&found)?;
                 self.rows.verdict(&found.verdict);
             }
-            Asked::Remnant(how) => {
+            ResolvedRequest::Remnant(how) => {
                 let found = how.run(recording).map_err(text)?;
                 self.polynomial_row(estimator, found.fit.polynomial_fit(0), &found.data.records[0])?;
                 self.rows.verdict(&found.verdict);
             }
-            Asked::Polynomials(how) => {
+            ResolvedRequest::Polynomials(how) => {
                 let found = how.run(recording).map_err(text)?;
                 self.polynomial_row(estimator, &found.fit.fit, &found.data.records[0])?;
                 self.rows.verdict(&found.verdict);

@@ -2,7 +2,7 @@
 //!
 //! | table | a row is | columns |
 //! |---|---|---|
-//! | fits | one estimator on one replication | what was simulated and estimated; how it ended, what it is worth; theta, operator, remnant with standard errors; error measures |
+//! | fits | one estimator on one replication | the simulated scenario and estimated; how it ended, its reliability; theta, operator, remnant with standard errors; error measures |
 //! | traces | one kept point of a recursion | cell, replication, estimator, t; theta and operator |
 //! | cells | one scenario of the grid | its settings and its true parameters |
 //!
@@ -11,14 +11,14 @@
 
 use std::collections::BTreeMap;
 
-use hoid_analysis::Asked;
+use hoid_analysis::ResolvedRequest;
 use hoid_io::{ColumnKind, ColumnSchema, ColumnValues, OutputColumn, OutputTable, TableSchema};
 
 use crate::plan::{Plan, Task, analysis};
 
 /// The operator's parameters, in the order of all tables.
 pub const OPERATOR: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
-/// What is looked at in a trace: these and the delay, in the order of
+/// Quantities examined in a trace: these and the delay, in the order of
 /// [`hoid_model::uncertainty::OperatorEstimate::rows`].
 pub(crate) const TRACED: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 
@@ -52,7 +52,7 @@ impl Rows {
         }
     }
 
-    /// Begins a row: empty cells, zero counts.
+    /// Starts a row: empty cells, zero counts.
     pub fn begin(&mut self) {
         self.rows += 1;
         for column in &mut self.columns {
@@ -64,7 +64,7 @@ impl Rows {
         }
     }
 
-    /// Sets a number of the row; a column that the table does not have is not looked for twice:
+    /// Sets a number of the row; a column that the table does not have is not searched for twice:
     /// plans decide which there are.
     pub fn real(&mut self, name: &str, value: f64) {
         if let Some(ColumnValues::Real(values)) = self.column(name)
@@ -123,7 +123,7 @@ impl Rows {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Schemas {
     pub fits: TableSchema,
-    /// None where no traces are kept.
+    /// None if no traces are kept.
     pub traces: Option<TableSchema>,
 }
 
@@ -138,7 +138,7 @@ impl Schemas {
     }
 }
 
-/// What to know about each table of a study.
+/// Notes on each table of a study.
 pub(crate) fn comments(plan: &Plan) -> Vec<String> {
     vec![
         format!("hoid {} study {}", env!("CARGO_PKG_VERSION"), plan.name),
@@ -224,7 +224,7 @@ fn fits(plan: &Plan, theta: &[String], comments: Vec<String>) -> TableSchema {
     c.add(Whole, &["decimate"]);
     c.add(Real, &["from_s", "to_s"]);
     c.add(Text, &["status", "reason", "termination"]);
-    let analyses: Vec<&Asked> = plan.estimators.iter().filter_map(|e| e.task.analysis()).collect();
+    let analyses: Vec<&ResolvedRequest> = plan.estimators.iter().filter_map(|e| e.task.analysis()).collect();
     if !analyses.is_empty() {
         c.add(Text, &["verdict", "findings", "form"]);
     }
@@ -249,7 +249,7 @@ fn fits(plan: &Plan, theta: &[String], comments: Vec<String>) -> TableSchema {
         }
     }
     c.add(Real, &["T_n_backward_euler", "K_n_backward_euler"]);
-    if analyses.iter().any(|asked| matches!(asked, Asked::Change(_))) {
+    if analyses.iter().any(|asked| matches!(asked, ResolvedRequest::Change(_))) {
         c.add(Real, &["change_found"]);
     }
     if plan.estimators.iter().any(|e| matches!(e.task, Task::Track(_))) {

@@ -16,17 +16,17 @@ pub(crate) fn part(directory: &Path, block: u64, table: &str) -> PathBuf {
     directory.join("parts").join(format!("{block:06}-{table}.parquet"))
 }
 
-/// Where the seal of a block stands.
+/// Position of the seal of a block.
 pub(crate) fn seal_path(directory: &Path, block: u64) -> PathBuf {
     directory.join("parts").join(format!("{block:06}-seal.json"))
 }
 
-/// Writes the plan beside the results.
+/// Writes the plan next to the results.
 pub(crate) fn write_plan(plan: &Plan, directory: &Path) -> Result<(), StudyError> {
     write_source(&directory.join(PLAN), plan.text())
 }
 
-/// Writes what the results are made of beside them, never over something else of the same name.
+/// Writes what the results are made of next to them, never over something else of the same name.
 pub(crate) fn write_source(path: &Path, text: &str) -> Result<(), StudyError> {
     if path.exists() {
         if hoid_io::read_bytes(path)? == text.as_bytes() {
@@ -39,7 +39,7 @@ pub(crate) fn write_source(path: &Path, text: &str) -> Result<(), StudyError> {
     Ok(hoid_io::write_atomically(path, |file| file.write_all(text.as_bytes()))?)
 }
 
-/// Removes what a killed run was writing: everything in `parts` that has not got its name yet.
+/// Removes the partial output of a killed run: everything in `parts` that has not got its name yet.
 pub(crate) fn sweep(parts: &Path) -> Result<(), StudyError> {
     hoid_io::make_directory(parts)?;
     let unwritable = |source| IoError::Unwritable {

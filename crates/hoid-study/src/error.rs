@@ -3,8 +3,8 @@
 use hoid_io::IoError;
 use thiserror::Error;
 
-/// What can go wrong with a study as a whole. A fit that fails is a row of the results with its
-/// reason, not an error.
+/// Errors of a study as a whole. A fit that fails is a row of the results with its reason, not an
+/// error.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StudyError {
@@ -15,43 +15,45 @@ pub enum StudyError {
         path: String,
         /// Line, from 1, where one can be named.
         line: Option<usize>,
-        /// What is wrong and what was expected.
+        /// The problem and the expected value.
         reason: String,
     },
     /// A file that cannot be read or written.
     #[error(transparent)]
     Io(#[from] IoError),
-    /// A shard that is none.
+    /// A shard that is invalid.
     #[error("shard {found:?}: expected I/N with 1 <= I <= N, such as 2/7")]
     BadShard {
-        /// What was given.
+        /// The value given.
         found: String,
     },
     /// A `study.json` that is not one.
     #[error(
-        "{file}: {reason}; expected the file that hoid wrote: take another directory, or remove this one to start anew"
+        "{file}: {reason}; expected the file that hoid wrote: take another directory, or remove this one to start again"
     )]
     Manifest {
         /// The file.
         file: String,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// Results would be overwritten.
-    #[error("{directory} already holds a study: go on with --resume, or take another directory")]
+    #[error("{directory} already holds a study: continue with --resume, or take another directory")]
     Occupied {
         /// The directory.
         directory: String,
     },
-    /// A plan or manifest of the user in the place of the copy beside the results.
-    #[error("{file} is there already and would be replaced by what is run now; take another directory for the results")]
+    /// A plan or manifest of the user in the place of the copy next to the results.
+    #[error(
+        "{file} is already present and would be replaced by what is run now; take another directory for the results"
+    )]
     SourceThere {
         /// The file.
         file: String,
     },
     /// Parts without checksums.
     #[error(
-        "the blocks of {directory} carry no checksums, an earlier hoid wrote them: run that shard again with --resume, which computes them anew"
+        "the blocks of {directory} carry no checksums, an earlier hoid wrote them: run that shard again with --resume, which computes them again"
     )]
     Unsealed {
         /// The directory.
@@ -62,7 +64,7 @@ pub enum StudyError {
     OtherStudy {
         /// The directory.
         directory: String,
-        /// What differs.
+        /// The differences.
         reason: String,
     },
     /// No results where some were expected.
@@ -72,17 +74,17 @@ pub enum StudyError {
         directory: String,
     },
     /// A study without its tables.
-    #[error("{directory} holds a study that is not finished: go on with --resume, or merge its shards")]
+    #[error("{directory} holds a study that is not finished: continue with --resume, or merge its shards")]
     Unfinished {
         /// The directory.
         directory: String,
     },
-    /// A table that is not what the plan beside it says.
+    /// A table that is not what the plan next to it reports.
     #[error("{file}: {reason}; expected the table that hoid wrote: run the study again")]
     Table {
         /// The file.
         file: String,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// A study that is already whole.
@@ -91,7 +93,7 @@ pub enum StudyError {
         /// The directory.
         directory: String,
     },
-    /// A part that is there twice.
+    /// A part that is duplicated.
     #[error("block {block} is both in {first} and in {second}: name each shard once")]
     Overlap {
         /// The block.
@@ -118,20 +120,20 @@ pub enum StudyError {
     /// Threads that the system does not give.
     #[error("no threads: {reason}; try --jobs 1")]
     Threads {
-        /// What the system says.
+        /// Error reported by the operating system.
         reason: String,
     },
-    /// A pattern of file names that is none.
+    /// A pattern of file invalid names.
     #[error("pattern {pattern:?}: {reason}; expected something like {{subject}}_{{condition}}_{{run}}.csv")]
     Pattern {
         /// The pattern.
         pattern: String,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// A directory without runs.
     #[error(
-        "no file in {directory} is called {pattern}; it has {found}: say by --pattern what their names mean, as {{subject}}_{{run}}.csv"
+        "no file in {directory} is called {pattern}; it has {found}: state by --pattern what their names mean, as {{subject}}_{{run}}.csv"
     )]
     NoRuns {
         /// The directory.

@@ -16,7 +16,7 @@
 //! - `false_alarms`: changes declared more than 5 s after a true one, or before the first; `hours`:
 //!   the time in which they could be. `found`, %: true changes after the start fit that were
 //!   declared within 5 s; `lag`, s: mean time to the declaration of those.
-//! - `diverged`: a coefficient is no number, or its magnitude is beyond 10.
+//! - `diverged`: a coefficient is not a number, or its magnitude is beyond 10.
 //! - `noise_level_obtained`: `(var u - var u0) / var u` with u0 of the run without remnant,
 //!   `noise_level_response`: `var(u - u0) / var u`, which lacks the chance correlation of the two,
 //!   and `noise_level_remnant`: `var n / var u`.
@@ -124,7 +124,7 @@ impl TraceErrors {
     }
 }
 
-/// Time within which a change is to be declared, and during which bands are looked at apart, s.
+/// Time within which a change is to be declared, and during which bands are examined apart, s.
 const THROUGH_S: f64 = 5.0;
 /// Length of the end of a trace whose mean error is taken, s.
 const END_S: f64 = 10.0;
@@ -167,7 +167,7 @@ impl ChangeMeasures {
         let end_s = record.time_s(record.len());
         let changes_s = scenario.schedule.changes_s(end_s);
         let first_s = changes_s.first().copied().unwrap_or(f64::INFINITY);
-        // A two-sided estimate moves from the beginning on; its alarms are those of the causal one.
+        // A two-sided estimate moves from the start on; its alarms are those of the causal one.
         let fitted_s = match trace.options().start {
             StartAt::Span(Some((_, to))) => to,
             _ => trace.updated_from_s(),

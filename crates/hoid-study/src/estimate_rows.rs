@@ -61,12 +61,12 @@ impl<'a> EstimateRows<'a> {
         }
     }
 
-    /// Begins a replication: its estimators are compared with each other.
+    /// Starts a replication: its estimators are compared with each other.
     pub fn begin_replication(&mut self) {
         self.vafs.clear();
     }
 
-    /// What was simulated and what is estimated.
+    /// The simulated and the estimated quantities.
     pub fn begin(&mut self, estimator: &EstimatorCell, replication: u64) {
         let (cell, rows) = (self.cell, &mut self.fits);
         let scenario = cell.resolved.scenario();
@@ -108,7 +108,7 @@ impl<'a> EstimateRows<'a> {
         rows.real("to_s", to);
     }
 
-    /// The estimate that was begun has failed.
+    /// The estimate that was started has failed.
     pub fn failed(&mut self, reason: &str) {
         self.fits.text("status", "failed");
         self.fits.text("reason", reason);
@@ -206,7 +206,7 @@ impl<'a> EstimateRows<'a> {
         if let Some(true_response) = &self.true_response {
             rows.real("response_error", true_response.error_percent(&of.polynomial_fit));
         }
-        // T_I of a pure integration is no number.
+        // T_I of a pure integration is not a number.
         for p in of.parameters.iter().filter(|p| p.value.is_finite()) {
             let estimate = Estimate {
                 value: p.value,
@@ -242,7 +242,7 @@ impl<'a> EstimateRows<'a> {
         Ok(())
     }
 
-    /// What the estimate is worth, and the kinds of what speaks against it.
+    /// Verdict on the estimate, and the kinds of the findings against it.
     pub fn verdict(&mut self, verdict: &Verdict) {
         let against = verdict
             .findings()

@@ -1,10 +1,9 @@
 //! Monte Carlo studies of estimators, and groups of recorded runs.
 //!
-//! How large are bias and spread of an estimate, and do its standard errors say so? One record
-//! cannot tell. A study simulates many: a [`Plan`] names scenarios (operator, task, remnant) and
-//! estimators, each list in it is an axis of a grid, and [`run`] estimates every cell of the grid
-//! in many replications, each with its own random stream. [`Results`] reads the tables back, and a
-//! [`Query`] picks rows:
+//! How large are bias and spread of an estimate, and do its standard errors cover the error? One record cannot
+//! determine. A study simulates many: a [`Plan`] names scenarios (operator, task, remnant) and estimators, each list in
+//! it is an axis of a grid, and [`run`] estimates every cell of the grid in many replications, each with its own random
+//! stream. [`Results`] reads the tables back, and a [`Query`] picks rows:
 //!
 //! ```
 //! use hoid_study::{Plan, Query, Results, RunOptions, run};
@@ -42,11 +41,10 @@
 //! # Ok::<(), hoid_study::StudyError>(())
 //! ```
 //!
-//! Replications are run and stored in blocks. A study that was stopped goes on where it was
-//! (`resume`), shards of a study can run on several machines and are joined by [`merge`], and the
-//! bytes of the tables depend on neither.
+//! Replications are run and stored in blocks. A study that was stopped continues where it was (`resume`), shards of a
+//! study can run on several machines and are joined by [`merge`], and the bytes of the tables depend on neither.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`plan`] | [`Plan`]: scenarios and estimators as grids, read from TOML and checked |
 //! | [`plans`] | plans that come with the program |

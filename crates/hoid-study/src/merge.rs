@@ -21,10 +21,9 @@ use crate::{
 /// Joins the shards of a study.
 ///
 /// # Errors
-/// [`StudyError::OtherStudy`] for shards of different plans, seeds or versions,
-/// [`StudyError::Overlap`] and [`StudyError::Gap`] when blocks are there twice or not at all,
-/// [`StudyError::NoStudy`] for a directory without one, [`StudyError::Unsealed`] for one whose blocks
-/// have no checksums.
+/// [`StudyError::OtherStudy`] for shards of different plans, seeds or versions, [`StudyError::Overlap`] and
+/// [`StudyError::Gap`] when blocks are duplicated or not at all, [`StudyError::NoStudy`] for a directory without one,
+/// [`StudyError::Unsealed`] for one whose blocks have no checksums.
 pub fn merge(shards: &[PathBuf], directory: &Path, csv: bool) -> Result<Outcome, StudyError> {
     let mut plan: Option<(Plan, RunRecord)> = None;
     let mut owners: BTreeMap<u64, &Path> = BTreeMap::new();

@@ -6,14 +6,14 @@ use hoid_model::{Channel, Detrend, Record, SampleTime};
 
 use crate::plan::EstimatorCell;
 
-/// What is done with a record before it is used.
+/// Treatment of a record before it is used.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Preparation {
     /// The span that is taken, s; none for all.
     pub span_s: Option<(f64, f64)>,
     /// Every `decimate`-th sample.
     pub decimate: usize,
-    /// What is subtracted.
+    /// The part subtracted.
     pub detrend: Detrend,
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-/// A description of rows: what it does not name may be anything.
+/// A description of rows; keys that it does not name may have any value.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Query {
     quantity: Option<String>,
@@ -51,7 +51,7 @@ impl std::fmt::Display for Query {
     }
 }
 
-/// What describes a cell and an estimator.
+/// Description of a cell and an estimator.
 #[derive(Debug, Clone)]
 pub(crate) struct RowKey {
     pub cell: u64,
@@ -88,70 +88,70 @@ impl Query {
         self.quantity.as_deref()
     }
 
-    /// Of the cell of this number.
+    /// For the cell of this number.
     #[must_use]
     pub fn cell(mut self, cell: u64) -> Self {
         self.cell = Some(cell);
         self
     }
 
-    /// Of the scenario of this name.
+    /// For the scenario of this name.
     #[must_use]
     pub fn scenario(mut self, scenario: &str) -> Self {
         self.scenario = Some(scenario.to_owned());
         self
     }
 
-    /// Of cells that started from this condition.
+    /// For cells that started from this condition.
     #[must_use]
     pub fn condition(mut self, condition: &str) -> Self {
         self.condition = Some(condition.to_owned());
         self
     }
 
-    /// Of a simulated remnant of this order m0.
+    /// For a simulated remnant of this order m0.
     #[must_use]
     pub fn remnant_order(mut self, order: usize) -> Self {
         self.remnant_order = Some(order);
         self
     }
 
-    /// Of this demanded noise level.
+    /// For this demanded noise level.
     #[must_use]
     pub fn noise_level(mut self, level: f64) -> Self {
         self.noise_level = Some(level);
         self
     }
 
-    /// Of this time constant of the simulated remnant, s.
+    /// For this time constant of the simulated remnant, s.
     #[must_use]
     pub fn t_n_s(mut self, t_n_s: f64) -> Self {
         self.t_n_s = Some(t_n_s);
         self
     }
 
-    /// Of this entry of a list of the plan, such as ("memory", "1s").
+    /// For this entry of a list of the plan, such as ("memory", "1s").
     #[must_use]
     pub fn axis(mut self, key: &str, value: &str) -> Self {
         self.axes.push((key.to_owned(), value.to_owned()));
         self
     }
 
-    /// Of the estimator with this label.
+    /// For the estimator with this label.
     #[must_use]
     pub fn estimator(mut self, label: &str) -> Self {
         self.estimator = Some(label.to_owned());
         self
     }
 
-    /// Of the estimators of this name.
+    /// For the estimators of this name.
     #[must_use]
     pub fn name(mut self, name: &str) -> Self {
         self.name = Some(name.to_owned());
         self
     }
 
-    /// Of this method.
+    /// For this method.
     #[must_use]
     pub fn method(mut self, method: &str) -> Self {
         self.method = Some(method.to_owned());
@@ -165,7 +165,7 @@ impl Query {
         self
     }
 
-    /// Of models with this delay n_k*, samples.
+    /// For models with this delay n_k*, samples.
     #[must_use]
     pub fn nk(mut self, nk: usize) -> Self {
         self.nk = Some(nk);
@@ -179,7 +179,7 @@ impl Query {
         self
     }
 
-    /// Of estimators that took every n-th sample.
+    /// For estimators that took every n-th sample.
     #[must_use]
     pub fn decimate(mut self, decimate: usize) -> Self {
         self.decimate = Some(decimate);

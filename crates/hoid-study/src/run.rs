@@ -1,9 +1,9 @@
 //! Running a study: blocks over threads, parts on disk, resume.
 //!
-//! A block is written as one file a table when it is finished, traces first, beside its place and
-//! then renamed, and at last its seal (`seal`). A study that was killed therefore has whole blocks
-//! and nothing else, and goes on with the blocks that have no seal or do not agree with it. When all blocks are there, the parts are joined in
-//! the order of the plan; which thread or machine made a part does not show.
+//! A block is written as one file a table when it is finished, traces first, next to its place and then renamed, and at
+//! last its seal (`seal`). A study that was killed therefore has whole blocks and nothing else, and continues with the
+//! blocks that have no seal or do not agree with it. When all blocks are there, the parts are joined in the order of
+//! the plan; which thread or machine made a part does not show.
 
 use std::{
     path::{Path, PathBuf},
@@ -32,7 +32,7 @@ pub struct RunOptions {
     pub shard: Option<Shard>,
     /// Threads; none for one a core.
     pub jobs: Option<usize>,
-    /// Go on with a study that was stopped.
+    /// Continue with a study that was stopped.
     pub resume: bool,
     /// Write the tables as CSV instead of Parquet.
     pub csv: bool,
@@ -49,7 +49,7 @@ pub struct Progress {
     pub known: u64,
 }
 
-/// What a run has left behind.
+/// Result of a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Outcome {
     /// True when all blocks of the study (or of its shard) are there.
@@ -58,7 +58,7 @@ pub struct Outcome {
     pub estimates: u64,
     /// The tables; empty for a shard, which waits to be merged.
     pub tables: Vec<PathBuf>,
-    /// What the user should know of the directory: damaged blocks that were computed again.
+    /// Warnings about the directory: damaged blocks that were computed again.
     pub notes: Vec<String>,
 }
 
@@ -66,10 +66,9 @@ pub struct Outcome {
 /// is called before each estimate, and what it stops can be resumed.
 ///
 /// # Errors
-/// [`StudyError::Occupied`] when the directory holds a study without `resume`,
-/// [`StudyError::OtherStudy`] when it is another one, [`StudyError::SourceThere`] where a plan stands
-/// that is another, [`StudyError::Io`] when a file cannot be written or another process works on the
-/// directory.
+/// [`StudyError::Occupied`] when the directory holds a study without `resume`, [`StudyError::OtherStudy`] when it is
+/// another one, [`StudyError::SourceThere`] if there is another plan, [`StudyError::Io`] when a file cannot be written
+/// or another process works on the directory.
 pub fn run(
     plan: &Plan,
     directory: &Path,
@@ -107,7 +106,7 @@ pub fn run(
         let done = done.fetch_add(n, Ordering::Relaxed) + n;
         progress(Progress { done, total, known });
     };
-    // Once one block was stopped, the next do not begin with simulating their runs.
+    // Once one block was stopped, the next do not start with simulating their runs.
     let stopped = AtomicBool::new(false);
     let one = |block: &Block| -> Result<bool, StudyError> {
         if stopped.load(Ordering::Relaxed) {
@@ -146,7 +145,7 @@ pub fn run(
     })
 }
 
-/// Writes what came out of a block.
+/// Writes the results of a block.
 pub(crate) fn write_tables(
     directory: &Path,
     plan_sha256: &str,
@@ -200,7 +199,7 @@ fn prepare(plan: &Plan, directory: &Path, manifest: &RunRecord, resume: bool) ->
     Ok(manifest.clone())
 }
 
-/// Makes a directory that is known ready to go on: what was on its way is removed, and what an
+/// Makes a directory that is known ready to continue: output in progress is removed, and what an
 /// earlier program left without seals is named as sealed from here on, for it has no block yet.
 pub(crate) fn ready(directory: &Path, found: &RunRecord, record: &RunRecord) -> Result<(), StudyError> {
     if found.complete {

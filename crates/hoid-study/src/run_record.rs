@@ -1,8 +1,8 @@
-//! What stands beside the results: `study.json`.
+//! Files next to the results: `study.json`.
 //!
-//! It says which plan and which program made the parts of a directory, and which shard of the study
-//! they are. Two directories belong together when plan, replications, seed and version are the
-//! same.
+//! It reports which plan and which program made the parts of a directory, and which shard of the
+//! study they are. Two directories belong together when plan, replications, seed and version are
+//! the same.
 
 use std::path::Path;
 
@@ -24,7 +24,7 @@ pub(crate) struct RunRecord {
     pub shard: Option<Shard>,
     /// True once the tables are there.
     pub complete: bool,
-    /// True where blocks have seals; an earlier program wrote none.
+    /// True if blocks have seals; an earlier program wrote none.
     #[serde(default)]
     pub sealed: bool,
 }
@@ -46,14 +46,14 @@ impl RunRecord {
         }
     }
 
-    /// What is said of a directory whose blocks have no seals.
+    /// Report about a directory whose blocks have no seals.
     pub fn note_on_seals(&self) -> Option<String> {
         let unsealed = !self.sealed && !self.complete;
         unsealed
             .then(|| "its blocks carry no checksums, an earlier hoid wrote them: all were computed again".to_owned())
     }
 
-    /// The manifest of a directory; none where it holds no study.
+    /// The manifest of a directory; none if it holds no study.
     pub fn read(directory: &Path) -> Result<Option<Self>, StudyError> {
         let path = directory.join(NAME);
         if !path.exists() {
@@ -74,10 +74,10 @@ impl RunRecord {
         Ok(hoid_io::write_atomically(&path, |file| writeln!(file, "{text}"))?)
     }
 
-    /// What keeps two parts from belonging to one study; none when they do.
+    /// Difference that prevents merging two parts into one study; none if they match.
     pub fn differs(&self, other: &Self) -> Option<String> {
         // What a user may have changed on purpose first: each of these also changes the hash of the
-        // plan, which says less.
+        // plan, which reports less.
         let pairs = [
             ("hoid version", self.hoid.clone(), other.hoid.clone()),
             ("study", self.study.clone(), other.study.clone()),

@@ -1,9 +1,9 @@
-//! What a block on disk is: its plan, its number, and the checksum of each of its tables.
+//! Definition of a block on disk: its plan, its number, and the checksum of each of its tables.
 //!
 //! The seal of a block is written after its tables. A block is whole when its seal names this plan
-//! and this block and each table has the bytes that the seal says; a damaged disk, a cut file and a
-//! block in the place of another are found so, and the block is computed again. A block without a
-//! seal was on its way when its process was stopped.
+//! and this block and each table has the bytes that the seal reports; a damaged disk, a cut file
+//! and a block in the place of another are found so, and the block is computed again. A block
+//! without a seal was on its way when its process was stopped.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -30,7 +30,7 @@ struct Seal {
 pub(crate) enum OnDisk {
     Whole,
     Missing,
-    /// Why it is not what it says.
+    /// Why its content does not match its header.
     Damaged(String),
 }
 
@@ -58,7 +58,7 @@ pub(crate) fn write_block(
     })?)
 }
 
-/// What stands on disk of a block.
+/// Part of a block on disk.
 pub(crate) fn on_disk(directory: &Path, plan_sha256: &str, block: u64) -> OnDisk {
     let path = seal_path(directory, block);
     if !path.exists() {
@@ -92,7 +92,7 @@ pub(crate) fn sha256(bytes: &[u8]) -> String {
 /// Damaged blocks that are named one by one.
 const MOST_NAMED: usize = 5;
 
-/// What is said of blocks that are computed again.
+/// Report about blocks that are computed again.
 pub(crate) fn notes_on(damaged: &[(u64, String)]) -> Vec<String> {
     let mut notes: Vec<String> = damaged
         .iter()

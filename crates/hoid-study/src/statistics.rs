@@ -2,7 +2,7 @@
 //!
 //! - Quantiles interpolate linearly between order statistics (type 7 of Hyndman and Fan, *The
 //!   American Statistician* 50, 1996; the default of NumPy and R).
-//! - Whiskers reach to the last value within 1.5 interquartile ranges of the box; what lies beyond
+//! - Whiskers reach to the last value within 1.5 interquartile ranges of the box; anything beyond
 //!   is an outlier (Tukey, 1977).
 //! - Monte Carlo errors: `s / sqrt(n)` of the mean; `sqrt((m4 - s^4 (n-3)/(n-1)) / n) / (2 s)` of
 //!   the standard deviation, with the fourth central moment m4 (Rao, *Linear Statistical
@@ -12,10 +12,10 @@
 
 use hoid_numerics::statistics::{self, finite_sorted, mean};
 
-/// What a box plot and a table say of some values.
+/// Statement of a box plot and a table about some values.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Statistics {
-    /// Values, those that are no numbers left out.
+    /// Values, those that are not numbers left out.
     pub count: usize,
     /// Values left out.
     pub missing: usize,
@@ -48,7 +48,7 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// The statistics of some values; of none, all but the counts are no numbers.
+    /// The statistics of some values; of none, all but the counts are not numbers.
     pub fn of(values: &[f64]) -> Self {
         let sorted = finite_sorted(values.iter().copied());
         let (n, missing) = (sorted.len(), values.len() - sorted.len());
@@ -131,7 +131,7 @@ pub fn quantile(sorted: &[f64], p: f64) -> f64 {
     statistics::quantile(sorted, p).unwrap_or(f64::NAN)
 }
 
-/// Median of values; those that are no numbers are left out.
+/// Median of values; those that are not numbers are left out.
 pub fn median(values: &[f64]) -> f64 {
     statistics::quantile_of(values, 0.5).unwrap_or(f64::NAN)
 }

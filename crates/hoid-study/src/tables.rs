@@ -9,7 +9,7 @@ use hoid_io::{ColumnValues, OutputTable};
 
 use crate::StudyError;
 
-/// Where a table stands: as Parquet, or else as CSV.
+/// Position of a table: as Parquet, or else as CSV.
 pub(crate) fn table_path(directory: &Path, table: &str) -> PathBuf {
     let parquet = directory.join(format!("{table}.parquet"));
     if parquet.exists() {

@@ -1,6 +1,6 @@
-//! The true values of what is estimated.
+//! The true values of the estimated quantities.
 
-use hoid_analysis::Asked;
+use hoid_analysis::ResolvedRequest;
 use hoid_model::{
     remnant::{RemnantDiscretisation, RemnantFilter},
     schedule::Schedule,
@@ -20,7 +20,7 @@ pub fn true_value(cell: &Cell, estimator: &EstimatorCell, name: &str) -> f64 {
         Task::Track(_) => (scenario.measurement_s, scenario.measurement_s),
         _ => estimator.span_s.unwrap_or((0.0, scenario.measurement_s)),
     };
-    if let Some(Asked::Change(_)) = estimator.task.analysis() {
+    if let Some(ResolvedRequest::Change(_)) = estimator.task.analysis() {
         return of_change(cell, name);
     }
     let [first, last] = [from, to].map(|t| cell.resolved.parameters_at(t).operator);
@@ -33,7 +33,7 @@ pub fn true_value(cell: &Cell, estimator: &EstimatorCell, name: &str) -> f64 {
     } else {
         after
     };
-    // Of a form that is not the lead K is the gain at rest too.
+    // For a form that is not the lead K is the gain at rest too.
     let named = if name == "K" { "K_e" } else { name };
     if let Some(i) = OPERATOR.iter().position(|p| *p == named) {
         return state.operator[i];
@@ -59,7 +59,8 @@ fn close(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-2 * a.abs().max(b.abs())
 }
 
-/// Of an operator whose gains change: before (1) and after (2) the change, its instant and its rate.
+/// For an operator whose gains change: before (1) and after (2) the change, its instant and its
+/// rate.
 fn of_change(cell: &Cell, name: &str) -> f64 {
     let scenario = cell.resolved.scenario();
     let ends = cell.truth();
@@ -67,7 +68,7 @@ fn of_change(cell: &Cell, name: &str) -> f64 {
     let place = |parameter: &str| OPERATOR.iter().position(|p| *p == parameter);
     let end = |digit| name.strip_suffix(digit).and_then(place);
     match (name, &scenario.schedule) {
-        // Who changes there and back is not who is looked for.
+        // Who changes there and back is not who is searched for.
         (_, Schedule::Alternating { .. }) => f64::NAN,
         ("t_M", schedule) => schedule.change_s().unwrap_or(f64::NAN),
         ("G", schedule) => schedule.rate_per_s().unwrap_or(f64::NAN),
@@ -84,8 +85,8 @@ fn of_change(cell: &Cell, name: &str) -> f64 {
 /// Coefficients of D and the innovation variance of the remnant as it is held over each sample.
 fn of_noise_model(cell: &Cell, estimator: &EstimatorCell, k_n: f64, name: &str) -> f64 {
     let remnant = cell.resolved.scenario().remnant;
-    let by_polynomials =
-        matches!(estimator.task, Task::Fit(_)) || matches!(estimator.task.analysis(), Some(Asked::Polynomials(_)));
+    let by_polynomials = matches!(estimator.task, Task::Fit(_))
+        || matches!(estimator.task.analysis(), Some(ResolvedRequest::Polynomials(_)));
     if estimator.decimate > 1 || !by_polynomials {
         return f64::NAN;
     }

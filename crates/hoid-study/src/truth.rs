@@ -1,4 +1,4 @@
-//! What was simulated: the settings and true parameters of each cell.
+//! The simulated scenario: the settings and true parameters of each cell.
 
 use hoid_io::{ColumnKind, ColumnSchema, OutputTable, TableSchema};
 use hoid_model::{

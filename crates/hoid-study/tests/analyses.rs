@@ -131,7 +131,8 @@ fn is_operator(table: &OutputTable, row: usize, found: &Identified) {
     }
 }
 
-/// Each row is what the analysis of that run gives, to the last bit, with the options of the plan.
+/// Each row is the result of the analysis of that run, to the last bit, with the options of the
+/// plan.
 #[test]
 fn a_row_is_the_analysis_of_the_run() {
     let (directory, fits) = fits(PLAN);
@@ -180,7 +181,7 @@ fn a_row_is_the_analysis_of_the_run() {
         assert_eq!(real(&fits, &name, at), estimate.value, "{name}");
     }
 
-    // The summary counts the verdicts, and takes errors against what was simulated.
+    // The summary counts the verdicts, and takes errors against the simulated scenario.
     let results = Results::read(directory.path()).unwrap();
     let one = |quantity: &str, scenario: &str, name: &str| {
         let query = Query::of(quantity).scenario(scenario).name(name);
@@ -190,13 +191,13 @@ fn a_row_is_the_analysis_of_the_run() {
         let levels = ["trustworthy", "doubtful", "not_determined"].map(|level| one(level, scenario, name));
         assert!((levels.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{name}: {levels:?}");
     }
-    // Nobody who changes is told as constant.
+    // No one who changes is reported as constant.
     assert_eq!(one("trustworthy", "change", "lead"), 0.0);
     assert!(one("bias_t_M", "change", "change").abs() < 2.0);
     assert!(one("bias_K_e2", "change", "change").abs() < 30.0);
 }
 
-/// The lead of a form with a lag is no estimate of the lead that was simulated.
+/// The lead of a form with a lag is not an estimate of the lead that was simulated.
 #[test]
 fn a_lead_of_another_form_has_no_bias() {
     let text = PLAN.replace("form = \"lead\"", "form = \"lead-lag\"");

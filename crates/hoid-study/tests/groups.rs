@@ -50,7 +50,7 @@ fn manifest(directory: &Path) -> Manifest {
     assert_eq!((manifest.runs.len(), others.len()), (8, 1));
     manifest.analysis.delay_s = (0.25, 0.32);
     manifest.analysis.form = "lead".to_owned();
-    // What was written is what is read.
+    // The data read are the data written.
     assert_eq!(Manifest::parse(&manifest.text(), "group.toml").unwrap(), manifest);
     manifest
 }
@@ -161,7 +161,7 @@ fn a_group_gives_its_people_back_and_goes_on_when_it_was_stopped() {
     assert_eq!(
         status.iter().filter(|s| **s == fitted).count(),
         4,
-        "nothing says that C4 changes"
+        "nothing states that C4 changes"
     );
     assert!(!status.contains(&changes) && summary.failures.is_empty());
     for (who, k_e) in [("A", 0.09), ("B", 0.108)] {
@@ -283,8 +283,8 @@ fn a_bad_file_is_a_row_and_a_bad_manifest_an_error() {
     );
 }
 
-/// Runs of two people who change at the seam are joined, and what is found in the frequency domain
-/// is what was simulated.
+/// Runs of two people who change at the seam are joined, and the findings in the frequency domain
+/// is the simulated scenario.
 #[test]
 fn joined_runs_settle_and_fits_agree_with_the_describing_function() {
     let data = recorded();
@@ -374,7 +374,7 @@ run = "2"
         of("phase_margin_deg")
     );
 
-    // The manifest says where the change is, or the seam does.
+    // The manifest states where the change is, or the seam does.
     let both = text.replace(
         "[[runs]]\nfile = \"A_C1_1.csv\"\nsubject",
         "[conditions.\"A then B\"]\nchange_s = 5.0\n\n[[runs]]\nfile = \"A_C1_1.csv\"\nsubject",
@@ -384,7 +384,7 @@ run = "2"
 }
 
 /// A sample of delay more in every file is a sample of nk more, by the operator of the person (C1)
-/// and by the fits to all runs at once (C4, which is said to change).
+/// and by the fits to all runs at once (C4, which is reported to change).
 #[test]
 fn the_delay_moves_with_the_output() {
     let data = recorded();
@@ -436,7 +436,7 @@ fn the_delay_moves_with_the_output() {
             assert_eq!(after - before, 1.0, "{before} {after}");
         }
     }
-    // Where the manifest says that u is late, the operator is the same, and the orders are not.
+    // Where the manifest states that u is late, the operator is the same, and the orders are not.
     let mut told = manifest.clone();
     told.conditions.get_mut("C1").unwrap().offset_samples = 1.0;
     let (late_nk, told_s) = found(&told, late.path(), "told");

@@ -1,5 +1,5 @@
-//! Plans of studies, manifests of groups and scenarios whose text was changed: read or refused in
-//! words that name the file, and never a panic; what is read can be read again.
+//! Plans of studies, manifests of groups and scenarios whose text was changed: read or refused as
+//! text that name the file, and never a panic; data that are read can be read again.
 #![allow(clippy::unwrap_used)]
 
 use std::{fs, path::Path};
@@ -86,7 +86,7 @@ condition = "fo"
 run = "1"
 "#;
 
-/// Values that stand where others belong.
+/// Values that are where others belong.
 const VALUES: [&str; 30] = [
     "",
     "0",
@@ -123,7 +123,7 @@ const CHARACTERS: [char; 14] = [
     '[', ']', '{', '}', '"', '\'', '=', '.', ',', '#', '\n', '\0', '\u{1b}', '\u{fffd}',
 ];
 
-/// What is done to a text.
+/// Treatment of a text.
 #[derive(Debug, Clone)]
 enum Change {
     Value(Index, Index),

@@ -101,7 +101,7 @@ fn bad_plans_name_line_and_remedy() {
             "orders.nk = 29",
             "orders.nk = 29\nspan_s = [50.0, 20.0]",
             14,
-            vec!["span_s", "beginning before its end"],
+            vec!["span_s", "start before its end"],
         ),
         (
             "orders.nk = 29",
@@ -240,7 +240,7 @@ fn cells_follow_the_order_of_the_file() {
     assert_ne!(plan.hash(), plan.clone().with_replications(11).unwrap().hash());
 }
 
-/// A plan of before the method had its name of now is the same plan.
+/// A plan from before the method had its current name is the same plan.
 #[test]
 fn an_earlier_name_of_a_method_is_read() {
     let by = |method: &str| {

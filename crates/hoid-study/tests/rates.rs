@@ -1,4 +1,4 @@
-//! Groups that are recorded at a high rate: decimated by themselves, the same people and lines.
+//! Groups that are recorded at a high rate: decimated automatically, the same people and lines.
 #![allow(clippy::unwrap_used)]
 
 mod common;

@@ -1,4 +1,4 @@
-//! Sampling trouble that was planted is found where it is, and none where there is none.
+//! Sampling trouble that was planted is found where it is, and none if there is none.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;

@@ -285,7 +285,7 @@ fn text<'a>(table: &'a OutputTable, column: &str, row: usize) -> &'a str {
     }
 }
 
-/// A row is what simulating and fitting that run by itself gives, to the last bit.
+/// A row is the result of simulating and fitting that run by itself gives, to the last bit.
 #[test]
 fn a_row_is_the_run_by_itself() {
     let (directory, _) = whole(2);

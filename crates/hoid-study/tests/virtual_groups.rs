@@ -1,4 +1,4 @@
-//! Virtual experiments: groups of simulated people, with what is true beside them.
+//! Virtual experiments: groups of simulated people, with what is true next to them.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -69,7 +69,7 @@ fn a_virtual_experiment_has_its_truth_beside_it() {
     assert!(z.iter().all(|z| z.abs() < 5.0), "{z:?}");
     assert!((z.iter().sum::<f64>() / 16.0).abs() < 1.0, "{z:?}");
 
-    // Troubles: an uneven t is refused as it stands and read when it is to be resampled.
+    // Troubles: an uneven t is refused unchanged and read when it is to be resampled.
     let troubled = VirtualExperiment {
         subjects: 1,
         runs: 1,
@@ -182,7 +182,8 @@ fn grey_box_error_bars_hold_in_a_virtual_experiment() {
     assert!((bj - 29.0).abs() < 2.0 && arx > bj + 3.0, "ARX {arx}, BJ {bj}");
 }
 
-/// Virtual people: their files are those of recorded experiments, with all that is true beside them.
+/// Virtual people: their files are those of recorded experiments, with all that is true next to
+/// them.
 #[test]
 fn virtual_people_have_their_truth_beside_them() {
     let experiment = PeopleExperiment {
@@ -216,7 +217,7 @@ fn virtual_people_have_their_truth_beside_them() {
         let offset = reals(&truth, "offset_e")[row];
         assert!((0..2400).all(|k| (e[k] + y[k] - offset).abs() < 1e-9));
     }
-    // Of a lead-lag K/T_I is there always, T_I where it is finite.
+    // For a lead-lag K/T_I is there always, T_I where it is finite.
     let forms = texts(&truth, "form");
     let ratio = reals(&truth, "K_over_T_I");
     assert!((0..12).all(|row| (forms[row] == "lead") == ratio[row].is_nan()));
@@ -241,6 +242,6 @@ fn virtual_people_have_their_truth_beside_them() {
         let directory = directory.path().join("bad");
         let refused = simulate_people(&bad, &directory, &|| ());
         assert!(matches!(refused, Err(StudyError::Virtual { .. })));
-        assert!(!directory.exists(), "nothing is written of what is refused");
+        assert!(!directory.exists(), "nothing is written of the refused input");
     }
 }

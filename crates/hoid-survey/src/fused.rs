@@ -1,5 +1,5 @@
-//! Two methods in one, as the reference text proposes it (section VII): recursive least squares for
-//! the gains, with the neuromuscular coefficients "adjusted based on recursive Box-Jenkins
+//! Two methods in one, as the thesis proposes it (section VII): recursive least squares for the
+//! gains, with the neuromuscular coefficients "adjusted based on recursive Box-Jenkins
 //! calculations".
 //!
 //! The prediction-error method with a forgetting matrix gives F and D; least squares has only B
@@ -25,7 +25,7 @@ use hoid_ident::{IdentError, settings, settings::Bounds};
 use hoid_track::{
     Memory, MemoryOptions, Sample, StabilityOptions,
     building::{
-        About, Gain, Kernel, Plan, Recursion, RecursiveMethod, Scaled, Setup, StartState, StepOutcome, USUAL_LIMIT,
+        About, DEFAULT_LIMIT, Gain, Kernel, Plan, Recursion, RecursiveMethod, Scaled, Setup, StartState, StepOutcome,
         bounded, check_operator_orders, error_bars,
     },
 };
@@ -37,7 +37,7 @@ settings! {
     /// Options of least squares with the poles of the prediction-error method.
     pub struct FusedOptions {
         /// Covariance P at the start: X times the unit matrix, in units of the innovation variance
-        /// (the reference text: 0.1)
+        /// (the thesis: 0.1)
         #[setting(bounds(Bounds::PositiveFinite), default("that of the start fit; 1e6 where there is none"))]
         pub covariance: Option<f64> = None,
         /// Standard deviations beyond which an innovation moves the estimate no further
@@ -57,13 +57,13 @@ impl RecursiveMethod for FusedOptions {
         About {
             name: "fused",
             help: "least squares for B with the poles of rpem, for comparison",
-            source: "the reference text, section VII",
+            source: "the thesis, section VII",
             structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
             defaults: &[("memory", "2.56s for b, inf for the others")],
         }
     }
 
-    fn usual_memory(&self, parameter: &str) -> Memory {
+    fn default_memory(&self, parameter: &str) -> Memory {
         if parameter.starts_with('b') {
             Memory::Seconds(2.56)
         } else {
@@ -98,7 +98,7 @@ impl RecursiveMethod for FusedOptions {
     }
 
     fn limit(&self) -> f64 {
-        self.limit.unwrap_or(USUAL_LIMIT)
+        self.limit.unwrap_or(DEFAULT_LIMIT)
     }
 
     fn stable(&self) -> Stable {
@@ -110,7 +110,7 @@ impl RecursiveMethod for FusedOptions {
     }
 }
 
-/// RLS beside RPEM.
+/// RLS next to RPEM.
 pub(crate) struct FusedRecursion {
     rpem: Box<dyn Recursion>,
     rls: Rls<AnyShape, B, Gain<B>>,
@@ -243,7 +243,7 @@ impl Recursion for FusedRecursion {
         &self.theta
     }
 
-    /// That of each method; between them nothing is known, and zero is put.
+    /// The value for each method; between them nothing is known, and zero is put.
     fn covariance(&self, into: &mut [f64]) -> bool {
         let known = self.rpem.covariance(into);
         let p = self.theta.len();

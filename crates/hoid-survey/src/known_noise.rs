@@ -1,5 +1,5 @@
-//! What methods in the operator's parameters have in common that know the noise model from a batch fit: their
-//! checks, and T_L of gains.
+//! Common parts of methods in the operator's parameters with the noise model of a batch fit: their checks, and T_L of
+//! gains.
 
 use hoid_ident::IdentError;
 use hoid_track::{
@@ -10,7 +10,7 @@ use hoid_track::{
 /// Largest order of the noise model.
 pub(crate) const LARGEST_ND: usize = 8;
 
-/// Checks what a method needs that has a model of how the person changes.
+/// Checks the requirements of a method that has a model of how the person changes.
 ///
 /// # Errors
 /// [`IdentError::BadOption`].

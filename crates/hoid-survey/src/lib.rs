@@ -1,4 +1,4 @@
-//! The recursive methods of the literature beside those of hoid: for comparison.
+//! The recursive methods of the literature next to those of hoid: for comparison.
 //!
 //! Each follows the source that its file names, and is a [`Method`](hoid_track::Method) as the default is: the tracker,
 //! the guard, saved states, traces and verdicts of [`hoid_track`] are those of all. This crate sees all
@@ -12,7 +12,7 @@
 //! let simulator = Simulator::new(&Scenario::condition(Condition::C4))?;
 //! let record = simulator.run(RunSeed::default(), false)?;
 //! let physical = hoid_survey::method("physical")?;
-//! let options = TrackOptions::usual(physical, 29).with(&[("memory_of", "K_e=4s")])?;
+//! let options = TrackOptions::default_for(physical, 29).with(&[("memory_of", "K_e=4s")])?;
 //! let trace = track(&record, &options, 100)?;
 //!
 //! // The task changes at 40.96 s, and K_e_dot rises from .036 to .084 s.

@@ -1,6 +1,5 @@
-//! A network of a single linear layer that learns the equalization parameters, as section 2.4 of the
-//! reference text describes that of its reference [14]. The rule: B. Widrow and M. E. Hoff,
-//! *Adaptive switching circuits*, IRE WESCON 1960.
+//! A network of a single linear layer that learns the equalization parameters, as section 2.4 of the thesis describes
+//! that of its reference [14]. The rule: B. Widrow and M. E. Hoff, *Adaptive switching circuits*, IRE WESCON 1960.
 //!
 //! The inputs are the discretised pilot model with unit equalization: y_0 and y_1, the responses of
 //! the neuromuscular part to the delayed error and to its rate, each over its size s_i, the root mean
@@ -45,19 +44,19 @@ impl RecursiveMethod for LinearNetworkOptions {
     fn about(&self) -> About {
         About {
             name: NAME,
-            help: "single linear layer that learns K_e and K_e_dot behind a known neuromuscular part, for comparison",
-            source: "the reference text, section 2.4; Widrow and Hoff 1960",
+            help: "single linear layer that learns K_e and K_e_dot after a known neuromuscular part, for comparison",
+            source: "the thesis, section 2.4; Widrow and Hoff 1960",
             structures: &[Structure::BoxJenkins, Structure::General],
             defaults: &[],
         }
     }
 
     /// It follows from the time constant of learning.
-    fn usual_memory(&self, _parameter: &str) -> Memory {
+    fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Infinite
     }
 
-    fn usual_nd(&self) -> Option<usize> {
+    fn default_nd(&self) -> Option<usize> {
         Some(1)
     }
 
@@ -105,7 +104,7 @@ impl RecursiveMethod for LinearNetworkOptions {
         true
     }
 
-    fn memory_in_words(&self) -> Option<String> {
+    fn memory_as_text(&self) -> Option<String> {
         Some(format!(
             "a weight is learned with a time constant of {} s",
             self.learning
@@ -317,7 +316,7 @@ mod tests {
         let simulator = Simulator::new(&scenario).unwrap();
         let options = TrackOptions {
             start: StartAt::Span(Some((0.0, 30.72))),
-            ..TrackOptions::usual(Method::from(LinearNetworkOptions::default()), 29)
+            ..TrackOptions::default_for(Method::from(LinearNetworkOptions::default()), 29)
         };
         let mut mean = 0.0;
         for replication in 0..RUNS {

@@ -69,7 +69,7 @@ pub fn is_for_comparison(method: &Method) -> bool {
         .any(|own| own.name() == method.name())
 }
 
-/// What is known of each method: what command line, plans, Python and the book read.
+/// Known properties of each method: what command line, plans, Python and the book read.
 pub fn registry() -> Vec<MethodSpec> {
     methods().iter().map(Method::spec).collect()
 }
@@ -79,8 +79,8 @@ fn plain(text: &str) -> String {
     text.trim().to_ascii_lowercase()
 }
 
-/// The method of a name, with its defaults. An earlier name stands in plans and in saved trackers, and is read
-/// as well; who can tell the user says it ([`renamed`]).
+/// The method of a name, with its defaults. An earlier name is in plans and in saved trackers, and is read as well; who
+/// can determine the user reports it ([`renamed`]).
 ///
 /// # Errors
 /// [`IdentError::BadOption`] for a name that no method has.
@@ -93,7 +93,7 @@ pub fn method(text: &str) -> Result<Method, IdentError> {
     found.ok_or_else(|| bad("the method", text.to_owned(), &format!("one of {}", names.join(", "))))
 }
 
-/// Of an earlier name of a method that of now, and the sentence that says so.
+/// For an earlier name of a method the current one, and the sentence that reports it.
 pub fn renamed(text: &str) -> Option<(&'static str, String)> {
     let earlier = plain(text);
     let found = methods()
@@ -178,7 +178,7 @@ mod tests {
         for method in methods() {
             for structure in Structure::ALL {
                 let orders = match structure {
-                    Structure::BoxJenkins => method.usual_orders(29),
+                    Structure::BoxJenkins => method.default_orders(29),
                     _ => structure.operator_orders(if structure.has_input() { 29 } else { 0 }),
                 };
                 let options = TrackOptions::new(method.clone(), structure, orders);

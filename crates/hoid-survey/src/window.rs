@@ -55,18 +55,18 @@ impl RecursiveMethod for WindowOptions {
         About {
             name: "window",
             help: "a batch fit of the last seconds, again and again",
-            source: "the reference text, section VII",
+            source: "the thesis, section VII",
             structures: &Structure::ALL,
             defaults: &[],
         }
     }
 
-    /// Not used: the window is what it remembers.
-    fn usual_memory(&self, parameter: &str) -> Memory {
+    /// Not used: the window is its memory.
+    fn default_memory(&self, parameter: &str) -> Memory {
         short_for_b(parameter)
     }
 
-    fn memory_in_words(&self) -> Option<String> {
+    fn memory_as_text(&self) -> Option<String> {
         let window = self.window.text().unwrap_or_default();
         Some(format!("window of {window}, a fit every {} samples", self.refit))
     }
@@ -349,8 +349,8 @@ impl WindowRecursion {
     }
 }
 
-/// A fit whose search came to rest; one that did not says more about the limit of iterations than
-/// about the window.
+/// A fit whose search came to rest; one that did not carries more information about the limit of
+/// iterations than about the window.
 fn settled(fit: Fit) -> Result<Fit, IdentError> {
     if fit.termination().converged() {
         Ok(fit)

@@ -20,7 +20,7 @@ fn record(seed: u64) -> Record {
 }
 
 fn options(method: Method, guard: &str) -> TrackOptions {
-    let (structure, orders) = (method.usual_structure(), method.usual_orders(29));
+    let (structure, orders) = (method.default_structure(), method.default_orders(29));
     TrackOptions::new(method, structure, orders)
         .with(&[("guard", guard)])
         .unwrap()
@@ -42,7 +42,7 @@ fn a_guard_that_never_acts_changes_no_digit() {
             let without = track(&record, &options(method(), "no"), 16).unwrap();
             assert!(with.is_guarded() && !without.is_guarded());
             assert_eq!(with.faults(), [], "{}", method());
-            // As bits: there is none before the estimate begins.
+            // As bits: there is none before the estimate starts.
             let bits = |numbers: &[f64]| numbers.iter().map(|x| x.to_bits()).collect::<Vec<u64>>();
             for row in 0..with.len() {
                 assert_eq!(with.theta(row), without.theta(row), "{}", method());
@@ -123,7 +123,7 @@ fn a_restored_guard_goes_on_with_the_same_digits() {
             assert_eq!(first.is_paused(), second.is_paused());
             for k in stop..6700 {
                 let (e, u) = hostile(&record, k);
-                // NaN is no innovation, so that outcomes can be compared.
+                // NaN is not an innovation, so that outcomes can be compared.
                 let of =
                     |tracker: &mut Tracker| -> (Outcome, Option<GuardEvent>) { (tracker.step(e, u), tracker.event()) };
                 assert_eq!(of(&mut first), of(&mut second), "{} at {k}", method());
@@ -150,7 +150,7 @@ fn what_was_found_and_done_is_told_with_its_place() {
     }
     use {GuardAction as A, GuardKind as K};
     assert_eq!(told[0], (K::Outlier, A::Held, 4000, 1));
-    // Beginning and end of the gap, of the larger span and of the frozen one.
+    // Start and end of the gap, of the larger span and of the frozen one.
     let of = |kind: K, action: A| told.iter().find(|t| (t.0, t.1) == (kind, action));
     assert!(of(K::Missing, A::Resumed).is_some(), "{told:?}");
     let level = of(K::Level, A::Restarted).unwrap();

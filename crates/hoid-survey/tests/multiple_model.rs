@@ -121,7 +121,7 @@ fn responses_times_gains_are_the_held_operator_and_their_derivatives_are_differe
 #[test]
 fn a_point_that_moves_takes_the_past_with_it() {
     // What the filters remember after a move differs in the second order from that of filters that
-    // always stood there.
+    // always was there.
     let error = |step: f64| {
         let mut noise = Noise(9);
         let (mut moved, mut there) = (
@@ -147,7 +147,7 @@ fn one_hypothesis_with_a_known_neuromuscular_system_is_least_squares() {
     let d = [-0.85];
     let data = operator(3000, 3, 0.02, |_| S1);
     let prior = [1e-4, 1e-4];
-    // So many residuals that sigma^2 stays what it is.
+    // A given number of residuals that sigma^2 stays what it is.
     let sigma2 = 4e-4;
     let fixed = InnovationVariance::new(sigma2, 1e30, 1.0);
     let mut bank = bank(

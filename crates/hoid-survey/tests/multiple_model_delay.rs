@@ -114,7 +114,7 @@ fn a_delay_that_changes_is_found_and_named() {
             assert!((total - 1.0).abs() < 1e-12);
             declared.extend(bank.bank().change().map(|c| (k, c)));
         }
-        // Two births of other delays after the change; a second one may say better what changed.
+        // Two births of other delays after the change; a second one may report better what changed.
         let (k, change) = declared[0];
         assert!((6000..6300).contains(&k), "{seed}: {k} {change:?}");
         let last = declared[declared.len() - 1].1;

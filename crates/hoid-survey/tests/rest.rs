@@ -27,7 +27,7 @@ fn record(condition: Condition) -> Record {
 /// The answer to a step of e, and the second in which its end is found, s.
 const ANSWER_S: f64 = 4.0;
 
-/// What stands still.
+/// What stays constant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stand {
     /// e and u are zero.
@@ -126,16 +126,16 @@ fn through(options: &TrackOptions, record: &Record, stand: Stand, length_s: f64)
 fn all_options() -> Vec<TrackOptions> {
     let mut all: Vec<TrackOptions> = hoid_survey::methods()
         .into_iter()
-        .map(|method| TrackOptions::usual(method, DELAY))
+        .map(|method| TrackOptions::default_for(method, DELAY))
         .collect();
-    all.extend(TrackOptions::usual(Method::adaptive(), DELAY).with(&[("replay", "0")]));
+    all.extend(TrackOptions::default_for(Method::adaptive(), DELAY).with(&[("replay", "0")]));
     for (name, text) in [
         ("memory", "100"),
         ("forgetting", "directional"),
         ("forgetting", "variable"),
     ] {
         for method in [Method::rls(), Method::rpem()] {
-            all.extend(TrackOptions::usual(method, DELAY).with(&[(name, text)]));
+            all.extend(TrackOptions::default_for(method, DELAY).with(&[(name, text)]));
         }
     }
     all
@@ -218,7 +218,8 @@ fn a_long_rest_is_as_a_short_one_and_tracking_goes_on_behind_it() {
     }
 }
 
-/// A record with a rest: the trace says when nothing arrived, and one without is not told of any.
+/// A record with a rest: the trace reports when nothing arrived, and one without is not informed of
+/// any.
 #[test]
 fn the_time_without_excitation_is_a_finding() {
     let whole = record(Condition::C1);
@@ -240,7 +241,7 @@ fn the_time_without_excitation_is_a_finding() {
         hoid_survey::window(),
         hoid_survey::fused(),
     ] {
-        let options = TrackOptions::usual(method.clone(), DELAY);
+        let options = TrackOptions::default_for(method.clone(), DELAY);
         let trace = track(&with_rest, &options, 50).unwrap();
         let said = trace.verdict(&with_rest, None).unwrap();
         let said: Vec<&str> = said.reasons().collect();
@@ -250,7 +251,7 @@ fn the_time_without_excitation_is_a_finding() {
         );
         assert_eq!(track(&whole, &options, 50).unwrap().faults(), [], "{method}");
     }
-    let as_it_comes = TrackOptions::usual(Method::rls(), DELAY)
+    let as_it_comes = TrackOptions::default_for(Method::rls(), DELAY)
         .with(&[("guard", "no")])
         .unwrap();
     assert_eq!(track(&with_rest, &as_it_comes, 50).unwrap().faults(), []);

@@ -44,7 +44,7 @@ fn every_method_takes_samples_or_says_that_the_sample_time_is_too_long() {
     for method in hoid_survey::methods() {
         for ts in sample_times() {
             let sample_time = SampleTime::new(ts).unwrap();
-            for options in starts(&TrackOptions::told_nothing(method.clone(), sample_time)) {
+            for options in starts(&TrackOptions::without_prior(method.clone(), sample_time)) {
                 let made = Tracker::new(&options, None, sample_time);
                 if ts >= LONGEST_S {
                     assert!(refused_as_it_should_be(&made.unwrap_err(), ts), "{method} at {ts} s");
@@ -69,7 +69,7 @@ fn a_start_from_a_span_and_a_plan_say_so_too() {
         let (e, u) = (0..400).map(signals).unzip();
         let record = Record::new(sample_time, Channel::new("e", "", e), Channel::new("u", "", u)).unwrap();
         for method in hoid_survey::methods() {
-            let options = TrackOptions::usual(method.clone(), 2);
+            let options = TrackOptions::default_for(method.clone(), 2);
             let made = Tracker::new(&options, Some(&record), sample_time);
             assert!(refused_as_it_should_be(&made.unwrap_err(), ts), "{method} at {ts} s");
             let ranges = ranges_of(&method, options.structure, &NamedOrders::new(), &[], sample_time).unwrap();
@@ -83,7 +83,7 @@ fn a_start_from_a_span_and_a_plan_say_so_too() {
 fn adaptive_by_default_takes_every_sample_time_of_recordings() {
     for ts in [0.001, 0.01, 1.0 / 60.0, 0.1] {
         let sample_time = SampleTime::new(ts).unwrap();
-        let options = TrackOptions::told_nothing(Method::default(), sample_time);
+        let options = TrackOptions::without_prior(Method::default(), sample_time);
         assert!(Tracker::new(&options, None, sample_time).is_ok(), "{ts}");
     }
 }

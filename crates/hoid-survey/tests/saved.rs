@@ -1,4 +1,4 @@
-//! Trackers as numbers: every method goes on with the same digits, and nothing out of them ends the process.
+//! Trackers as numbers: every method continues with the same digits, and nothing out of them ends the process.
 #![allow(clippy::unwrap_used)]
 
 use hoid_model::{
@@ -35,7 +35,7 @@ fn a_restored_tracker_goes_on_with_the_same_digits() {
         TrackOptions::new(Method::rls(), Structure::Arx, Structure::Arx.operator_orders(29)),
         of(physical()),
         of(multiple_model()),
-        TrackOptions::usual(Method::adaptive(), 29),
+        TrackOptions::default_for(Method::adaptive(), 29),
         of(fused()),
         of(ekf()),
         of(ukf()),
@@ -93,8 +93,8 @@ fn a_restored_tracker_goes_on_with_the_same_digits() {
     }
 }
 
-/// Numbers that were changed and sealed anew, as nobody does by accident: the tracker is refused or goes on, and
-/// no place, length or bound out of them ends the process.
+/// Numbers that were changed and sealed again, as no one does by accident: the tracker is refused or continues, and no
+/// place, length or bound out of them ends the process.
 #[test]
 fn numbers_that_were_changed_and_sealed_again_end_nothing() {
     let record = record();
@@ -106,7 +106,7 @@ fn numbers_that_were_changed_and_sealed_again_end_nothing() {
         of(Method::rpem()),
         of(physical()).with(&[("track_delay", "0.2..0.35")]).unwrap(),
         of(multiple_model()),
-        TrackOptions::usual(Method::adaptive(), 29)
+        TrackOptions::default_for(Method::adaptive(), 29)
             .with(&[("replay", "5")])
             .unwrap(),
         of(ekf()),

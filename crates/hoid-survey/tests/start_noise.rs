@@ -1,4 +1,4 @@
-//! A start whose operator is that of the grey box keeps the noise model that was asked for.
+//! A start whose operator is that of the grey box keeps the noise model that was requested.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeMap;
@@ -25,7 +25,7 @@ fn span() -> Record {
 fn outside() -> TrackOptions {
     let mut own = MultipleModelOptions::default();
     own.bounds.bound = BTreeMap::from([("omega_nm".to_owned(), Constraint::Between(20.0, 30.0))]);
-    TrackOptions::usual(own.into(), 29)
+    TrackOptions::default_for(own.into(), 29)
 }
 
 #[test]

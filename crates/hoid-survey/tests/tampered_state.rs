@@ -72,7 +72,7 @@ fn saved() -> &'static Saved {
     })
 }
 
-/// What is done to numbers.
+/// Treatment of numbers.
 #[derive(Debug, Clone)]
 enum Tampering {
     Set(Index, f64),
@@ -158,7 +158,7 @@ proptest! {
         if options != others && numbers.len() != of_others.len() {
             prop_assert!(Tracker::restored(options, saved.sample_time, of_others).is_err());
         }
-        // Of the same length they are numbers of that tracker: no panic, whatever they mean.
+        // For the same length they are numbers of that tracker: no panic, whatever they mean.
         let orders = options.structure.operator_orders(nk);
         let other = TrackOptions { orders, ..options.clone() };
         let _ = Tracker::restored(&other, saved.sample_time, numbers);

@@ -35,7 +35,7 @@ fn options(range: Option<&str>) -> TrackOptions {
     let options = TrackOptions {
         start: StartAt::Span(Some((0.0, 30.72))),
         at_rad_s: vec![2.5],
-        ..TrackOptions::usual(Method::rpem(), NK)
+        ..TrackOptions::default_for(Method::rpem(), NK)
     };
     match range {
         Some(range) => options.with(&[("track_delay", range)]).unwrap(),
@@ -100,7 +100,7 @@ fn the_response_of_physical_has_the_delay_of_its_row() {
     let physical = TrackOptions {
         start: StartAt::Span(Some((0.0, 30.72))),
         at_rad_s: vec![2.5],
-        ..TrackOptions::usual(hoid_survey::physical(), NK)
+        ..TrackOptions::default_for(hoid_survey::physical(), NK)
     };
     // A memory that lets the delay go.
     let options = physical
@@ -112,7 +112,7 @@ fn the_response_of_physical_has_the_delay_of_its_row() {
         trace.operator(last).unwrap().tau_e_s.value,
         trace.response(last, 0).unwrap().phase_deg().value,
     );
-    // That of the operator of the row, not of the delay of the start fit.
+    // The value for the operator of the row, not of the delay of the start fit.
     let found = trace.operator(last).unwrap();
     let square = found.omega_nm_rad_s.value.powi(2);
     let lead = (2.5 * found.t_l_s.value).atan();
@@ -122,7 +122,7 @@ fn the_response_of_physical_has_the_delay_of_its_row() {
     assert!((tau - 0.28).abs() > 0.02, "the delay has moved: {tau}");
 }
 
-/// Phase of the true operator of the last sample at 2.5 rad/s, behind its hold.
+/// Phase of the true operator of the last sample at 2.5 rad/s, after its hold.
 fn true_phase_deg(record: &Record) -> f64 {
     let of = |name: &str| record.channel(name).unwrap()[record.len() - 1];
     let (omega, square) = (2.5_f64, of("omega_nm").powi(2));

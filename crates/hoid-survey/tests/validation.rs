@@ -29,7 +29,7 @@ fn run(noise_level: f64, seed: u64) -> Record {
 fn options(method: Method) -> TrackOptions {
     TrackOptions {
         start: StartAt::Span(Some((0.0, 30.72))),
-        ..TrackOptions::usual(method, NK)
+        ..TrackOptions::default_for(method, NK)
     }
 }
 
@@ -71,7 +71,7 @@ fn the_best_of_the_grid_is_taken() {
         assert_eq!(chosen.method.covariance(), Some(choice.covariance));
         let most = choice.candidates.iter().map(|(_, vaf)| *vaf).fold(0.0, f64::max);
         assert_eq!(choice.vaf(), most, "{method}");
-        // What it says is what the trace with it has.
+        // Its output is that of the trace.
         let trace = track(&record, &chosen, 1).unwrap();
         assert_eq!(trace.vaf_of(&other).unwrap(), (most, choice.span_s));
         assert!(most > 80.0, "{method}: {choice:?}");
@@ -138,11 +138,11 @@ fn what_cannot_choose_is_refused_with_what_to_do() {
     assert!(says(&alone, &options(Method::rls())).contains("no input"));
 }
 
-/// With a power of zero nothing is changed, to the last bit; with the usual one P shrinks and the estimate
-/// of a person who changes is better in what the text names, the oscillations.
+/// With a power of zero nothing is changed, to the last bit; with the default one P shrinks and the estimate of a
+/// person who changes is better in what the text names, the oscillations.
 #[test]
 fn the_covariance_shrinks_where_less_is_explained() {
-    let (mut usual, mut updated, mut differs) = (0.0, 0.0, false);
+    let (mut default, mut updated, mut differs) = (0.0, 0.0, false);
     for seed in 20..26 {
         let (record, other) = (run(0.2, seed), run(0.2, seed + 100));
         let settings = [
@@ -163,15 +163,15 @@ fn the_covariance_shrinks_where_less_is_explained() {
             assert_eq!(plain.theta(k), left.theta(k), "{k}");
             differs |= plain.theta(k) != by_vaf.theta(k);
         }
-        usual += plain.vaf_of(&other).unwrap().0;
+        default += plain.vaf_of(&other).unwrap().0;
         updated += by_vaf.vaf_of(&other).unwrap().0;
     }
     println!(
         "VAF of the second run, mean of six: {:.2} %, with updates {:.2} %",
-        usual / 6.0,
+        default / 6.0,
         updated / 6.0
     );
-    assert!(differs && updated > usual, "{usual} {updated}");
+    assert!(differs && updated > default, "{default} {updated}");
     let (record, other) = (run(0.1, 30), run(0.1, 31).span(0.0, 60.0).unwrap());
     let says = |other: &Record, options: TrackOptions| {
         let updates = CovarianceUpdates::default();
@@ -183,7 +183,7 @@ fn the_covariance_shrinks_where_less_is_explained() {
     assert!(says(&record, options(hoid_survey::window())).contains("rls or rpem"));
     let tracked = options(Method::rpem()).with(&[("track_delay", "0.2..0.4")]).unwrap();
     assert!(says(&record, tracked).contains("without track_delay"));
-    // A second run in which nothing happens says nothing.
+    // A second run in which nothing happens carries no information.
     let n = record.len();
     let silent = Record::new(
         record.sample_time(),

@@ -1,4 +1,4 @@
-//! Why the reference text could not be reproduced.
+//! Why the thesis could not be reproduced.
 
 use hoid_ident::IdentError;
 use hoid_io::IoError;
@@ -34,9 +34,9 @@ pub enum ThesisError {
     Unsuited {
         /// The comparator.
         method: &'static str,
-        /// What is wrong.
+        /// The problem.
         quantity: String,
-        /// As it was found.
+        /// The value as found.
         found: String,
         /// As it should be.
         expected: String,
@@ -44,10 +44,10 @@ pub enum ThesisError {
     /// An estimator that failed, or an option that it does not have.
     #[error(transparent)]
     Estimator(Box<IdentError>),
-    /// A model that has no meaning.
+    /// An invalid model.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// A model that is no operator.
+    /// A model that is not an operator.
     #[error(transparent)]
     NotConvertible(#[from] NotConvertible),
     /// A scenario that cannot be simulated.

@@ -1,6 +1,6 @@
-//! The reference text, reproduced: its studies, tables, figures and claims (A. Ortiz Moya,
-//! *Time-Varying Human-Operator Identification with Box-Jenkins Models*, MSc thesis, Delft
-//! University of Technology, 2023).
+//! The thesis, reproduced: its studies, tables, figures and claims (A. Ortiz Moya, *Time-Varying
+//! Human-Operator Identification with Box-Jenkins Models*, MSc thesis, Delft University of
+//! Technology, 2023).
 //!
 //! The text compares ARX and Box-Jenkins models of the human operator, in batches and recursively,
 //! by simulation. [`reproduce`] runs its studies, draws its tables and figures, tests what it
@@ -25,7 +25,7 @@
 //! # Ok::<(), hoid_thesis::ThesisError>(())
 //! ```
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`plans`] | the studies of the text as named plans |
 //! | [`reproduction`] | tables, figures and claims in a directory, from the results of the studies |
@@ -34,7 +34,7 @@
 //! | [`experiment`] | the experiment of the text with virtual people |
 //! | [`claims`] | statements of the text, tested by the results of the named plans |
 //!
-//! Studies and reports know nothing of this crate.
+//! Studies and reports do not depend on this crate.
 
 pub mod claims;
 pub mod comparators;

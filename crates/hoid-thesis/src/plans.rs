@@ -1,5 +1,4 @@
-//! The studies of the reference text, as named plans, beside those that come with the program
-//! anyway.
+//! The studies of the thesis, as named plans, next to those that come with the program anyway.
 
 use hoid_study::{NamedPlan, PLANS};
 
@@ -34,7 +33,7 @@ pub const SURVEY: &NamedPlan = &NamedPlan {
     text: include_str!("../plans/survey.toml"),
 };
 
-/// The named plans of the list: those of the reference text, and those of what goes beyond it.
+/// The named plans of the list: those of the thesis, and those beyond it.
 pub fn named_plans() -> impl Iterator<Item = &'static NamedPlan> {
     TEXT_PLANS.iter().chain(PLANS)
 }

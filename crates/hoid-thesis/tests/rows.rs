@@ -1,5 +1,5 @@
-//! The page of the book that says where each row of the reference text is: what it names is made,
-//! what is made is named, and its numbers are those of its rows.
+//! The page of the book that reports where each row of the thesis is: what it names is made, what
+//! is made is named, and its numbers are those of its rows.
 #![allow(clippy::unwrap_used)]
 
 use std::{collections::BTreeSet, path::Path};
@@ -33,7 +33,7 @@ fn count(cell: &str) -> usize {
     numbers.split(", ").map(of).sum()
 }
 
-/// What stands between backticks, ranges one by one.
+/// What is between backticks, ranges one by one.
 fn quoted(cell: &str) -> Vec<String> {
     let parts: Vec<&str> = cell.split('`').collect();
     let mut names = Vec::new();
@@ -70,11 +70,11 @@ fn the_page_of_rows_is_true() {
     }
     for name in formulas.iter().chain(&proposals).flat_map(|row| quoted(row[2])) {
         if name.starts_with("hoid-") {
-            assert!(root.join("crates").join(&name).is_file(), "{name} is no file");
+            assert!(root.join("crates").join(&name).is_file(), "{name} is not a file");
         } else if made.contains(&name) || plans.contains(name.as_str()) {
             named.insert(name);
         } else {
-            // Options and methods stand in the options of the program.
+            // Options and methods are in the options of the program.
             let options = include_str!("../../../docs/src/reference/command-line.md");
             assert!(name == CLAIMS || options.contains(&name), "{name} is nothing");
         }

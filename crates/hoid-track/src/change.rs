@@ -1,4 +1,4 @@
-//! When a person changed, as a method says it, and the published baseline.
+//! When a person changed, as a method reports it, and the published baseline.
 //!
 //! The baseline looks at the loop from outside: an adaptation is taken to be needed while the
 //! tracking error or its rate is larger than k of its standard deviations before the change (R. A.
@@ -32,14 +32,14 @@ pub struct Change {
     /// Change of K_e, K_e_dot, omega_nm, zeta_nm, the logarithm of the innovation variance and
     /// tau_e, each over its standard error.
     pub z: [f64; 6],
-    /// True where the operator was held against before as a whole: their response has changed then, even where
-    /// no single quantity has by two standard errors.
+    /// True if the operator was held against before as a whole: their response has changed then, even where no single
+    /// quantity has by two standard errors.
     pub of_operator: bool,
 }
 
-/// Change over its standard error from which a quantity is said to have changed.
+/// Change over its standard error from which a quantity is reported to have changed.
 const CHANGED: f64 = 2.0;
-/// What [`Change::z`] is of.
+/// Quantities of [`Change::z`].
 const QUANTITIES: [&str; 6] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", REMNANT, "tau_e"];
 const REMNANT: &str = "remnant";
 
@@ -49,9 +49,9 @@ impl Change {
         1.0 / (1.0 + (-self.odds).exp())
     }
 
-    /// Names of what changed by more than two standard errors: `K_e`, `K_e_dot`, `omega_nm`,
-    /// `zeta_nm`, `remnant`, `tau_e`. Where the operator as a whole was found to have changed, and no single
-    /// quantity of theirs did by so much, `response` stands for them.
+    /// Names of the change by more than two standard errors: `K_e`, `K_e_dot`, `omega_nm`, `zeta_nm`, `remnant`,
+    /// `tau_e`. Where the operator as a whole was found to have changed, and no single quantity of theirs did by so
+    /// much, `response` represents them.
     pub fn changed(&self) -> Vec<&'static str> {
         let each = || QUANTITIES.into_iter().zip(self.z).filter(|(_, z)| z.abs() > CHANGED);
         let is_named = each().any(|(name, _)| name != REMNANT);

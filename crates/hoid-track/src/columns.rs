@@ -26,11 +26,10 @@ impl Trace {
         names
     }
 
-    /// `t`, each coefficient, each parameter of the operator, and gain in dB and phase in degrees at the
-    /// frequencies of the options (`gain_db@2.5`, `phase_deg@2.5`), and with a controlled element
-    /// `crossover_rad_s` and `phase_margin_deg`, with their standard errors behind each (`_se`). NaN
-    /// stands where a row has no operator or no crossover, or a value no standard error.
-    /// `operators` are those of [`Trace::operators`].
+    /// `t`, each coefficient, each parameter of the operator, and gain in dB and phase in degrees at the frequencies of
+    /// the options (`gain_db@2.5`, `phase_deg@2.5`), and with a controlled element `crossover_rad_s` and
+    /// `phase_margin_deg`, with their standard errors after each (`_se`). NaN is where a row has no operator or no
+    /// crossover, or a value no standard error. `operators` are those of [`Trace::operators`].
     pub fn estimate_columns(&self, operators: &[Result<OperatorEstimate, NotConvertible>]) -> Columns {
         let mut columns: Columns = vec![("t".to_owned(), self.times_s().to_vec())];
         let mut add = |name: &str, estimates: &[Option<Estimate>]| {

@@ -1,24 +1,23 @@
-//! A delay that is followed in whole samples, beside any recursion whose delay is given: one
-//! recursion for each delay of a range, and the one that foretells best is reported (D. T. Magill,
-//! *Optimal adaptive estimation of sampled stochastic processes*, 1965; with evidence that is
-//! forgotten as in A. H. Jazwinski, *Stochastic Processes and Filtering Theory*, 1970, section 8.8).
+//! A delay that is tracked in whole samples, next to any recursion whose delay is given: one recursion for each delay
+//! of a range, and the one that predicts best is reported (D. T. Magill, *Optimal adaptive estimation of sampled
+//! stochastic processes*, 1965; with evidence that is forgotten as in A. H. Jazwinski, *Stochastic Processes and
+//! Filtering Theory*, 1970, section 8.8).
 //!
 //! With the a-priori innovation eps_k of the recursion with the delay k and sigma^2 of the one that is
 //! reported, the logarithm of the evidence is
 //!
 //! `L_k(t) = gamma L_k(t-1) - eps_k(t)^2/(2 sigma^2)`,  `gamma = 1 - Ts/T`,
 //!
-//! with T = 10 s: evidence of a delay from before a change fades as the change recedes. Another delay
-//! is reported once it leads by 2. Its recursion has run all the time, so that the estimate does
-//! not begin anew. The weights `p_k` are those of `exp(L_k/3)`, for neighbouring innovations of a model that is
-//! not right say the same thing more than once (without the 3 bands of 95 % hold 82 % where the delay
-//! stays, with it 95); tau_e is told as their mean, and its standard error as the root of their variance and of that of a delay that lies evenly between two
-//! samples, `Ts^2/12`.
+//! with T = 10 s: evidence of a delay from before a change fades as the change recedes. Another delay is reported once
+//! it leads by 2. Its recursion has run all the time, so that the estimate does not start again. The weights `p_k` are
+//! those of `exp(L_k/3)`, for neighbouring innovations of a model that is not right state the same thing more than once
+//! (without the 3 bands of 95 % hold 82 % where the delay stays, with it 95); tau_e is reported as their mean, and its
+//! standard error as the root of their variance and of that of a delay that lies evenly between two samples, `Ts^2/12`.
 //!
-//! Before there is evidence the delay lies about that of the start, `L_k = -(tau_k - tau_start)^2/(2 s^2)`
-//! with s = 0.03 s; that fades like all evidence. An innovation counts up to [`LARGEST`] standard deviations, so that one outlier does not decide.
-//! While the estimate stands still nothing is learnt of the delay: all but one of the recursions have
-//! the coefficients of another delay then.
+//! Before there is evidence the delay lies about that of the start, `L_k = -(tau_k - tau_start)^2/(2 s^2)` with s =
+//! 0.03 s; that fades like all evidence. An innovation counts up to [`LARGEST`] standard deviations, so that one
+//! outlier does not decide. While the estimate stays constant nothing is learnt of the delay: all but one of the
+//! recursions have the coefficients of another delay then.
 
 use hoid_core::state::{State, visit_all};
 use hoid_model::{Orders, SampleTime, uncertainty::Estimate};
@@ -35,13 +34,13 @@ use crate::{
 const MEMORY_S: f64 = 10.0;
 /// Lead of the logarithm of the evidence with which another delay is taken.
 const LEAD: f64 = 2.0;
-/// What the evidence is divided by where it tells how sure the delay is.
+/// Definition of the evidence is divided by where it shows how sure the delay.
 const TEMPER: f64 = 3.0;
 /// Standard deviations up to which an innovation counts.
 const LARGEST: f64 = 5.0;
 /// Standard deviation of the delay about that of the start before there is any evidence, s.
 const BEFORE_S: f64 = 0.03;
-/// Most delays that are followed.
+/// Most delays that are tracked.
 const MOST: usize = 128;
 
 /// One recursion for each delay.
@@ -123,7 +122,7 @@ impl DelayBank {
         let mut most = f64::NEG_INFINITY;
         for (evidence, innovation) in self.evidence.iter_mut().zip(&self.innovations) {
             let square = (innovation * innovation / variance).min(LARGEST * LARGEST);
-            // A recursion that has lost its numbers foretells nothing.
+            // A recursion that has lost its numbers predicts nothing.
             let square = if square.is_nan() { LARGEST * LARGEST } else { square };
             *evidence = self.keeps * *evidence - 0.5 * square;
             most = most.max(*evidence);

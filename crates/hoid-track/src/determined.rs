@@ -1,8 +1,8 @@
 //! Which parameters of an operator the data determine.
 //!
-//! A parameter is determined where it stands more than two standard errors from zero and, where the
+//! A parameter is determined where it is more than two standard errors from zero and, where the
 //! method supposes something of it before the first sample, where the data have at least halved that
-//! variance: else what stands there is the supposition.
+//! variance: else what is there is the supposition.
 
 use hoid_model::uncertainty::OperatorEstimate;
 
@@ -48,8 +48,8 @@ impl Trace {
         determined(&self.options().method, operator)
     }
 
-    /// Columns that say where a parameter is determined, 1 or 0, for methods that suppose something
-    /// before the first sample: `K_e_determined` and so on.
+    /// Columns that report where a parameter is determined, 1 or 0, for methods that suppose
+    /// something before the first sample: `K_e_determined` and so on.
     pub fn determined_columns(
         &self,
         operators: &[Result<OperatorEstimate, hoid_model::NotConvertible>],

@@ -8,7 +8,7 @@ use hoid_ident::{
 };
 
 /// Rate of the gradient when none is given.
-const USUAL_RATE: f64 = 0.1;
+const DEFAULT_RATE: f64 = 0.1;
 
 /// The words for the rules.
 const WORDS: [&str; 6] = [
@@ -50,7 +50,7 @@ impl Value for ForgettingRule {
             "window" => Ok(Self::Window),
             "variable" => Ok(Self::Variable),
             "directional" => Ok(Self::Directional),
-            "gradient" => Ok(Self::Gradient(USUAL_RATE)),
+            "gradient" => Ok(Self::Gradient(DEFAULT_RATE)),
             _ => Err(format!("one of {}", WORDS.join(", "))),
         }
     }
@@ -84,7 +84,7 @@ impl ForgettingRule {
     }
 
     fn rate() -> Setting {
-        Setting::of("rate", &USUAL_RATE)
+        Setting::of("rate", &DEFAULT_RATE)
             .bounds(Bounds::Between(0.0, 2.0))
             .help(&["For forgetting by the gradient: step size"])
     }

@@ -17,7 +17,7 @@ use crate::{forgetting::ForgettingRule, setup::Setup, shared_options::WindupGuar
 
 /// Where nothing excites a parameter, its variance in P may grow to this multiple of the level that
 /// it has with the excitation of the start fit: the gain after a silence is that of three times the
-/// usual standard error.
+/// typical standard error.
 const ROOM_TO_GROW: f64 = 10.0;
 /// The same for a start covariance that comes from no fit, as a multiple of it.
 pub const ROOM_WITHOUT_FIT: f64 = 1e4;
@@ -63,7 +63,7 @@ impl<const N: usize> Gain<N> {
             .map(|(_, memory)| memory.lambda(sample_time))
             .collect::<Result<Vec<f64>, _>>()?;
         let shortest = lambda.iter().copied().fold(1.0, f64::min);
-        // Where no fit says what the innovation variance is, P and drift are in the units of the
+        // Where no fit shows what the innovation variance is, P and drift are in the units of the
         // parameters.
         let unit = if from.variance > 0.0 { from.variance } else { 1.0 };
         let padded =
@@ -143,7 +143,7 @@ impl<const N: usize> Gain<N> {
 
 /// A gain with a covariance that can be changed from outside.
 pub trait Scaled {
-    /// P times a factor; false where there is no P that stays.
+    /// P times a factor; false if there is no P that stays.
     fn scale(&mut self, factor: f64) -> bool;
 }
 

@@ -1,10 +1,10 @@
-//! The idle head of a record: what was recorded before the run began.
+//! The idle head of a record: what was recorded before the run started.
 //!
-//! Somebody who waits for the run to begin is not tracking. A fit of such samples takes a delay and
+//! A person who waits for the run to start is not tracking. A fit of such samples takes a delay and
 //! poles from nothing, and gives them small standard errors. The head is the longest run of first
 //! samples in which both e and u stay within [`SHARE`] of their later size about their first second,
 //! or within a step of their resolution; the size is the 90 % quantile of the distance from the
-//! median in the second half of the record. A head shorter than [`LEAST_S`] is none: signals begin
+//! median in the second half of the record. A head shorter than [`LEAST_S`] is none: signals start
 //! near zero.
 
 use hoid_model::Record;
@@ -21,7 +21,7 @@ const STEPS: f64 = 1.01;
 /// Largest step of a resolution, as a share of the size.
 const COARSE: f64 = 0.2;
 
-/// Samples at the beginning of a record in which neither e nor u moves; 0 where there are few, all
+/// Samples at the start of a record in which neither e nor u moves; 0 where there are few, all
 /// where neither ever moves.
 pub fn idle_head(record: &Record) -> usize {
     let second = (1.0 / record.sample_time().s()).round().max(1.0) as usize;
@@ -32,7 +32,7 @@ pub fn idle_head(record: &Record) -> usize {
         let size = upper_quantile(&mut off, SIZE).unwrap_or(0.0);
         let steps = || later.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|d| *d > 0.0);
         let step = steps().fold(f64::INFINITY, f64::min);
-        // Noise has no resolution: its differences are no multiples of the smallest.
+        // Noise has no resolution: its differences are not multiples of the smallest.
         let multiple = |d: f64| (d / step - (d / step).round()).abs() < 1e-3;
         let coarse = step <= COARSE * size && steps().all(multiple);
         let room = if coarse {
@@ -57,9 +57,9 @@ pub fn idle_head(record: &Record) -> usize {
     }
 }
 
-/// The span of a record that gives the start fit when none is named, s: the first third behind the
+/// The span of a record that gives the start fit when none is named, s: the first third after the
 /// idle head.
-pub fn usual_start_span(record: &Record) -> (f64, f64) {
+pub fn default_start_span(record: &Record) -> (f64, f64) {
     let head = match idle_head(record) {
         all if all >= record.len() => 0,
         head => head,
@@ -99,13 +99,13 @@ mod tests {
             let record = simulator.run(seed, false).unwrap();
             assert_eq!(idle_head(&record), 0);
             let third = record.len() as f64 * 0.01 / 3.0;
-            assert_eq!(usual_start_span(&record), (0.0, third));
+            assert_eq!(default_start_span(&record), (0.0, third));
             let noise: Vec<f64> = (0..1500).map(|k| 1e-3 * (f64::from(k) * 12.9898).sin()).collect();
             let offset: Vec<f64> = noise.iter().map(|n| 0.3 + n * 0.1).collect();
             let idle = with_head(&record, &noise, &offset);
             let head = idle_head(&idle);
             assert!((1490..1540).contains(&head), "{head}");
-            let (from, to) = usual_start_span(&idle);
+            let (from, to) = default_start_span(&idle);
             assert!((from - 15.0).abs() < 0.5 && (to - from - third).abs() < 0.2);
             // Half a second is not worth a word, and e alone no rest.
             assert_eq!(idle_head(&with_head(&record, &noise[..50], &offset[..50])), 0);
@@ -119,6 +119,6 @@ mod tests {
         let still = |name: &str, x: f64| Channel::new(name, "", vec![x; 500]);
         let record = Record::new(hoid_model::SampleTime::HUNDREDTH, still("e", 0.0), still("u", 2.0)).unwrap();
         assert_eq!(idle_head(&record), 500);
-        assert_eq!(usual_start_span(&record).0, 0.0);
+        assert_eq!(default_start_span(&record).0, 0.0);
     }
 }

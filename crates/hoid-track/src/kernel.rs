@@ -1,4 +1,4 @@
-//! The recursions of the real-time kernel behind one face: room for the parameters, the delay line,
+//! The recursions of the real-time kernel after one face: room for the parameters, the delay line,
 //! the covariance in units of the parameters.
 
 use hoid_core::{
@@ -39,7 +39,7 @@ pub fn too_many(parameters: usize) -> IdentError {
     }
 }
 
-/// What a recursion is made of.
+/// Components of a recursion.
 pub struct Plan<'a> {
     /// Structure, orders and options.
     pub setup: &'a Setup,

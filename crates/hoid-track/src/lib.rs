@@ -15,7 +15,7 @@
 //!
 //! let simulator = Simulator::new(&Scenario::condition(Condition::C4))?;
 //! let record = simulator.run(RunSeed::default(), false)?;
-//! let options = TrackOptions::usual(Method::rpem(), 29).with(&[("memory_of", "b=4s")])?;
+//! let options = TrackOptions::default_for(Method::rpem(), 29).with(&[("memory_of", "b=4s")])?;
 //! let trace = track(&record, &options, 100)?;
 //!
 //! // The task changes at 40.96 s, and K_e_dot rises from .036 to .084 s.
@@ -24,28 +24,28 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
-//! | `methods`, `method` | [`Method`]: the recursive methods, a file or folder each; what each says of itself |
+//! | `methods`, `method` | [`Method`]: the recursive methods, a file or folder each; the self-description of each |
 //! | [`building`] | what a method is made of, for those in other crates |
 //! | `options`, `shared_options`, `memory`, `forgetting` | [`TrackOptions`]: what is to be tracked, and how |
-//! | `person_prior` | [`PersonPrior`]: what is known of a person before the first sample |
-//! | `request`, `plan` | [`TrackRequest`]: what is asked for; [`TrackPlan`]: orders that are still open, searched on the start span |
+//! | `person_prior` | [`PersonPrior`]: the prior knowledge of a person before the first sample |
+//! | `request`, `plan` | [`TrackRequest`]: what is requested; [`TrackPlan`]: orders that are still open, searched on the start span |
 //! | `setup`, `start`, `start_noise`, `gain` | what a recursion is built of: structure, start, way of forgetting |
 //! | `kernel`, `recursion` | RLS and RPEM of the real-time kernel; what every recursion does |
-//! | `predictor`, `past`, `reported` | signals and reports for methods that are not of the kernel |
+//! | `predictor`, `history`, `reported` | signals and reports for methods that are not of the kernel |
 //! | `response` | [`Response`]: gain and phase of an estimate at a frequency |
 //! | `open_loop` | [`OpenLoop`]: crossover and phase margin of an estimate with the controlled element |
-//! | `tracker`, `outcome`, `saved` | [`Tracker`]: one sample at a time; a tracker as numbers, to go on elsewhere |
+//! | `tracker`, `outcome`, `saved` | [`Tracker`]: one sample at a time; a tracker as numbers, to continue elsewhere |
 //! | `live` | [`Live`]: the warm-up of a stream, then its tracker |
 //! | `guard` | samples and spans that no tracking makes, kept from the recursion |
-//! | `standing` | what a recursion without a guard does while nothing arrives |
-//! | `idle` | what was recorded before a run began |
+//! | `stationary` | what a recursion without a guard does while nothing arrives |
+//! | `idle` | what was recorded before a run started |
 //! | `over_record`, `two_sided` | [`track()`]: a record; the two-sided estimate of a recorded run |
-//! | `trace`, `columns`, `summary`, `in_words` | [`Trace`]: the estimate at every sample, as columns and in words |
-//! | `judgement` | what a trace, and the estimate of a moment, is worth: [`Trace::verdict`] |
+//! | `trace`, `columns`, `summary`, `as_text` | [`Trace`]: the estimate at every sample, as columns and as text |
+//! | `diagnostics` | what a trace, and the estimate of a moment, is worth: [`Trace::verdict`] |
 //! | `determined` | which parameters the data determine |
-//! | `delay_bank` | a delay in whole samples, followed beside any recursion |
+//! | `delay_bank` | a delay in whole samples, followed next to any recursion |
 //! | `validation` | what a trace explains of another run; the covariance at the start that this chooses |
 //! | `change` | [`Change`]: when a person changed |
 //!
@@ -54,23 +54,23 @@
 //! estimate stays, so that no sample counts twice and the error bars hold. With the text's own
 //! start, `P_0 = 0.1 I` (eq. 38, 5.41, 5.55), the estimate moves from the first sample on.
 //!
-//! **Samples that are not as they should be** never reach the filters. A value is a fault when it
-//! is not a finite number or larger than [`TrackOptions::largest`]. An error e is then replaced by
-//! the last good one, an output u by the one-step prediction, and the estimate stays at that
-//! sample. Each is counted. Behind a guard (`guard`; by default for `adaptive`) so are
-//! outliers and spans that no tracking makes.
+//! **Samples that are not as they should be** never reach the filters. A value is a fault when it is not a finite
+//! number or larger than [`TrackOptions::largest`]. An error e is then replaced by the last good one, an output u by
+//! the one-step prediction, and the estimate stays at that sample. Each is counted. After a guard (`guard`; by default
+//! for `adaptive`) so are outliers and spans that no tracking makes.
 
 pub mod building;
 mod change;
 mod columns;
 mod delay_bank;
 mod determined;
+mod diagnostics;
+mod display;
 mod forgetting;
 mod gain;
 mod guard;
+mod history;
 mod idle;
-mod in_words;
-mod judgement;
 mod kernel;
 mod live;
 mod memory;
@@ -80,7 +80,6 @@ mod open_loop;
 mod options;
 mod outcome;
 mod over_record;
-mod past;
 mod person_prior;
 mod plan;
 mod predictor;
@@ -92,9 +91,9 @@ mod saved;
 mod seal;
 mod setup;
 mod shared_options;
-mod standing;
 mod start;
 mod start_noise;
+mod stationary;
 mod summary;
 mod trace;
 mod tracker;
@@ -106,7 +105,7 @@ pub use columns::{Columns, value_of};
 pub use determined::Determined;
 pub use forgetting::ForgettingRule;
 pub use guard::{GuardAction, GuardChannel, GuardChoice, GuardEvent, GuardKind, GuardOptions, TrackFault};
-pub use idle::{idle_head, usual_start_span};
+pub use idle::{default_start_span, idle_head};
 pub use live::{Choose, Live, LiveOutcome, WarmUp};
 pub use memory::{CommonMemory, Memory, MemoryOptions};
 pub use method::RecursiveMethod;

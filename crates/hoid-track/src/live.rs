@@ -12,14 +12,14 @@ use crate::{
 };
 use hoid_ident::{Choice, IdentError};
 
-/// What makes the options of a record of the warm-up, with what was searched for them.
+/// Computes the options from a record of the warm-up, with the searched values.
 pub type Choose<'a> = &'a dyn Fn(&Record) -> Result<(TrackOptions, Option<Choice>), IdentError>;
 
-/// Share of the warm-up that is collected besides after a fit that failed.
+/// Share of the warm-up that is collected in addition after a fit that failed.
 const QUARTER: usize = 4;
-/// Of a warm-up that goes on, so many times its length is kept.
+/// For a warm-up that continues, so many times its length is kept.
 const KEPT: usize = 2;
-/// Longest run of faulty samples within a warm-up, s; after a longer one it begins anew.
+/// Longest run of faulty samples within a warm-up, s; after a longer one it starts again.
 const LONGEST_FAULT_S: f64 = 1.0;
 
 /// Where the recursion is.
@@ -31,18 +31,18 @@ pub enum Live {
     Tracking(Box<Tracker>),
 }
 
-/// What a sample led to.
+/// Result of a sample.
 #[derive(Debug, Default)]
 pub struct LiveOutcome {
-    /// What the tracker says, once there is one.
+    /// Report of the tracker, once there is one.
     pub outcome: Option<Outcome>,
     /// Options and search of a start fit that has just been made.
     pub started: Option<(TrackOptions, Option<Choice>)>,
 }
 
 impl Live {
-    /// A recursion that begins at once where its start is given, else with a warm-up of so many
-    /// samples.
+    /// A recursion that starts at once where its start is given, else with a warm-up of a given
+    /// number of samples.
     ///
     /// # Errors
     /// [`IdentError`] for a start that cannot be used.
@@ -83,8 +83,8 @@ impl Live {
         Ok(Self::Tracking(Box::new(tracker)))
     }
 
-    /// Takes a sample; NaN stands for what is faulty or missing. The fit of the warm-up is made
-    /// when its last sample comes, with the options that `choose` gives for it.
+    /// Takes a sample; NaN represents faulty values or missing. The fit of the warm-up is made when
+    /// its last sample comes, with the options that `choose` gives for it.
     pub fn update(&mut self, sample: Sample, choose: Choose<'_>) -> LiveOutcome {
         let warm_up = match self {
             Self::Tracking(tracker) => {
@@ -126,11 +126,11 @@ pub struct WarmUp {
     length: usize,
     sample_time: SampleTime,
     samples: VecDeque<Sample>,
-    /// Samples since the collection began.
+    /// Samples since the collection started.
     pub collected: usize,
     /// How many there are to be when the fit is tried.
     pub needed: usize,
-    /// Why the last start fit failed, or the collection began anew.
+    /// Why the last start fit failed, or the collection started again.
     pub trouble: Option<String>,
     /// Faulty samples at the end.
     faulty: usize,
@@ -198,7 +198,7 @@ impl WarmUp {
         }
     }
 
-    /// Takes a sample. The collection begins with a sound one, and begins anew after a long fault.
+    /// Takes a sample. The collection starts with a sound one, and starts again after a long fault.
     fn collect(&mut self, sample: Sample) {
         let sound = sample.e.is_finite() && sample.u.is_finite();
         self.faulty = if sound { 0 } else { self.faulty + 1 };
@@ -208,7 +208,7 @@ impl WarmUp {
         if self.faulty as f64 * self.sample_time.s() > LONGEST_FAULT_S {
             *self = Self::new(self.length, self.sample_time);
             self.trouble = Some(format!(
-                "more than {LONGEST_FAULT_S} s of faulty samples: the warm-up began anew"
+                "more than {LONGEST_FAULT_S} s of faulty samples: the warm-up started again"
             ));
             return;
         }
@@ -219,8 +219,8 @@ impl WarmUp {
         self.collected += 1;
     }
 
-    /// Leaves out what came before the run began, and collects as much in its place; false where
-    /// there is nothing of the kind.
+    /// Leaves out the data before the run, and collects as much in its place; false if there is
+    /// nothing of the kind.
     fn leave_out_idle(&mut self) -> bool {
         let Ok(record) = self.record() else { return false };
         let idle = idle_head(&record);
@@ -230,7 +230,7 @@ impl WarmUp {
         self.samples.drain(..idle.min(self.samples.len()));
         self.needed = self.collected + idle;
         self.trouble = Some(format!(
-            "neither e nor u moved for {:.1} s: left out, the warm-up goes on",
+            "neither e nor u moved for {:.1} s: left out, the warm-up continues",
             idle as f64 * self.sample_time.s()
         ));
         true
@@ -247,7 +247,7 @@ impl WarmUp {
         Ok((tracker, choice))
     }
 
-    /// What was collected as a record; a faulty value is the last good one.
+    /// The collected samples as a record; a faulty value is the last good one.
     fn record(&self) -> Result<Record, IdentError> {
         let channel = |name: &str, of: fn(&Sample) -> f64| {
             let mut last = self.samples.iter().map(of).find(|v| v.is_finite()).unwrap_or(0.0);

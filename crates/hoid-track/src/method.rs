@@ -1,4 +1,4 @@
-//! What a recursive method says of itself.
+//! Self-description of a recursive method.
 //!
 //! A method is a file or folder: its options (a struct made by `settings!`), [`RecursiveMethod`] for
 //! them, and the [`Recursion`] that it builds. That makes it a [`Method`](crate::Method), in this crate or
@@ -30,18 +30,18 @@ use crate::{
 pub struct About {
     /// Name as typed.
     pub name: &'static str,
-    /// What it is, in a line without a full stop.
+    /// Its definition, in a line without a full stop.
     pub help: &'static str,
     /// Where it comes from.
     pub source: &'static str,
-    /// The structures that it serves; the first is that of the method when none is named, but for
-    /// Box-Jenkins where it is among them.
+    /// The structures that it serves; the first is that of the method when none is named, except
+    /// for Box-Jenkins where it is among them.
     pub structures: &'static [Structure],
-    /// Defaults, in words, of options that it shares with others.
+    /// Defaults, as text, of options that it shares with others.
     pub defaults: &'static [(&'static str, &'static str)],
 }
 
-/// What a method can do behind a box: any that can be cloned and compared.
+/// Object-safe operations of a method: clone and comparison.
 pub trait Boxed: fmt::Debug + Send + Sync {
     /// A copy.
     fn boxed(&self) -> Box<dyn RecursiveMethod>;
@@ -76,7 +76,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
     }
 
     /// Memory of a parameter when none is given.
-    fn usual_memory(&self, parameter: &str) -> Memory;
+    fn default_memory(&self, parameter: &str) -> Memory;
 
     /// Builds the recursion.
     ///
@@ -92,19 +92,19 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
     /// Checks the options against structure and orders.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] with what is wrong.
+    /// [`IdentError::BadOption`] with the problem.
     fn check(&self, setup: &Setup) -> Result<(), IdentError>;
 
-    /// Checks what depends on the sample time.
+    /// Checks that depend on the sample time.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] with what is wrong.
+    /// [`IdentError::BadOption`] with the problem.
     fn check_at(&self, _sample_time: SampleTime) -> Result<(), IdentError> {
         Ok(())
     }
 
-    /// Order of the noise model when none is named; none where that of the structure is taken.
-    fn usual_nd(&self) -> Option<usize> {
+    /// Order of the noise model when none is named; none if that of the structure is taken.
+    fn default_nd(&self) -> Option<usize> {
         None
     }
 
@@ -114,7 +114,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
     }
 
     /// True for a method that has a model of how the person changes, and no memory: physical
-    /// parameters behind the noise model of a batch fit, which stays.
+    /// parameters after the noise model of a batch fit, which stays.
     fn is_model_of_change(&self) -> bool {
         false
     }
@@ -129,7 +129,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         None
     }
 
-    /// True where the two-sided estimate of a recorded run was asked for.
+    /// True if the two-sided estimate of a recorded run was requested.
     fn smooths(&self) -> bool {
         false
     }
@@ -142,13 +142,13 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         Ok(Vec::new())
     }
 
-    /// True for a method that fits what it keeps anew: it starts from no coefficients and waits for nothing.
+    /// True for a method that fits what it keeps again: it starts from no coefficients and waits for nothing.
     fn fits_anew(&self) -> bool {
         false
     }
 
-    /// What it remembers, in words, where that is no memory of parameters.
-    fn memory_in_words(&self) -> Option<String> {
+    /// What it remembers, as text, where that is not a memory of parameters.
+    fn memory_as_text(&self) -> Option<String> {
         None
     }
 
@@ -179,18 +179,18 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         f64::INFINITY
     }
 
-    /// How far P may grow where nothing excites a parameter; none where that follows from the start.
+    /// How far P may grow where nothing excites a parameter; none if that follows from the start.
     fn windup_guard(&self, _structure: Structure) -> Option<WindupGuard> {
         self.gain().and_then(|gain| gain.windup_guard)
     }
 
-    /// Whether a guard stands in front of it, or that was refused; none where nothing was said and its own default
-    /// is to have none.
+    /// Whether a guard is in front of it, or that was refused; none if nothing was specified and its own default is to
+    /// have none.
     fn guard(&self) -> Option<GuardChoice> {
         None
     }
 
-    /// True where a guard stands in front of it.
+    /// True if a guard is in front of it.
     fn is_guarded(&self) -> bool {
         self.guard() == Some(GuardChoice::Yes)
     }
@@ -210,7 +210,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         None
     }
 
-    /// True where tau_e, when it is followed, is one of the parameters that move.
+    /// True if tau_e, when it is followed, is one of the parameters that move.
     fn delay_is_parameter(&self) -> bool {
         false
     }
@@ -220,7 +220,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         None
     }
 
-    /// What is known of the person before the first sample, where that is an option.
+    /// Prior knowledge of the person before the first sample, where that is an option.
     fn person_prior(&self) -> Option<&PersonPrior> {
         None
     }
@@ -231,19 +231,19 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         None
     }
 
-    /// Takes what is known of the person; false where that is no option.
+    /// Takes the prior knowledge of the person; false if that is not an option.
     fn set_person_prior(&mut self, _prior: PersonPrior) -> bool {
         false
     }
 
-    /// Takes from a record what has a default there.
+    /// Takes settings with a default from a record.
     fn prepare(&mut self, _record: &Record) {}
 
-    /// Leaves out what was said of parameters that are not known.
+    /// Leaves out what was reported about parameters that are not known.
     fn retain(&mut self, _known: &dyn Fn(&str) -> bool) {}
 }
 
-/// What is known of a method.
+/// Known properties of a method.
 pub fn spec(method: &dyn RecursiveMethod) -> MethodSpec {
     let about = method.about();
     let own = |setting: Setting| match about.defaults.iter().find(|(name, _)| *name == setting.name) {

@@ -5,8 +5,8 @@
 //! and how it moves with `dL/L` is that of batch fits ([`Crossover`]); `dL/L = dY/Y`, whose covariance is
 //! that of the real and imaginary part of the response at the crossover.
 //!
-//! Nothing is said where |L| does not fall through one, and where the standard error of the crossover
-//! is more than half of it: to first order it says nothing then.
+//! Nothing is reported where |L| does not fall through one, and where the standard error of the crossover is more than
+//! half of it: to first order it carries no information then.
 
 use hoid_ident::family::Crossover;
 use hoid_model::{Complex64, ContinuousTransferFunction, SampleTime, uncertainty::Estimate};
@@ -51,7 +51,7 @@ impl OpenLoop {
     /// Numbers of it.
     pub(crate) const NUMBERS: usize = 4;
 
-    /// Of an estimate whose response is `value`, and with its covariance `whole`.
+    /// For an estimate whose response is `value`, and with its covariance `whole`.
     pub(crate) fn of(
         value: impl Fn(f64) -> Option<[f64; 2]>,
         whole: impl Fn(f64) -> Option<Response>,
@@ -87,7 +87,7 @@ impl OpenLoop {
         }
     }
 
-    /// Values and variances, for means; NaN where there is none.
+    /// Values and variances, for means; NaN if there is none.
     pub(crate) fn packed(found: Result<Self, NoCrossover>) -> [f64; Self::NUMBERS] {
         let Ok(found) = found else {
             return [f64::NAN; Self::NUMBERS];
@@ -97,7 +97,7 @@ impl OpenLoop {
         [a, b, c, d]
     }
 
-    /// Of the numbers of [`OpenLoop::packed`].
+    /// For the numbers of [`OpenLoop::packed`].
     pub(crate) fn unpacked(numbers: &[f64]) -> Option<Self> {
         let &[a, b, c, d] = numbers else { return None };
         a.is_finite().then_some(Self {

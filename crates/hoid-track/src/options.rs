@@ -1,15 +1,15 @@
-//! What is to be tracked, and how.
+//! Signals to be tracked, and how.
 
 use hoid_ident::{Estimator, IdentError, SearchOptions};
 use hoid_model::{ContinuousTransferFunction, Orders, Record, SampleTime, Structure};
 
 use crate::{
     forgetting::ForgettingRule,
-    idle::usual_start_span,
+    idle::default_start_span,
     memory::Memory,
     method::bad,
     methods::Method,
-    setup::{Setup, StartAt, USUAL_DELAY_S, parameter_names, polynomial_orders},
+    setup::{DEFAULT_DELAY_S, Setup, StartAt, parameter_names, polynomial_orders},
     start::check_sample_time,
 };
 
@@ -25,15 +25,15 @@ pub struct TrackOptions {
     /// Where to start. Default: a batch fit of the first third.
     pub start: StartAt,
     /// Time from which the estimate moves, s; before that only the filters follow. Default: the end
-    /// of the start span when P is that of its fit, else the beginning of the record.
+    /// of the start span when P is that of its fit, else the start of the record.
     pub update_from_s: Option<f64>,
     /// Limits of the search of start fits and windows.
     pub search: SearchOptions,
     /// Magnitude of e or u beyond which a sample is taken for a fault. Default 1e6.
     pub largest: f64,
-    /// Frequencies at which a trace tells gain and phase, rad/s. Default none.
+    /// Frequencies at which a trace reports gain and phase, rad/s. Default none.
     pub at_rad_s: Vec<f64>,
-    /// What the person controls, for crossover and phase margin. Default none.
+    /// The controlled element, for crossover and phase margin. Default none.
     pub controlled_element: Option<ContinuousTransferFunction>,
 }
 
@@ -56,15 +56,15 @@ impl TrackOptions {
         }
     }
 
-    /// The usual ones of a method that starts itself and is told nothing of the person.
-    pub fn told_nothing(method: Method, sample_time: SampleTime) -> Self {
-        Self::usual(method, sample_time.nk(USUAL_DELAY_S))
+    /// The defaults of a method that starts itself and gets no information about the person.
+    pub fn without_prior(method: Method, sample_time: SampleTime) -> Self {
+        Self::default_for(method, sample_time.nk(DEFAULT_DELAY_S))
     }
 
     /// Default options with the structure and the orders that the method takes when none are named,
     /// for a delay of nk samples.
-    pub fn usual(method: Method, nk: usize) -> Self {
-        let (structure, orders) = (method.usual_structure(), method.usual_orders(nk));
+    pub fn default_for(method: Method, nk: usize) -> Self {
+        let (structure, orders) = (method.default_structure(), method.default_orders(nk));
         Self::new(method, structure, orders)
     }
 
@@ -88,10 +88,10 @@ impl TrackOptions {
         }
     }
 
-    /// The span of a record that gives the start fit, s; none where there is no such fit.
+    /// The span of a record that gives the start fit, s; none if there is no such fit.
     pub fn start_span(&self, record: &Record) -> Option<(f64, f64)> {
         let StartAt::Span(span) = self.start else { return None };
-        Some(span.unwrap_or_else(|| usual_start_span(record)))
+        Some(span.unwrap_or_else(|| default_start_span(record)))
     }
 
     /// Range of tau_e in s where it is one of the parameters that the recursion moves.
@@ -114,7 +114,7 @@ impl TrackOptions {
     /// Memory of each parameter, in the order of [`TrackOptions::parameter_names`].
     ///
     /// # Errors
-    /// [`IdentError::UnknownParameter`] for a memory of a parameter that is not there.
+    /// [`IdentError::UnknownParameter`] for a memory of a parameter that does not exist.
     pub fn memories(&self) -> Result<Vec<Memory>, IdentError> {
         let (names, method) = (self.parameter_names(), &self.method);
         let given = method.memories();
@@ -126,12 +126,12 @@ impl TrackOptions {
         }
         let of = |name: &String| {
             let own = given.and_then(|given| given.given(name));
-            own.unwrap_or_else(|| method.usual_memory(name))
+            own.unwrap_or_else(|| method.default_memory(name))
         };
         Ok(names.iter().map(of).collect())
     }
 
-    /// What the recursion is built of.
+    /// Components of the recursion.
     ///
     /// # Errors
     /// As [`TrackOptions::memories`].
@@ -159,7 +159,7 @@ impl TrackOptions {
     /// As [`TrackOptions::check`], with what depends on the sample time.
     ///
     /// # Errors
-    /// [`IdentError`] with what is wrong.
+    /// [`IdentError`] with the problem.
     pub(crate) fn check_at(&self, sample_time: SampleTime) -> Result<(), IdentError> {
         check_sample_time(sample_time)?;
         self.check()?;
@@ -173,7 +173,7 @@ impl TrackOptions {
     /// Checks method, structure, orders and options against each other.
     ///
     /// # Errors
-    /// [`IdentError`] with what is wrong.
+    /// [`IdentError`] with the problem.
     pub fn check(&self) -> Result<(), IdentError> {
         self.orders.check(self.structure)?;
         let (setup, method) = (self.setup()?, &self.method);

@@ -1,5 +1,5 @@
-//! What is known of a person before the first sample: an option of methods that start without a fit
-//! of the record.
+//! Prior knowledge of a person before the first sample: an option of methods that start without a
+//! fit of the record.
 
 use hoid_ident::{
     IdentError,
@@ -8,15 +8,15 @@ use hoid_ident::{
 };
 use hoid_model::{FittedOperator, SampleTime};
 
-/// What is known of a person before the first sample.
+/// Prior knowledge of a person before the first sample.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum PersonPrior {
-    /// What is usual of people.
+    /// Default values for people.
     #[default]
     Population,
-    /// As little as can be: the usual values with wide errors.
+    /// As little as can be: the default values with wide errors.
     Nothing,
-    /// The same as usual, but for what is named.
+    /// The same as by default, except for what is named.
     Named(OperatorPrior),
     /// An earlier fit of the person.
     Fit(Box<FittedOperator>),
@@ -43,12 +43,12 @@ impl PersonPrior {
             })
     }
 
-    /// Where the estimate starts, in words.
-    pub(crate) fn in_words(&self) -> String {
+    /// Where the estimate starts, as text.
+    pub(crate) fn as_text(&self) -> String {
         match self {
-            Self::Population => "what is usual of people".to_owned(),
-            Self::Nothing => "next to nothing: what is usual of people, with wide errors".to_owned(),
-            Self::Named(prior) => format!("what is usual of people, with {prior}"),
+            Self::Population => "the defaults for people".to_owned(),
+            Self::Nothing => "next to nothing: the defaults for people, with wide errors".to_owned(),
+            Self::Named(prior) => format!("the defaults for people, with {prior}"),
             Self::Fit(fit) => format!(
                 "the fit in {} with its covariance, form {}",
                 fit.source,

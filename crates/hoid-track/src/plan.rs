@@ -1,5 +1,5 @@
-//! What is to be tracked while some orders may still be open: they are searched on the start span
-//! or the warm-up.
+//! Tracking plan with orders that may still be open: they are searched on the start span or the
+//! warm-up.
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
@@ -10,7 +10,7 @@ use crate::{
     methods::Method,
     options::TrackOptions,
     person_prior::PersonPrior,
-    setup::{StartAt, USUAL_DELAY_S},
+    setup::{DEFAULT_DELAY_S, StartAt},
 };
 use hoid_ident::{
     Choice, IdentError, NamedOrders, OrderRanges,
@@ -31,8 +31,8 @@ impl TrackPlan {
     /// checked that can be before there are data.
     ///
     /// # Errors
-    /// [`IdentError`] for options that contradict each other, name what is not there, or give a
-    /// start for one of several models.
+    /// [`IdentError`] for options that contradict each other, name what is missing, or give a start
+    /// for one of several models.
     pub fn new(
         options: TrackOptions,
         ranges: OrderRanges,
@@ -40,7 +40,7 @@ impl TrackPlan {
         sample_time: SampleTime,
     ) -> Result<Self, IdentError> {
         let ranges = match options.method.starts_itself() {
-            true => usual_ranges(&options.method, &ranges, sample_time),
+            true => default_ranges(&options.method, &ranges, sample_time),
             false => ranges,
         };
         let combinations = ranges.combinations()?;
@@ -85,7 +85,7 @@ impl TrackPlan {
     /// every candidate.
     ///
     /// # Errors
-    /// Those of the search.
+    /// The errors of the search.
     pub fn choose(
         &self,
         span: &Record,
@@ -100,8 +100,8 @@ impl TrackPlan {
         Ok((self.with_orders(choice.fit.orders()), Some(choice)))
     }
 
-    /// The options for orders within the ranges; what was said of coefficients that these orders do
-    /// not have is left out.
+    /// The options for orders within the ranges; what was reported about coefficients that these
+    /// orders do not have is left out.
     pub fn with_orders(&self, orders: Orders) -> TrackOptions {
         let mut options = TrackOptions {
             orders,
@@ -121,32 +121,31 @@ pub fn of_one_model() -> IdentError {
     }
 }
 
-/// Ranges of a method that searches none: the orders that are usual, as near as the ranges allow.
-fn usual_ranges(method: &Method, ranges: &OrderRanges, sample_time: SampleTime) -> OrderRanges {
+/// Ranges of a method that searches none: the orders that are typical, as near as the ranges allow.
+fn default_ranges(method: &Method, ranges: &OrderRanges, sample_time: SampleTime) -> OrderRanges {
     let known = method.person_prior().and_then(PersonPrior::delay_s);
-    let nk = sample_time.nk(known.unwrap_or(USUAL_DELAY_S));
-    let usual = method.usual_orders(nk);
-    let only = |usual: usize, range: &RangeInclusive<usize>| {
-        let one = usual.clamp(*range.start(), (*range.end()).max(*range.start()));
+    let nk = sample_time.nk(known.unwrap_or(DEFAULT_DELAY_S));
+    let default = method.default_orders(nk);
+    let only = |default: usize, range: &RangeInclusive<usize>| {
+        let one = default.clamp(*range.start(), (*range.end()).max(*range.start()));
         one..=one
     };
     OrderRanges {
-        na: only(usual.na, &ranges.na),
-        nb: only(usual.nb, &ranges.nb),
-        nc: only(usual.nc, &ranges.nc),
-        nd: only(usual.nd, &ranges.nd),
-        nf: only(usual.nf, &ranges.nf),
+        na: only(default.na, &ranges.na),
+        nb: only(default.nb, &ranges.nb),
+        nc: only(default.nc, &ranges.nc),
+        nd: only(default.nd, &ranges.nd),
+        nf: only(default.nf, &ranges.nf),
         nk: only(nk, &ranges.nk),
     }
 }
 
-/// What is searched: the ranges that are usual for structure and method, with the orders that are
-/// named in their place. Where nk is not named, the delay lies within the range that is tracked;
-/// where no other order is, orders that are still open are those of the coefficients of a start,
-/// named as f1 or b0.
+/// Search ranges: the defaults of structure and method, with named orders in their place. Where nk
+/// is not named, the delay lies within the range that is tracked; where no other order is, orders
+/// that are still open are those of the coefficients of a start, named as f1 or b0.
 ///
 /// # Errors
-/// [`IdentError::BadOption`] for a name that is no order.
+/// [`IdentError::BadOption`] for a name that is not an order.
 pub fn ranges_of(
     method: &Method,
     structure: Structure,
@@ -154,9 +153,9 @@ pub fn ranges_of(
     start_names: &[String],
     sample_time: SampleTime,
 ) -> Result<OrderRanges, IdentError> {
-    let mut usual = default_operator_ranges(structure, sample_time);
-    if let Some(nd) = method.usual_nd() {
-        usual.nd = nd..=nd;
+    let mut default = default_operator_ranges(structure, sample_time);
+    if let Some(nd) = method.default_nd() {
+        default.nd = nd..=nd;
     }
     let delay = method.track_delay_s().filter(|_| !named.contains_key("nk"));
     let of_start = if named.keys().all(|name| name == "nk") {
@@ -164,10 +163,10 @@ pub fn ranges_of(
     } else {
         &[]
     };
-    Ok(narrowed(usual.with(named)?, delay, of_start, sample_time))
+    Ok(narrowed(default.with(named)?, delay, of_start, sample_time))
 }
 
-/// Narrows ranges to what is known besides.
+/// Narrows ranges by additional knowledge.
 fn narrowed(
     mut ranges: OrderRanges,
     track_delay_s: Option<(f64, f64)>,
@@ -195,7 +194,7 @@ fn narrowed(
     ranges
 }
 
-/// What the recursion checks when it starts, before anything is read or searched.
+/// Checks of the recursion at its start, before data are read or orders searched.
 fn check(options: &TrackOptions, sample_time: SampleTime) -> Result<(), IdentError> {
     options.check_at(sample_time)?;
     for memory in options.memories()? {
@@ -247,11 +246,11 @@ mod tests {
     #[test]
     fn a_start_settles_the_orders_and_the_delay_those_of_the_input() {
         let ts = SampleTime::HUNDREDTH;
-        let usual = default_operator_ranges(Structure::BoxJenkins, ts);
+        let default = default_operator_ranges(Structure::BoxJenkins, ts);
         let start: Vec<String> = ["b0", "b1", "d1", "d2", "f1", "f2"].map(str::to_owned).to_vec();
-        let found = narrowed(usual.clone(), Some((0.2, 0.3)), &start, ts);
+        let found = narrowed(default.clone(), Some((0.2, 0.3)), &start, ts);
         assert_eq!((found.nd.clone(), found.nk.clone()), (2..=2, 21..=31));
-        assert_eq!(narrowed(usual.clone(), None, &[], ts), usual);
+        assert_eq!(narrowed(default.clone(), None, &[], ts), default);
     }
 
     #[test]
@@ -285,7 +284,7 @@ mod tests {
             nd: 16..=16,
             ..default_operator_ranges(Structure::BoxJenkins, ts)
         };
-        let options = TrackOptions::usual(Method::adaptive(), 29);
+        let options = TrackOptions::default_for(Method::adaptive(), 29);
         let plan = TrackPlan::new(options.clone(), ranges.clone(), Criterion::Bic, ts).unwrap();
         assert!(plan.is_settled());
         assert_eq!((plan.options().orders.nk, plan.options().orders.nd), (21, 16));
@@ -297,7 +296,7 @@ mod tests {
     #[test]
     fn a_start_belongs_to_one_model() {
         let ts = SampleTime::HUNDREDTH;
-        let usual = default_operator_ranges(Structure::BoxJenkins, ts);
+        let default = default_operator_ranges(Structure::BoxJenkins, ts);
         let options = TrackOptions {
             start: StartAt::Theta(vec![0.0; 5]),
             ..TrackOptions::new(
@@ -306,7 +305,7 @@ mod tests {
                 Structure::BoxJenkins.operator_orders(29),
             )
         };
-        let refused = TrackPlan::new(options, usual, Criterion::Bic, ts).unwrap_err();
+        let refused = TrackPlan::new(options, default, Criterion::Bic, ts).unwrap_err();
         assert!(refused.to_string().contains("one model"), "{refused}");
     }
 }

@@ -1,4 +1,4 @@
-//! One-step prediction, sample by sample: the predictor of the kernel behind a delay line, for
+//! One-step prediction, sample by sample: the predictor of the kernel after a delay line, for
 //! methods that need no gradient of it.
 //!
 //! The coefficients may change from sample to sample; the histories of w, v and eps keep the values
@@ -12,7 +12,7 @@ use hoid_core::{
 };
 use hoid_model::Orders;
 
-use crate::past::bounded;
+use crate::history::bounded;
 
 /// Room for coefficients.
 const ROOM: usize = 64;

@@ -1,4 +1,4 @@
-//! What a recursive method is.
+//! Definition of a recursive method.
 
 use hoid_core::{recursion::Step, state::State};
 use hoid_model::uncertainty::{Estimate, OperatorEstimate};
@@ -16,7 +16,7 @@ pub struct Sample {
     pub reference: Option<f64>,
 }
 
-/// What a recursion says of a sample that it has taken.
+/// Report of a recursion on a sample that it has taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepOutcome {
     /// A-priori innovation.
@@ -34,7 +34,7 @@ impl From<Step> for StepOutcome {
     }
 }
 
-/// A delay that is followed, and that of the polynomials.
+/// A delay that is tracked, and that of the polynomials.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Delay {
     /// Delay of b0 of the polynomials, samples.
@@ -77,11 +77,11 @@ pub trait Recursion: State + Send + Sync {
     fn response_value(&self, _omega_rad_s: f64) -> Option<[f64; 2]> {
         None
     }
-    /// Multiplies the covariance of its gain by a factor; false where it has none.
+    /// Multiplies the covariance of its gain by a factor; false if it has none.
     fn scale_covariance(&mut self, _factor: f64) -> bool {
         false
     }
-    /// The delay at present, where it is followed.
+    /// The delay at present, if it is tracked.
     fn delay(&self) -> Option<Delay> {
         None
     }

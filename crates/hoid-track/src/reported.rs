@@ -1,5 +1,5 @@
-//! What a trace reports of a recursion in physical parameters whose noise model stays: the
-//! polynomials of the exact hold and the operator.
+//! Trace of a recursion in physical parameters with a fixed noise model: the polynomials of the
+//! exact hold and the operator.
 
 use hoid_core::{
     held_operator::held_operator,
@@ -12,7 +12,7 @@ use hoid_model::{
 
 use crate::start::StartState;
 
-/// Parameters of the operator behind a known delay: K_e, K_e_dot, omega_nm and zeta_nm.
+/// Parameters of the operator after a known delay: K_e, K_e_dot, omega_nm and zeta_nm.
 pub const OPERATOR: usize = 4;
 
 /// `[b0, b1, d.., f1, f2]` with the Jacobian of the operator's part, and the covariance of d, which

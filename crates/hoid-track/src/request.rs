@@ -1,4 +1,4 @@
-//! A recursion as it is asked for, before the time between samples is known: a delay in seconds is none of the orders
+//! A recursion as it is requested, before the time between samples is known: a delay in seconds is none of the orders
 //! yet, and a start names its coefficients.
 
 use std::collections::BTreeMap;
@@ -16,16 +16,16 @@ use crate::{
 /// Where the recursion is to start.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum RequestedStart {
-    /// As the method does: from a batch fit, or from what is known of people.
+    /// As the method does: from a batch fit, or from the prior knowledge of people.
     #[default]
-    Usual,
+    Default,
     /// From nothing.
     Nothing,
     /// From all coefficients, by name.
     Coefficients(BTreeMap<String, f64>),
 }
 
-/// A recursion as it is asked for.
+/// A recursion as it is requested.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackRequest {
     /// The recursion, with its options.
@@ -38,13 +38,13 @@ pub struct TrackRequest {
     pub delay: Option<DelayRange>,
     /// Where it starts.
     pub start: RequestedStart,
-    /// What decides between orders that are searched.
+    /// Criterion that decides between orders that are searched.
     pub criterion: Criterion,
     /// Magnitude of e or u beyond which a sample is a fault.
     pub largest: f64,
-    /// Frequencies at which the response is told, rad/s.
+    /// Frequencies at which the response is reported, rad/s.
     pub at_rad_s: Vec<f64>,
-    /// What the person controls.
+    /// The controlled element.
     pub controlled_element: Option<ContinuousTransferFunction>,
 }
 
@@ -62,7 +62,7 @@ impl TrackRequest {
             structure: None,
             orders: NamedOrders::new(),
             delay: None,
-            start: RequestedStart::Usual,
+            start: RequestedStart::Default,
             criterion: Criterion::Bic,
             largest: TrackOptions::LARGEST,
             at_rad_s: Vec::new(),
@@ -70,9 +70,9 @@ impl TrackRequest {
         }
     }
 
-    /// The structure that was asked for, else that of the method.
+    /// The structure that was requested, else that of the method.
     pub fn structure(&self) -> Structure {
-        self.structure.unwrap_or_else(|| self.method.usual_structure())
+        self.structure.unwrap_or_else(|| self.method.default_structure())
     }
 
     /// Whether the recursion is of polynomials, or its delay is given in samples: such takes the samples as they are.
@@ -84,7 +84,7 @@ impl TrackRequest {
     /// The plan for a time between samples; everything is checked that can be before there are data.
     ///
     /// # Errors
-    /// [`IdentError`] for options that contradict each other, or name what is not there.
+    /// [`IdentError`] for options that contradict each other, or name what is missing.
     pub fn plan(&self, sample_time: SampleTime) -> Result<TrackPlan, IdentError> {
         let mut orders = self.orders.clone();
         if let Some(delay) = &self.delay {
@@ -113,10 +113,10 @@ impl TrackRequest {
         let structure = self.structure();
         let ranges = ranges_of(&self.method, structure, &orders, &names, sample_time)?;
         let combinations = ranges.combinations()?;
-        // The largest of each order: what is not known there is not known at all.
+        // The largest of each order: a quantity that is not known there is not known at all.
         let largest = combinations[combinations.len() - 1];
         let start = match &self.start {
-            RequestedStart::Usual => StartAt::Span(None),
+            RequestedStart::Default => StartAt::Span(None),
             RequestedStart::Nothing => StartAt::Nothing,
             RequestedStart::Coefficients(_) if combinations.len() > 1 => return Err(of_one_model()),
             RequestedStart::Coefficients(named) => StartAt::Theta(

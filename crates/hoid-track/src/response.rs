@@ -1,6 +1,6 @@
 //! The response of an estimate at a frequency: what seconds of data determine best.
 //!
-//! Of the polynomials, `H = B z^-nk/(A F)` at `z = e^{j omega Ts}`, with the derivatives
+//! For the polynomials, `H = B z^-nk/(A F)` at `z = e^{j omega Ts}`, with the derivatives
 //!
 //! `dH/db_j = z^-(nk+j)/(A F)`, `dH/da_j = -H z^-j/A`, `dH/df_j = -H z^-j/F`,
 //!
@@ -18,7 +18,7 @@ const DB: f64 = 8.685_889_638_065_037;
 pub struct Response {
     /// Real and imaginary part.
     pub value: [f64; 2],
-    /// Their covariance; NaN where there is none.
+    /// Their covariance; NaN if there is none.
     pub covariance: [[f64; 2]; 2],
 }
 
@@ -32,7 +32,7 @@ impl Response {
         [re, im, a, b, c]
     }
 
-    /// Of the numbers of [`Response::packed`]; `None` where they are none.
+    /// For the numbers of [`Response::packed`]; `None` if they are none.
     pub(crate) fn unpacked(numbers: &[f64]) -> Option<Self> {
         let &[re, im, a, b, c] = numbers else { return None };
         let sound = re.is_finite() && im.is_finite();
@@ -62,7 +62,7 @@ impl Response {
         (a * a * c[0][0] + 2.0 * a * b * c[0][1] + b * b * c[1][1]) / (square * square)
     }
 
-    /// Covariance of real and imaginary part of `dH/H`; `None` where there is none.
+    /// Covariance of real and imaginary part of `dH/H`; `None` if there is none.
     pub(crate) fn relative_covariance(&self) -> Option<[[f64; 2]; 2]> {
         let [re, im] = self.value;
         let (real, imaginary) = (self.along([re, im]), self.along([-im, re]));
@@ -98,13 +98,13 @@ impl Response {
             sum([1.0, 0.0], &theta[..o.na]),
             sum([1.0, 0.0], &theta[first_f..first_f + o.nf]),
         );
-        // B has no constant of its own: b_0 stands at the delay.
+        // B has no constant of its own: b_0 is at the delay.
         let b = sum([0.0; 2], &theta[first_b..first_b + o.nb]);
         let (sin, cos) = (-omega_rad_s * sample_time.s() * (o.nk as f64 - 1.0)).sin_cos();
         over(times(b, [cos, sin]), times(a, f))
     }
 
-    /// Of polynomials theta with these orders; `covariance` is that of theta by rows.
+    /// For polynomials theta with these orders; `covariance` is that of theta by rows.
     pub(crate) fn of_polynomials(
         orders: &Orders,
         theta: &[f64],

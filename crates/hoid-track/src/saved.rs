@@ -1,7 +1,7 @@
-//! A tracker as numbers, to go on elsewhere: in another process, or after a restart.
+//! A tracker as numbers, to continue elsewhere: in another process, or after a restart.
 //!
-//! The numbers are those of the start, of which gains and bounds are made, and then all that
-//! changes ([`hoid_core::state`]), and a seal against damage. A tracker that was restored goes on with the same digits. It
+//! The numbers are those of the start, of which gains and bounds are made, and then all that changes
+//! ([`hoid_core::state`]), and a seal against damage. A tracker that was restored continues with the same digits. It
 //! does not have the start fit any more.
 
 use hoid_core::state::{State, visit_all};
@@ -12,7 +12,7 @@ use crate::{
     options::TrackOptions,
     seal::{opened, sealed},
     start::StartState,
-    tracker::{guard_of, standing_of},
+    tracker::{guard_of, stationary_watch},
 };
 use hoid_ident::IdentError;
 
@@ -39,8 +39,8 @@ impl State for Tracker {
                 each,
             );
         }
-        if let Some(standing) = &mut self.standing {
-            visit_all(&mut [&mut self.counts.held, &mut self.moved, &mut **standing], each);
+        if let Some(stationary) = &mut self.stationary {
+            visit_all(&mut [&mut self.counts.held, &mut self.moved, &mut **stationary], each);
         }
     }
 }
@@ -104,7 +104,7 @@ impl Tracker {
         let mut recursion = options.method.build(&options.setup()?, &start, sample_time)?;
         let mut tracker = Self {
             guard: guard_of(options, &mut *recursion, None, sample_time),
-            standing: standing_of(options, sample_time),
+            stationary: stationary_watch(options, sample_time),
             moved: false,
             recursion,
             options: options.clone(),

@@ -1,5 +1,5 @@
-//! The seal of saved numbers: a sum over all of them behind the last, by which numbers that were
-//! changed, cut or mixed up since are refused.
+//! The seal of saved numbers: a sum over all of them after the last, by which numbers that were changed, cut or mixed
+//! up since are refused.
 //!
 //! A state that is only nearly right is worse than none: a place in a ring that lies outside ends the
 //! process, a covariance that is not one gives small error bars. The sum is FNV-1a (Fowler, Noll, Vo,
@@ -19,7 +19,7 @@ pub fn sealed(mut numbers: Vec<f64>) -> Vec<f64> {
     numbers
 }
 
-/// The numbers before their seal; none where it is another.
+/// The numbers before their seal; none if it is another.
 pub fn opened(sealed: &[f64]) -> Option<&[f64]> {
     let (stated, numbers) = sealed.split_last()?;
     (stated.to_bits() == seal(numbers).to_bits()).then_some(numbers)

@@ -1,4 +1,4 @@
-//! What a recursion is built of, beside its start: structure, orders, and the options that all
+//! Components of a recursion, next to its start: structure, orders, and the options that all
 //! methods read alike.
 
 use std::collections::BTreeMap;
@@ -9,8 +9,8 @@ use hoid_model::{Orders, Structure};
 
 use crate::{forgetting::ForgettingRule, memory::Memory, shared_options::WindupGuard};
 
-/// Delay of people who track, s: what is supposed where none is given.
-pub(crate) const USUAL_DELAY_S: f64 = 0.2;
+/// Delay of people who track, s: the prior where none is given.
+pub(crate) const DEFAULT_DELAY_S: f64 = 0.2;
 
 /// Names of the operator's parameters in a physical recursion.
 pub(crate) const PHYSICAL_NAMES: [&str; 5] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
@@ -26,7 +26,7 @@ pub enum StartAt {
     Nothing,
 }
 
-/// What a recursion is built of.
+/// Components of a recursion.
 #[derive(Debug, Clone)]
 pub struct Setup {
     /// The structure.
@@ -43,7 +43,7 @@ pub struct Setup {
     pub forgetting: ForgettingRule,
     /// P at the start as a multiple of the unit matrix; none for that of the start fit.
     pub covariance: Option<f64>,
-    /// How far P may grow where nothing excites a parameter; none where that follows from the start.
+    /// How far P may grow where nothing excites a parameter; none if that follows from the start.
     pub windup_guard: Option<WindupGuard>,
     /// Multiple of the innovation's standard deviation beyond which an innovation moves the
     /// estimate no further.
@@ -52,7 +52,7 @@ pub struct Setup {
     pub stable: Stable,
     /// True for a method that needs no start fit.
     pub starts_itself: bool,
-    /// True where the operator's parameters move.
+    /// True if the operator's parameters move.
     pub is_physical: bool,
     /// Bounds of physical parameters.
     pub bounds: BTreeMap<String, Constraint>,

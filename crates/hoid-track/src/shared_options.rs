@@ -13,9 +13,9 @@ use crate::{forgetting::ForgettingRule, memory::MemoryOptions};
 /// How far the variances of P may grow where nothing excites a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum WindupGuard {
-    /// As far as forgetting takes them: equations 5.26 and 31 of the reference text as they stand.
+    /// As far as forgetting takes them: equations 5.26 and 31 of the thesis unchanged.
     Off,
-    /// To this multiple of what they are at the start.
+    /// To this multiple of their initial value.
     Bound(f64),
 }
 
@@ -51,14 +51,14 @@ settings! {
     /// The gain of a recursion of the kernel.
     pub struct GainOptions {
         /// Covariance P at the start: X times the unit matrix, in units of the innovation variance
-        /// (the reference text: 0.1)
+        /// (the thesis: 0.1)
         #[setting(bounds(Bounds::PositiveFinite), default("that of the start fit; 1e6 where there is none"))]
         pub covariance: Option<f64> = None,
         /// Standard deviations beyond which an innovation moves the estimate no further
         #[setting(bounds(Bounds::Positive))]
         pub limit: Option<f64> = None,
         /// How far each variance in P may grow where nothing excites its parameter, as a multiple of
-        /// what it is at the start; off: without end
+        /// its initial value; off: without end
         #[setting(bounds(Bounds::AtLeast(1.0)), default("1e4 with a covariance or without a start fit, else 10 times what the memory has under the excitation of that fit"))]
         pub windup_guard: Option<WindupGuard> = None,
     }
@@ -72,23 +72,23 @@ settings! {
 
 impl GainOptions {
     /// The limit in use: none for a sliding window, whose sums hold every sample as it came.
-    pub fn limit_or(&self, usual: f64) -> f64 {
+    pub fn limit_or(&self, default: f64) -> f64 {
         match self.forgetting {
             ForgettingRule::Window => f64::INFINITY,
-            _ => self.limit.unwrap_or(usual),
+            _ => self.limit.unwrap_or(default),
         }
     }
 
-    /// The guard against windup in use; `None` where it follows from the start. It is off for the
-    /// recursion of the reference text: P at the start is given, P forgets exponentially, and no
-    /// innovation is too large.
+    /// The guard against windup in use; `None` if it follows from the start. It is off for the
+    /// recursion of the thesis: P at the start is given, P forgets exponentially, and no innovation
+    /// is too large.
     pub fn windup_guard(&self, limit: f64) -> Option<WindupGuard> {
         let of_the_text =
             self.covariance.is_some() && self.forgetting == ForgettingRule::Exponential && limit == f64::INFINITY;
         self.windup_guard.or(of_the_text.then_some(WindupGuard::Off))
     }
 
-    /// Leaves out what was said of parameters that are not known.
+    /// Leaves out what was reported about parameters that are not known.
     pub fn retain(&mut self, known: &dyn Fn(&str) -> bool) {
         self.memories.memory_of.retain(|key, _| known(key));
         if let ForgettingRule::RandomWalk(drift) = &mut self.forgetting {
@@ -114,7 +114,7 @@ settings! {
 }
 
 settings! {
-    /// A delay that is followed.
+    /// A tracked delay.
     pub struct DelayOptions {
         /// Follow the delay tau_e too, within this range: as a parameter by physical, in whole
         /// samples by rpem and multiple-model

@@ -3,7 +3,7 @@
 //! From a batch fit, P is its covariance over sigma^2, which is the inverse of the information
 //! matrix; in physical parameters `P_eta = T^{-1} P_theta T^{-T}` with the Jacobian T of
 //! theta(eta). A multiple of the unit matrix instead (the text's `0.1 I`) is the gain that the user
-//! wants; the error bars then still begin with the covariance of the fit.
+//! wants; the error bars then still start with the covariance of the fit.
 
 use std::collections::BTreeMap;
 
@@ -20,7 +20,7 @@ use crate::{
 /// Variance of P for a start from nothing, in units of the innovation variance.
 const UNKNOWN: f64 = 1e6;
 /// Operator of a start from nothing: K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm, tau_e (s), those
-/// of the reference text's order.
+/// of the thesis's order.
 const TYPICAL_OPERATOR: [f64; 5] = [0.1, 0.05, 10.0, 0.4, 0.25];
 /// First noise pole of a start from nothing.
 const TYPICAL_NOISE_POLE: f64 = -0.8;
@@ -68,9 +68,9 @@ pub struct StartState {
     pub variance: f64,
     /// Residuals that gave it.
     pub residuals: f64,
-    /// True where a fit gave it.
+    /// True if a fit gave it.
     pub from_fit: bool,
-    /// The fit, where it is at hand.
+    /// The fit, where it is available.
     pub fit: Option<Fit>,
 }
 
@@ -79,7 +79,7 @@ impl StartState {
     /// and that fit where it is known.
     ///
     /// # Errors
-    /// Those of the batch fit; [`IdentError::BadStart`].
+    /// The errors of the batch fit; [`IdentError::BadStart`].
     pub fn new(
         setup: &Setup,
         span: Option<&Record>,
@@ -145,7 +145,7 @@ impl StartState {
 
     /// From the batch fit of a record.
     fn fitted(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Self, IdentError> {
-        let Found {
+        let FittedStart {
             values,
             covariance,
             fit,
@@ -154,7 +154,7 @@ impl StartState {
             fit_physical(setup, record, known)?
         } else {
             let fit = polynomial_fit(setup, record, known)?;
-            Found {
+            FittedStart {
                 values: fit.model().theta().to_vec(),
                 covariance: fit.covariance().map(<[f64]>::to_vec),
                 variance: fit.innovation_variance(),
@@ -205,7 +205,7 @@ pub(crate) fn bounds(setup: &Setup, sample_time: SampleTime) -> Result<Vec<[f64;
             available: names.join(", "),
         });
     }
-    let usual = |name: &str| match name {
+    let default = |name: &str| match name {
         "omega_nm" => [SLOWEST_OMEGA, FASTEST_SHARE * sample_time.nyquist_rad_s()],
         "zeta_nm" => DAMPING,
         "tau_e" => setup.delay_parameter_s.map_or([0.0, 0.0], |(low, high)| [low, high]),
@@ -214,7 +214,7 @@ pub(crate) fn bounds(setup: &Setup, sample_time: SampleTime) -> Result<Vec<[f64;
     names
         .iter()
         .map(|name| {
-            let [low, high] = usual(name);
+            let [low, high] = default(name);
             let Some(constraint) = setup.bounds.get(name) else {
                 return Ok([low, high]);
             };
@@ -283,9 +283,9 @@ fn physical_values(setup: &Setup, theta: &[f64], sample_time: SampleTime) -> Res
     Ok(eta)
 }
 
-/// What a fit gives: the values, their covariance, the fit, and the variance of the innovations of
+/// Result of a fit: the values, their covariance, the fit, and the variance of the innovations of
 /// the model with these values.
-struct Found {
+struct FittedStart {
     values: Vec<f64>,
     covariance: Option<Vec<f64>>,
     fit: Fit,
@@ -301,8 +301,8 @@ fn polynomial_fit(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result
 }
 
 /// The Box-Jenkins fit where it has physical parameters within the bounds, else the grey box, which
-/// always has, with a noise model of the order that was asked for.
-fn fit_physical(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Found, IdentError> {
+/// always has, with a noise model of the order that was requested.
+fn fit_physical(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<FittedStart, IdentError> {
     if setup.delay_parameter_s.is_none()
         && let Some(start) = from_box_jenkins(setup, record, known)?
     {
@@ -311,7 +311,7 @@ fn fit_physical(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<F
     from_grey_box(setup, record)
 }
 
-fn from_box_jenkins(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Option<Found>, IdentError> {
+fn from_box_jenkins(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Option<FittedStart>, IdentError> {
     let sample_time = record.sample_time();
     let Ok(fit) = polynomial_fit(setup, record, known) else {
         return Ok(None);
@@ -333,14 +333,14 @@ fn from_box_jenkins(setup: &Setup, record: &Record, known: Option<&Fit>) -> Resu
             if i < 4 {
                 (0..4).map(|j| (places[j], inverse[i][j])).collect()
             } else {
-                // c and d stand behind b.
+                // c and d are behind b.
                 vec![(2 + i - 4, 1.0)]
             }
         };
         debug_assert_eq!(noise, setup.orders.nc + setup.orders.nd);
         congruence(&(0..p).map(row).collect::<Vec<_>>(), c, p)
     });
-    Ok(Some(Found {
+    Ok(Some(FittedStart {
         values: eta,
         covariance,
         variance: fit.innovation_variance(),
@@ -359,7 +359,7 @@ fn congruence(rows: &[Vec<(usize, f64)>], c: &[f64], width: usize) -> Vec<f64> {
         .collect()
 }
 
-fn from_grey_box(setup: &Setup, record: &Record) -> Result<Found, IdentError> {
+fn from_grey_box(setup: &Setup, record: &Record) -> Result<FittedStart, IdentError> {
     let ts = record.sample_time().s();
     let o = &setup.orders;
     let names = setup.names();
@@ -451,7 +451,7 @@ fn from_grey_box(setup: &Setup, record: &Record) -> Result<Found, IdentError> {
             }
         }
     }
-    Ok(Found {
+    Ok(FittedStart {
         values: eta,
         covariance,
         fit,

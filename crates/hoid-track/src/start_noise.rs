@@ -1,4 +1,5 @@
-//! The noise model of a start whose operator is known: D of what the operator leaves of the output.
+//! The noise model of a start whose operator is known: D of the part of the output that the operator leaves
+//! unexplained.
 //!
 //! `v(t) = u(t) - (B/F) q^-nk e(t)` is an autoregression, `D v = eps`, whose coefficients follow from
 //! least squares (L. Ljung, *System Identification*, 1999, section 10.1).
@@ -9,7 +10,7 @@ use hoid_model::{Channel, Orders, Record, Structure};
 /// D with its covariance.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct StartNoise {
-    /// Coefficients behind the 1.
+    /// Coefficients after the 1.
     pub d: Vec<f64>,
     /// Their covariance, by rows.
     pub covariance: Vec<f64>,
@@ -18,8 +19,8 @@ pub(crate) struct StartNoise {
 }
 
 impl StartNoise {
-    /// Of order nd, from what the operator of this fit leaves of a record; `None` where that is too
-    /// short or constant, or the fit is one of another sampling.
+    /// Of order nd, from the part that the operator of this fit leaves of a record; `None` if that
+    /// is too short or constant, or the fit is one of another sampling.
     pub fn of(fit: &Fit, record: &Record, nd: usize) -> Option<Self> {
         let simulated = fit.simulate(record).ok()?;
         let output = record.output().get(simulated.first..)?;
@@ -70,7 +71,7 @@ mod tests {
             .unwrap();
         let noise = StartNoise::of(&fit, &span, 4).unwrap();
         assert_eq!((noise.d.len(), noise.covariance.len()), (4, 16));
-        // The batch twin: the normal equations hold for the residuals of D on what is left.
+        // The batch twin: the normal equations hold for the residuals of D on the residual.
         let w = fit.simulate(&span).unwrap();
         let v: Vec<f64> = span.output()[w.first..]
             .iter()

@@ -6,8 +6,7 @@ use hoid_model::numbers::plain;
 
 use crate::trace::Trace;
 
-/// The method, what it remembers, where it started, the operator at the end, and the changes that
-/// were declared.
+/// The method, its memory, its start, the operator at the end, and the changes that were declared.
 impl fmt::Display for Trace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let options = self.options();
@@ -19,8 +18,8 @@ impl fmt::Display for Trace {
             options.orders,
             self.len()
         )?;
-        writeln!(f, "memory  {}", options.memory_in_words(self.sample_time()))?;
-        writeln!(f, "start   {}", options.start_in_words())?;
+        writeln!(f, "memory  {}", options.memory_as_text(self.sample_time()))?;
+        writeln!(f, "start   {}", options.start_as_text())?;
         let counts = self.counts();
         writeln!(
             f,
@@ -53,7 +52,7 @@ mod tests {
     fn a_trace_prints_what_it_is_and_where_it_ends() {
         let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
         let record = simulator.run(RunSeed::default(), false).unwrap();
-        let trace = track(&record, &TrackOptions::usual(Method::rpem(), 29), 64).unwrap();
+        let trace = track(&record, &TrackOptions::default_for(Method::rpem(), 29), 64).unwrap();
         let text = trace.to_string();
         for part in [
             "rpem of BJ",

@@ -24,11 +24,11 @@ pub struct Trace {
     pub(crate) times_s: Vec<f64>,
     /// theta by rows.
     pub(crate) theta: Vec<f64>,
-    /// Covariance of theta by rows and the upper triangle of each; NaN where there is none.
+    /// Covariance of theta by rows and the upper triangle of each; NaN if there is none.
     pub(crate) covariance: Vec<f64>,
     /// The operator itself, for a recursion in physical parameters.
     pub(crate) operator: Vec<OperatorEstimate>,
-    /// The delay of each row, where it is followed.
+    /// The delay of each row, if it is tracked.
     pub(crate) delays: Vec<Delay>,
     /// The responses that are not those of the polynomials, at each frequency of the options.
     pub(crate) responses: Vec<f64>,
@@ -43,7 +43,7 @@ pub struct Trace {
     /// Times at which changes were declared, s, with the changes.
     pub(crate) changes: Vec<(f64, Change)>,
     pub(crate) counts: Counts,
-    /// What the guard found.
+    /// Events found by the guard.
     pub(crate) faults: Vec<TrackFault>,
     /// Samples held back up to each row.
     pub(crate) held: Vec<u64>,
@@ -54,11 +54,11 @@ pub struct Trace {
     /// The batch fit that the recursion started from.
     pub(crate) start: Option<Fit>,
     pub(crate) failures: Option<(usize, String)>,
-    /// What the response at the end says against who is said to have held the loop.
+    /// Finding of the response at the end against the assumed operator.
     pub(crate) response_doubt: Option<Finding>,
     /// Every crossing of the loop at the end with its controlled element.
     pub(crate) loop_shape: Option<LoopShape>,
-    /// True where the response at the end is determined at some frequency, whatever gain and lead are.
+    /// True if the response at the end is determined at some frequency, whatever gain and lead are.
     pub(crate) response_is_known: bool,
     /// Samples between two rows.
     pub(crate) every: usize,
@@ -175,7 +175,7 @@ impl Trace {
         whole.iter().all(|c| c.is_finite()).then_some(whole)
     }
 
-    /// True for a row before the first estimate of a method that starts itself: what stands there is none.
+    /// True for a row before the first estimate of a method that starts itself: what is there is none.
     pub fn is_before_the_first(&self, row: usize) -> bool {
         self.options.method.starts_itself() && self.covariance(row).is_none()
     }
@@ -325,23 +325,23 @@ impl Trace {
         self.counts
     }
 
-    /// What the guard found, and what it did.
+    /// Events found by the guard, and what it did.
     pub fn faults(&self) -> &[TrackFault] {
         &self.faults
     }
 
-    /// Samples that the guard had held back, or during which it let the estimate stand still, up to
-    /// each row.
+    /// Samples that the guard had held back, or during which it let the estimate stay constant, up
+    /// to each row.
     pub fn held(&self) -> &[u64] {
         &self.held
     }
 
-    /// True where a guard stood in front of the recursion.
+    /// True if a guard was in front of the recursion.
     pub fn is_guarded(&self) -> bool {
         self.guarded
     }
 
-    /// Length of the idle head of the record, which the usual start span leaves out, s.
+    /// Length of the idle head of the record, which the default start span leaves out, s.
     pub fn idle_s(&self) -> f64 {
         self.idle_s
     }
@@ -371,7 +371,7 @@ impl Trace {
         self.averaged
     }
 
-    /// Delay of the rows behind the estimates by the moving average, s: half its length.
+    /// Delay of the rows after the estimates by the moving average, s: half its length.
     pub fn averaging_delay_s(&self) -> f64 {
         (self.averaged - 1) as f64 / 2.0 * self.every as f64 * self.sample_time.s()
     }
@@ -484,8 +484,8 @@ fn unpack(packed: &[f64], p: usize) -> Vec<f64> {
     whole
 }
 
-/// Mean of each column over the last `rows` rows, over those that there are in the beginning. NaN
-/// stays within its reach.
+/// Mean of each column over the last `rows` rows, over those that there are in the start. NaN stays
+/// within its reach.
 fn causal_mean(values: &[f64], width: usize, rows: usize) -> Vec<f64> {
     if width == 0 {
         return Vec::new();
@@ -495,7 +495,7 @@ fn causal_mean(values: &[f64], width: usize, rows: usize) -> Vec<f64> {
     for column in 0..width {
         let (mut sum, mut unknown) = (0.0, 0usize);
         for t in 0..n {
-            // The sum starts anew with each window, so that rounding does not pile up.
+            // The sum starts again with each window, so that rounding does not pile up.
             if t % rows == 0 {
                 let window = t.saturating_sub(rows - 1)..t;
                 let known = window.map(|s| values[s * width + column]).filter(|v| !v.is_nan());

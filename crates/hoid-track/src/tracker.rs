@@ -19,12 +19,12 @@ use crate::{
     recursion::{Recursion, Sample},
     response::Response,
     setup::StartAt,
-    standing::{Act, Standing},
     start::StartState,
+    stationary::{Act, StationaryWatch},
     trace::operator_of,
 };
 
-/// Frequency at which the sign of a response is looked at, rad/s.
+/// Frequency at which the sign of a response is examined, rad/s.
 const LOW_RAD_S: f64 = 0.5;
 /// Frequencies at which a response may be known, rad/s, and the error from which it is, dB.
 const KNOWN_AT_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
@@ -42,8 +42,8 @@ pub struct Tracker {
     pub(crate) sample_time: SampleTime,
     pub(crate) recursion: Box<dyn Recursion>,
     pub(crate) guard: Option<Box<Guard>>,
-    pub(crate) standing: Option<Box<Standing>>,
-    /// True where the last sample moved the estimate.
+    pub(crate) stationary: Option<Box<StationaryWatch>>,
+    /// True if the last sample moved the estimate.
     pub(crate) moved: bool,
     pub(crate) last_e: f64,
     pub(crate) counts: Counts,
@@ -62,7 +62,7 @@ impl std::fmt::Debug for Tracker {
 
 impl Tracker {
     /// A tracker with filters at rest. `span` is the record of the start fit; without it the
-    /// tracker starts from theta or from nothing, as the options say.
+    /// tracker starts from theta or from nothing, as the options state.
     ///
     /// # Errors
     /// [`IdentError`] when options contradict each other, or the start fit fails.
@@ -83,7 +83,7 @@ impl Tracker {
         let mut recursion = options.method.build(&setup, &start, sample_time)?;
         Ok(Self {
             guard: guard_of(options, &mut *recursion, span, sample_time),
-            standing: standing_of(options, sample_time),
+            stationary: stationary_watch(options, sample_time),
             moved: false,
             recursion,
             options: options.clone(),
@@ -130,8 +130,8 @@ impl Tracker {
             (true, true) => Act::Step,
             (true, false) => Act::Follow,
         };
-        let Guarded { outcome, held } = match &mut self.standing {
-            Some(standing) => standing.take(&mut *self.recursion, sample, act),
+        let Guarded { outcome, held } = match &mut self.stationary {
+            Some(stationary) => stationary.take(&mut *self.recursion, sample, act),
             None => Guarded {
                 outcome: act.on(&mut *self.recursion, sample),
                 held: false,
@@ -151,7 +151,7 @@ impl Tracker {
         }
     }
 
-    /// What became of a sample behind a guard.
+    /// Outcome of a sample after a guard.
     #[inline]
     fn guarded(&mut self, guarded: Guarded, skipped: bool) -> Outcome {
         let taken = guarded.outcome.filter(|_| !guarded.held);
@@ -168,19 +168,23 @@ impl Tracker {
         }
     }
 
-    /// What the guard found or did at the last sample.
+    /// Event of the guard at the last sample.
     pub fn event(&self) -> Option<GuardEvent> {
         let of_guard = self.guard.as_ref().and_then(|guard| guard.event());
-        of_guard.or_else(|| self.standing.as_ref()?.event())
+        of_guard.or_else(|| self.stationary.as_ref()?.event())
     }
 
-    /// True while the estimate stands still, by the guard or because nothing arrives.
+    /// True while the estimate stays constant, by the guard or because nothing arrives.
     pub fn is_paused(&self) -> bool {
         let of_guard = self.guard.as_ref().is_some_and(|guard| guard.is_paused());
-        of_guard || self.standing.as_ref().is_some_and(|standing| standing.is_paused())
+        of_guard
+            || self
+                .stationary
+                .as_ref()
+                .is_some_and(|stationary| stationary.is_paused())
     }
 
-    /// Seconds since the guard began the estimate again, where it has.
+    /// Seconds since the guard started the estimate again, where it has.
     pub fn since_restart_s(&self) -> Option<f64> {
         self.guard.as_ref()?.since_restart_s()
     }
@@ -267,8 +271,8 @@ impl Tracker {
         Some(OpenLoop::of(value, whole, element, self.sample_time))
     }
 
-    /// True where a method whose basis holds more forms than gain and lead knows the response of now at some frequency
-    /// to a quarter: gain and lead may be open then.
+    /// True if a method whose basis holds more forms than gain and lead knows the current response at some frequency to
+    /// a quarter: gain and lead may be open then.
     pub(crate) fn response_is_known(&self) -> bool {
         let known = |omega: &f64| {
             let gain = self
@@ -279,7 +283,7 @@ impl Tracker {
         self.options.method.lag_of_basis_s().is_some() && KNOWN_AT_RAD_S.iter().any(known)
     }
 
-    /// Every crossing of the loop of now with its controlled element; `None` without one, or without an estimate.
+    /// Every crossing of the current loop with its controlled element; `None` without one, or without an estimate.
     pub(crate) fn open_loop_shape(&self) -> Option<LoopShape> {
         let element = self.options.controlled_element.as_ref()?;
         self.response(1.0)?;
@@ -300,8 +304,8 @@ impl Tracker {
         LoopShape::of(known, element, self.sample_time)
     }
 
-    /// What the response of now says against who is said to have held the loop: with a controlled element the loop that
-    /// they would make ([`LoopShape::doubt`]), without one the sign of the response at low frequencies.
+    /// Finding of the current response against the assumed operator: with a controlled element, the loop that it would
+    /// form ([`LoopShape::doubt`]), without one the sign of the response at low frequencies.
     pub(crate) fn response_doubt(&self) -> Option<Finding> {
         if let Some(element) = &self.options.controlled_element {
             let reach = match self.open_loop()? {
@@ -378,12 +382,12 @@ fn largest_nk(options: &TrackOptions, sample_time: SampleTime) -> usize {
     options.orders.nk.max((latest.ceil() as usize).saturating_add(1))
 }
 
-/// The watch of a recursion without a guard, but where that was asked for.
-pub(crate) fn standing_of(options: &TrackOptions, sample_time: SampleTime) -> Option<Box<Standing>> {
+/// The watch of a recursion without a guard, but where that was requested.
+pub(crate) fn stationary_watch(options: &TrackOptions, sample_time: SampleTime) -> Option<Box<StationaryWatch>> {
     if options.method.guard().is_some() {
         return None;
     }
-    Standing::new(largest_nk(options, sample_time), sample_time).map(Box::new)
+    StationaryWatch::new(largest_nk(options, sample_time), sample_time).map(Box::new)
 }
 
 /// The guard of a recursion at its start, where the options ask for one.

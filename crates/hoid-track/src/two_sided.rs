@@ -7,7 +7,7 @@ use crate::setup::Setup;
 /// The causal run before it, and of which samples estimates are asked.
 #[derive(Debug, Clone)]
 pub struct Causal {
-    /// What the recursion was built of.
+    /// Components of the recursion.
     pub setup: Setup,
     /// Magnitude beyond which a sample is a fault.
     pub largest: f64,
@@ -17,7 +17,7 @@ pub struct Causal {
     pub last: Option<OperatorEstimate>,
 }
 
-/// What all of a run says of the operator at one sample.
+/// Information of all of a run about the operator at one sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TwoSided {
     /// The coefficients.

@@ -1,10 +1,9 @@
-//! What a trace explains of another run, and the covariance at the start that this chooses.
+//! Prediction of another run by a trace, and the choice of the initial covariance by it.
 //!
-//! The reference text measures models by the variance accounted for (eq. 39) and proposes that "the
-//! covariance matrix could be updated based on VAF from a validation data set, in order to reduce the
-//! strong oscillations" (section VII); how, it leaves open. Here: a second run of the same person in
-//! the same task, with its own remnant, is simulated with the estimates of the first as they changed
-//! in time,
+//! The thesis measures models by the variance accounted for (eq. 39) and proposes that "the covariance matrix could be
+//! updated based on VAF from a validation data set, in order to reduce the strong oscillations" (section VII); how, it
+//! leaves open. Here: a second run of the same person in the same task, with its own remnant, is simulated with the
+//! estimates of the first as they changed in time,
 //!
 //! `w(t) = sum_j b_j(t) e(t - nk - j) - sum_i g_i(t) w(t - i)`,  `G = A F`,
 //!
@@ -15,17 +14,16 @@
 //! that is too stiff explains less where the person changes. Runs are laid on one another from their
 //! first samples on, so that what changes in the task has to change at the same time in both.
 //!
-//! [`track_validated`] takes the proposal by its word: P is updated in course. At regular times the
-//! model of now and that of one interval before are both simulated over the last seconds of the second
-//! run; where the one of now explains less,
+//! [`track_validated`] takes the proposal by its word: P is updated in course. At regular times the current model and
+//! that of one interval before are both simulated over the last seconds of the second run; where the current one
+//! explains less,
 //!
 //! `P <- P max(least, ((1 - VAF_before)/(1 - VAF_now))^power)`,
 //!
 //! the estimate moves less until it has forgotten; where it explains more, P stays. What the remnant
 //! leaves unexplained is in both, so that a model that is right is not punished by noise.
 //!
-//! The VAF removes no mean. The first seconds are left out: the simulation begins at rest, and the
-//! person does not.
+//! The VAF removes no mean. The first seconds are left out: the simulation starts at rest, and the person does not.
 
 use hoid_ident::{IdentError, validation::vaf};
 use hoid_model::{Orders, Record, SampleTime};
@@ -40,7 +38,7 @@ use crate::{
 
 /// Values of p that are tried, in units of the innovation variance; the text's is 0.1.
 pub const COVARIANCES: [f64; 9] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0];
-/// Time behind which the simulation has forgotten that it began at rest, s.
+/// Time after which the simulation has forgotten that it started at rest, s.
 const SETTLING_S: f64 = 2.0;
 /// Shortest span that is compared, s.
 const SHORTEST_S: f64 = 5.0;
@@ -100,7 +98,7 @@ impl Trace {
     }
 }
 
-/// What a second run must be, and what its trace.
+/// Checks a second run and its trace.
 fn check(other: &Record, options: &TrackOptions, ts: SampleTime) -> Result<(), IdentError> {
     let found = other.sample_time();
     if !found.matches(ts) {
@@ -163,7 +161,7 @@ fn check_method(options: &TrackOptions) -> Result<(), IdentError> {
     if !has_p || matches!(forgets, ForgettingRule::Window | ForgettingRule::Gradient(_)) {
         return Err(bad(
             "the run for validation",
-            format!("{method}, whose gain does not begin with a covariance that can be chosen"),
+            format!("{method}, whose gain does not start with a covariance that can be chosen"),
             "a method with the option covariance, as rls or rpem, and a way of forgetting that has P",
         ));
     }
@@ -226,7 +224,7 @@ pub fn choose_covariance(
 pub struct CovarianceUpdates {
     /// Time between two looks at the second run, s.
     pub interval_s: f64,
-    /// Length of the second run that is looked at, s.
+    /// Length of the second run that is examined, s.
     pub window_s: f64,
     /// Smallest factor of P.
     pub least: f64,

@@ -1,4 +1,4 @@
-//! What `adaptive` says of virtual people in their first seconds: from the second second on, with
+//! What `adaptive` states of virtual people in their first seconds: from the second second on, with
 //! bands that hold.
 #![allow(clippy::unwrap_used)]
 
@@ -36,7 +36,7 @@ fn bands_hold_from_the_second_second_on() {
         let element: ContinuousTransferFunction = plant.text().parse().unwrap();
         let options = TrackOptions {
             controlled_element: Some(element),
-            ..TrackOptions::usual(Method::adaptive(), 13)
+            ..TrackOptions::default_for(Method::adaptive(), 13)
         };
         let mut tracker = Tracker::new(&options, None, ts).unwrap();
         for k in 0..run.record.len() {
@@ -78,7 +78,7 @@ fn bands_hold_from_the_second_second_on() {
     for (share, at) in shares(&counts).into_iter().zip(AT_S) {
         assert!((0.85..=1.0).contains(&share), "{at} s: {share}");
     }
-    // Before 8 s few say what their crossover is.
+    // Before 8 s few report what their crossover is.
     for (count, at) in loops.iter().zip(AT_S).skip(3) {
         assert!(count.all >= 30.0, "{at} s: {}", count.all);
         let share = count.inside / count.all;

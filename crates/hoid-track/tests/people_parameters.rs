@@ -1,4 +1,5 @@
-//! Parameters of virtual people by `adaptive`: within their errors, or not said to be determined.
+//! Parameters of virtual people by `adaptive`: within their errors, or not reported to be
+//! determined.
 #![allow(clippy::unwrap_used)]
 
 use hoid_model::uncertainty::Estimate;
@@ -6,7 +7,7 @@ use hoid_sim::people::{Person, Plant, Population, RemnantKind, Task};
 use hoid_track::{Method, TrackOptions, Tracker};
 
 const PEOPLE: u64 = 45;
-/// In the first second of an estimate, in the contest of the rivals, and behind it.
+/// In the first second of an estimate, in the contest of the rivals, and after it.
 const AT_S: [f64; 3] = [2.0, 15.0, 30.0];
 
 #[test]
@@ -27,7 +28,7 @@ fn poles_and_delay_of_people_are_within_their_errors() {
             continue;
         };
         people += 1.0;
-        let mut tracker = Tracker::new(&TrackOptions::usual(Method::adaptive(), 13), None, ts).unwrap();
+        let mut tracker = Tracker::new(&TrackOptions::default_for(Method::adaptive(), 13), None, ts).unwrap();
         for k in 0..run.record.len() {
             tracker.step(run.record.input()[k], run.record.output()[k]);
             let t = run.record.time_s(k) - run.record.time_s(0);

@@ -1,5 +1,5 @@
-//! The recursions of the reference text as its users get them, against its equations written down
-//! once more: P as a plain matrix, nothing shared with the library.
+//! The recursions of the thesis as its users get them, against its equations written down once more:
+//! P as a plain matrix, nothing shared with the library.
 //!
 //! ```text
 //! RLS, eq. 25 and 5.26:  psi = [-u(t-1) -u(t-2) x(t) x(t-1)],  eps = u - psi' theta
@@ -40,12 +40,12 @@ fn run(condition: Condition, order: usize, noise_level: f64, replication: u64) -
     Simulator::new(&scenario).unwrap().run(seed, false).unwrap()
 }
 
-/// By the settings of the text, and what is set besides.
+/// By the settings of the text, and what is set in addition.
 fn of_the_text(method: Method, besides: &[(&str, &str)]) -> TrackOptions {
     let rpem = method == Method::rpem();
     let options = TrackOptions {
         start: StartAt::Span(Some((0.0, 30.72))),
-        ..TrackOptions::usual(method, NK)
+        ..TrackOptions::default_for(method, NK)
     };
     let options = options.with(&[("memory", "256"), ("covariance", "0.1")]).unwrap();
     let own: &[(&str, &str)] = if rpem {
@@ -206,7 +206,7 @@ fn an_hour_of_silence_leaves_every_number_finite() {
         if method == Method::rpem() {
             continue;
         }
-        // After it the estimate is that of a run that begins there.
+        // After it the estimate is that of a run that starts there.
         let alone = track(&run, &of_the_text(method.clone(), &[]), loud).unwrap();
         let (last, first) = (trace.theta(trace.len() - 1), alone.theta(alone.len() - 1));
         for (a, b) in last.iter().zip(first) {
@@ -236,7 +236,7 @@ fn a_guard_that_is_none_is_refused_with_what_to_do() {
         found.contains("windup_guard") && found.contains("exponential"),
         "{found}"
     );
-    // Without a guard that is asked for, the window is served.
+    // Without a guard that is requested, the window is served.
     assert!(of_the_text(Method::rls(), &[("forgetting", "window")]).check().is_ok());
 }
 
@@ -244,11 +244,11 @@ fn a_guard_that_is_none_is_refused_with_what_to_do() {
 /// innovations, and structures that the text does not have.
 #[test]
 fn other_settings_keep_their_guard() {
-    let words = |options: TrackOptions| options.memory_in_words(hoid_model::SampleTime::HUNDREDTH);
+    let words = |options: TrackOptions| options.memory_as_text(hoid_model::SampleTime::HUNDREDTH);
     let is_off = |options: TrackOptions| words(options).ends_with("without a guard against windup");
     assert!(is_off(of_the_text(Method::rls(), &[])));
     assert!(is_off(of_the_text(Method::rpem(), &[])));
-    assert!(!is_off(TrackOptions::usual(Method::rpem(), NK)));
+    assert!(!is_off(TrackOptions::default_for(Method::rpem(), NK)));
     assert!(!is_off(of_the_text(Method::rpem(), &[("limit", "5")])));
     assert!(!is_off(of_the_text(Method::rls(), &[("windup_guard", "1e4")])));
     let fir = hoid_model::Structure::Fir;

@@ -1,11 +1,10 @@
 //! What does a fault of a recording do to a result, and does the result say so? The numbers of the
 //! page `research/notes/faults.md`.
 //!
-//! `cargo xtask slow faults [--part N] [--clean N] [--only METHOD] [--rows FILE] [--program FILE]
-//! [--seed N]`: all faults in runs of C1, of C2 and of a virtual person, then clean runs (1000 in
-//! all by default, evaluated in batch and by one tracker each). `--part` takes every N-th case and
-//! clean run, `--rows` writes a row of CSV for each result, `--program` is the program that is judged
-//! (by default the one that is built beside this example).
+//! `cargo xtask slow faults [--part N] [--clean N] [--only METHOD] [--rows FILE] [--program FILE] [--seed N]`: all
+//! faults in runs of C1, of C2 and of a virtual person, then clean runs (1000 in all by default, evaluated in batch and
+//! by one tracker each). `--part` takes every N-th case and clean run, `--rows` writes a row of CSV for each result,
+//! `--program` is the program that is judged (by default the one that is built next to this example).
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
 #[allow(dead_code)]
@@ -22,9 +21,9 @@ use fault_corpus::{
 };
 use rayon::prelude::*;
 
-/// That of the page; the tests have others.
+/// The value for the page; the tests have others.
 const SEED: u64 = 2121;
-/// Numbers of clean runs begin here, so that none is the run of a fault.
+/// Numbers of clean runs start here, so that none is the run of a fault.
 const FIRST_CLEAN: u64 = 100_000;
 
 fn main() {

@@ -1,7 +1,7 @@
 //! Identifies a person from a file and writes a report:
 //! `cargo run --example identify_file -- run1.csv report`.
 //!
-//! The file has the columns t (s), e and u. Without arguments a simulated run stands for it.
+//! The file has the columns t (s), e and u. Without arguments a simulated run represents it.
 #![allow(clippy::print_stdout)]
 
 use std::{error::Error, path::PathBuf};

@@ -12,10 +12,10 @@ use hoid::prelude::*;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let sample_time = SampleTime::new(0.01)?;
-    // Begun with the usual delay, 0.2 s.
+    // Started with the default delay, 0.2 s.
     let options = TrackOptions {
         controlled_element: Some("90/(s(s+6))".parse()?),
-        ..TrackOptions::usual(Method::adaptive(), 21)
+        ..TrackOptions::default_for(Method::adaptive(), 21)
     };
     let mut tracker = Tracker::new(&options, None, sample_time)?;
     let mut out = stdout().lock();

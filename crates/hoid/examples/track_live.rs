@@ -1,8 +1,8 @@
 //! Tracks a person while they act: one sample in, one estimate out.
 //! `cargo run --example track_live`.
 //!
-//! The samples come from a simulated run whose task changes at 40.96 s. The default tracker is told
-//! nothing of the person and begins with the first sample.
+//! The samples come from a simulated run whose task changes at 40.96 s. The default tracker gets no
+//! information about the person and starts with the first sample.
 #![allow(clippy::print_stdout)]
 
 use std::error::Error;
@@ -11,7 +11,7 @@ use hoid::prelude::*;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let run = Simulator::new(&Scenario::condition(Condition::C4))?.run(RunSeed::default(), false)?;
-    let options = TrackOptions::told_nothing(Method::default(), run.sample_time());
+    let options = TrackOptions::without_prior(Method::default(), run.sample_time());
     let mut tracker = Tracker::new(&options, None, run.sample_time())?;
     for (k, (e, u)) in run.input().iter().zip(run.output()).enumerate() {
         tracker.step(*e, *u);

@@ -44,7 +44,7 @@ fn main() {
     if cost {
         let run = Run::new(Condition::C1, 1, first, 81.92);
         for method in methods {
-            let options = TrackOptions::new(method.clone(), method.usual_structure(), method.usual_orders(29));
+            let options = TrackOptions::new(method.clone(), method.default_structure(), method.default_orders(29));
             run.taken(&options.with(&[("guard", guard)]).unwrap(), seeds);
         }
         return;
@@ -57,9 +57,9 @@ fn main() {
                 let remnant_order = 1 + (seed / 2 % 3) as usize;
                 let run = Run::new(condition, remnant_order, seed, LENGTH_S);
                 // The noise model that the method takes, or that of the remnant.
-                let orders = method.usual_orders(29);
+                let orders = method.default_orders(29);
                 let nd = if orders.nd > 0 { orders.nd.max(remnant_order) } else { 0 };
-                let options = TrackOptions::new(method.clone(), method.usual_structure(), Orders { nd, ..orders });
+                let options = TrackOptions::new(method.clone(), method.default_structure(), Orders { nd, ..orders });
                 let options = options.with(&[("guard", guard)]).unwrap();
                 let reference = Reference::new(&run, &options);
                 (run, reference)

@@ -23,7 +23,7 @@
 //! let choice = identify_box_jenkins(&records)?;             // polynomials; delay and noise order by BIC
 //! println!("{}", choice.fit.validate(&records[0])?);
 //!
-//! let options = TrackOptions::told_nothing(Method::default(), records[0].sample_time());
+//! let options = TrackOptions::without_prior(Method::default(), records[0].sample_time());
 //! let trace = track(&records[0], &options, 10)?;            // as `hoid track`: every tenth sample
 //! println!("{trace}");
 //!
@@ -56,7 +56,7 @@
 //! | `io` | [`io`]: files; [`analysis`]: from recordings to a result and its verdict | yes |
 //! | `study` | [`study`]: Monte Carlo studies and groups of runs | |
 //! | `report` | [`report`]: figures and HTML pages; with `study` | |
-//! | `thesis` | [`thesis`]: the reference text, reproduced; with `report` | |
+//! | `thesis` | [`thesis`]: the thesis, reproduced; with `report` | |
 //! | `pdf-png` | figures as PDF and PNG; with `report` | |
 //!
 //! With `default-features = false` nothing that reads files is built.
@@ -83,7 +83,7 @@ pub use hoid_survey as survey;
 pub use hoid_thesis as thesis;
 pub use hoid_track as track;
 
-/// What most programs use: read, identify, validate, track, report, simulate.
+/// Functions that most programs use: read, identify, validate, track, report, simulate.
 pub mod prelude {
     #[cfg(feature = "io")]
     pub use hoid_analysis::{Identification, Identified, Recordings, identify};

@@ -1,5 +1,5 @@
 //! A person who changes: the two-sided estimate against the causal one, and the methods that stand
-//! beside for comparison.
+//! next to for comparison.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
@@ -30,7 +30,7 @@ fn run(condition: Condition, remnant_order: usize, noise_level: f64, replication
 fn options(method: Method) -> TrackOptions {
     TrackOptions {
         start: StartAt::Span(Some((0.0, START_S))),
-        ..TrackOptions::new(method.clone(), method.usual_structure(), method.usual_orders(29))
+        ..TrackOptions::new(method.clone(), method.default_structure(), method.default_orders(29))
     }
 }
 
@@ -151,7 +151,7 @@ fn a_delay_that_changes_is_followed_and_named() {
             assert!(error.abs() < 4.0 * se && se < 0.02, "{t}: {tau:?}");
         }
     }
-    // A start outside what is tracked, a range that is none, and two sides.
+    // A start outside what is tracked, a range that is invalid, and two sides.
     let refused = |options: TrackOptions| {
         track(&run(Condition::C1, 1, 0.1, 0), &options, 8)
             .unwrap_err()
@@ -186,7 +186,7 @@ fn what_has_a_model_of_the_change_takes_no_memory() {
     let other_orders = TrackOptions {
         orders: hoid::model::Orders {
             nf: 1,
-            ..hoid::survey::fused().usual_orders(29)
+            ..hoid::survey::fused().default_orders(29)
         },
         ..options(hoid::survey::fused())
     };

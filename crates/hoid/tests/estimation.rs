@@ -1,5 +1,5 @@
 //! Properties of the estimators that need simulated records: coverage of the error bars, several
-//! records, other orders, and what is refused.
+//! records, other orders, and the refused input.
 #![allow(clippy::unwrap_used)]
 
 use hoid::{

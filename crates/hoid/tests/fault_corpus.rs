@@ -9,8 +9,8 @@ mod fault_corpus;
 use fault_corpus::{
     bases::{Truth, Who, base},
     inject::inject,
-    judge::{Judged, Known, Row, of_fit, of_trace},
-    kinds::{Fault, Kind, On, Place, WHOLE, What, faults},
+    judge::{CaseOutcome, CaseTruth, Row, of_fit, of_trace},
+    kinds::{Fault, FaultPosition, Kind, On, WHOLE, What, faults},
     program::{Way, outcomes, rows},
     summary::{Numbers, by_way, median},
     table::{Table, spread},
@@ -25,7 +25,7 @@ fn two_runs() -> (Table, Table) {
     (base.runs[0].clone(), base.second)
 }
 
-fn fault(what: What, on: On, size: f64, place: Place) -> Fault {
+fn fault(what: What, on: On, size: f64, place: FaultPosition) -> Fault {
     Fault {
         kind: Kind { what, on },
         size,
@@ -38,7 +38,7 @@ fn there_are_hundreds_and_no_two_are_alike() {
     let all = faults();
     assert!(all.len() > 250, "{}", all.len());
     for (i, one) in all.iter().enumerate() {
-        assert!(!all[..i].contains(one), "{one:?} is there twice");
+        assert!(!all[..i].contains(one), "{one:?} is duplicated");
         assert!(one.kind.name() != "none");
     }
 }
@@ -51,7 +51,7 @@ fn runs_and_faults_are_the_same_each_time() {
         let text = |seed: u64| inject(&fault, &clean, &second, seed, case).table.to_csv();
         assert_eq!(text(3), text(3), "{fault:?}");
     }
-    let spike = fault(What::Spike, On::E, 10.0, Place::Middle);
+    let spike = fault(What::Spike, On::E, 10.0, FaultPosition::Middle);
     let at = |seed| inject(&spike, &clean, &second, seed, 5).from_s;
     assert_ne!(at(3), at(4));
     let person = |case| base(Who::Person, SEED, case).unwrap();
@@ -98,10 +98,10 @@ fn each_fault_is_where_it_says_and_nowhere_else() {
         assert_eq!(added, expected, "{fault:?}");
         let share = found.from_s / table.seconds();
         match fault.place {
-            Place::Start => assert!(share < 0.08, "{fault:?}: {share}"),
-            Place::Middle => assert!((0.3..0.6).contains(&share), "{fault:?}: {share}"),
-            Place::End => assert!((0.7..1.0).contains(&share), "{fault:?}: {share}"),
-            Place::Whole => {}
+            FaultPosition::Start => assert!(share < 0.08, "{fault:?}: {share}"),
+            FaultPosition::Middle => assert!((0.3..0.6).contains(&share), "{fault:?}: {share}"),
+            FaultPosition::End => assert!((0.7..1.0).contains(&share), "{fault:?}: {share}"),
+            FaultPosition::Whole => {}
         }
     }
 }
@@ -109,7 +109,7 @@ fn each_fault_is_where_it_says_and_nowhere_else() {
 #[test]
 fn faults_have_their_size() {
     let (clean, second) = two_runs();
-    let with = |what, on, size| inject(&fault(what, on, size, Place::Middle), &clean, &second, SEED, 9);
+    let with = |what, on, size| inject(&fault(what, on, size, FaultPosition::Middle), &clean, &second, SEED, 9);
     let (of_e, of_u) = (spread(&clean.e), spread(&clean.u));
 
     let spike = with(What::Spike, On::Both, 30.0);
@@ -148,7 +148,7 @@ fn faults_have_their_size() {
     assert_eq!(lost.table.t, clean.t[..clean.len() - 100]);
 
     let swapped = inject(
-        &fault(What::Swapped, On::Both, WHOLE, Place::Whole),
+        &fault(What::Swapped, On::Both, WHOLE, FaultPosition::Whole),
         &clean,
         &second,
         SEED,
@@ -157,7 +157,7 @@ fn faults_have_their_size() {
     assert_eq!((&swapped.table.e, &swapped.table.u), (&clean.u, &clean.e));
     let held = with(What::Frozen, On::U, 1.0);
     assert!((held.rows.0..held.rows.1).all(|k| held.table.u[k] == clean.u[held.rows.0]));
-    let coarse = fault(What::Quantised, On::U, 1.0, Place::Whole);
+    let coarse = fault(What::Quantised, On::U, 1.0, FaultPosition::Whole);
     let coarse = inject(&coarse, &clean, &second, SEED, 9);
     assert!(
         coarse
@@ -168,9 +168,9 @@ fn faults_have_their_size() {
     );
 }
 
-fn known(span_s: Option<(f64, f64)>) -> Known {
+fn known(span_s: Option<(f64, f64)>) -> CaseTruth {
     let truth: Truth = vec![("K_e".to_owned(), 1.0), ("tau_e".to_owned(), 0.2)];
-    Known {
+    CaseTruth {
         truth,
         then: None,
         span_s,
@@ -195,7 +195,7 @@ fn fits_are_judged() {
     let told = judged(&fit(1.5, Some(0.1), "doubtful"));
     assert!(told.wrong && told.flagged() && !told.silently_wrong());
     assert!(!judged(&fit(1.39, Some(0.1), "trustworthy")).wrong);
-    // What has no standard error claims nothing, but for a delay on the grid.
+    // What has no standard error claims nothing, except for a delay on the grid.
     let open = judged(&fit(9.0, None, "trustworthy"));
     assert!(!open.wrong && matches!(&open.worst, Some((name, z)) if name == "tau_e" && (z - 1.0).abs() < 1e-9));
     let mut late = fit(1.0, Some(0.1), "trustworthy");
@@ -204,7 +204,7 @@ fn fits_are_judged() {
     let mut undetermined = fit(9.0, Some(0.1), "trustworthy");
     undetermined["operator"]["K_e"]["determined"] = json!(false);
     assert!(!judged(&undetermined).wrong);
-    let refused = Judged::refused();
+    let refused = CaseOutcome::refused();
     assert!(refused.flagged() && !refused.wrong);
 }
 
@@ -230,7 +230,7 @@ fn a_fault_counts_at_its_place_alone() {
 #[test]
 fn traces_are_judged_at_the_end_and_on_the_way() {
     let json = json!({"verdict": {"level": "trustworthy", "findings": []}});
-    // Off by ten errors for 8 s behind a fault of 1 s, then near.
+    // Off by ten errors for 8 s after a fault of 1 s, then near.
     let off_until = |end: f64| -> Vec<Row> {
         let row = |i: u32| {
             let t = f64::from(i) * 0.1;
@@ -254,7 +254,7 @@ fn traces_are_judged_at_the_end_and_on_the_way() {
     let short = of_trace(&json, &off_until(13.0), &known);
     assert!(short.lasting.unwrap() < 2.0, "{short:?}");
     // Another person from 10 s on: the trace that follows them is right.
-    let other = Known {
+    let other = CaseTruth {
         then: Some(vec![("K_e".to_owned(), 2.0)]),
         span_s: Some((10.0, 10.0)),
         ..known
@@ -283,7 +283,7 @@ fn tables_count() {
 
 /// The gate: no number that is wrong goes unflagged.
 #[test]
-#[ignore = "not all faults are found yet; it runs the program `hoid`, which must be built beside this test"]
+#[ignore = "not all faults are found yet; it runs the program `hoid`, which must be built next to this test"]
 fn nothing_is_wrong_and_not_flagged() {
     let here = std::env::current_exe().unwrap();
     let folder = here.parent().unwrap().parent().unwrap();

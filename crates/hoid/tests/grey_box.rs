@@ -1,5 +1,5 @@
 //! The grey box on simulated runs: bias, spread against the Cramér-Rao bound, coverage, choice of
-//! m, delays between samples, constraints, several records, and what is refused.
+//! m, delays between samples, constraints, several records, and the refused input.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid::{
@@ -60,7 +60,7 @@ fn median(values: &[f64]) -> f64 {
     (sorted[(n - 1) / 2] + sorted[n / 2]) / 2.0
 }
 
-/// Fits of known m in both conditions: medians within 5 %, spread as the information says,
+/// Fits of known m in both conditions: medians within 5 %, spread as the information shows,
 /// intervals that cover.
 fn unbiased_and_efficient(m0: usize) {
     let n = 100;

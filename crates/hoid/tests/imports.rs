@@ -18,14 +18,14 @@ use syn::{
     visit::{self, Visit},
 };
 
-/// A module: where it stands, what it defines, and what it imports.
+/// A module: its position, what it defines, and what it imports.
 #[derive(Default)]
 struct Module {
     file: PathBuf,
     parent: Option<usize>,
     children: BTreeMap<String, usize>,
     items: BTreeSet<String>,
-    /// Local name, the path that it stands for, and whether it is a re-export.
+    /// Local name, the path that it represents, and whether it is a re-export.
     imports: Vec<(String, Vec<String>, bool)>,
     globs: Vec<(Vec<String>, bool)>,
     /// Paths in the code.

@@ -1,6 +1,6 @@
 //! Instrumental variables: open loop against the truth and the prediction error method, the closed
 //! loops of the reference task and a faster one in which the input is strongly correlated with the
-//! noise, and what is refused.
+//! noise, and the refused input.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid::{
@@ -267,7 +267,7 @@ fn pem(nk: usize) -> impl Fn(&Record) -> Result<Fit, IdentError> {
     move |record| Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(nk)).fit(one(record))
 }
 
-/// The mean within so many of its standard errors and a share of the truth.
+/// The mean within a given number of its standard errors and a share of the truth.
 fn assert_unbiased(label: &str, samples: &[Sample], errors: f64, share: f64) {
     for ((sample, truth), name) in samples.iter().zip(truth()).zip(NAMES) {
         let distance = (sample.mean() - truth).abs();
@@ -295,7 +295,7 @@ fn fast_loop_biases_simulated_instruments_but_not_external_ones() {
         let label = format!("{method} from f_t");
         let samples = fit_all(&label, &records, |r| operator_iv(method, external(), nk).fit(one(r)));
         // The estimate is not linear in the data: a second-order bias of some per cent, where a
-        // spread is 13 %, is no surprise.
+        // spread is 13 %, is not a surprise.
         assert_unbiased(&label, &samples, 3.5, 0.02);
         for (i, (ours, theirs)) in samples.iter().zip(&by_pem).enumerate() {
             let ratio = (ours.spread() / theirs.spread()).powi(2);
@@ -399,7 +399,7 @@ fn a_missing_or_useless_channel_is_told() {
 #[test]
 fn instruments_that_vanish_where_they_count_are_told() {
     let record = open_loop(&[], 1.0, 2000, 0);
-    // Zero but for one sample near the end: no instrument is left in the rows that count.
+    // Zero except for one sample near the end: no instrument is left in the rows that count.
     let mut late = vec![0.0; 2000];
     late[1999] = 1.0;
     let record = record.with_channel(Channel::new("late", "", late)).unwrap();

@@ -39,7 +39,7 @@ fn prepared(record: Record, change: impl FnOnce(&mut Preparation)) -> Record {
 #[test]
 fn an_offset_gives_the_fit_of_the_aligned_record() {
     let whole = run(1);
-    // u stands three samples late in the file.
+    // u is stationary three samples late in the file.
     let late = bare(&whole, 3);
     let aligned = prepared(late, |p| {
         p.offset.insert("u".into(), Offset::Samples(3.0));

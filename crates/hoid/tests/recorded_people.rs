@@ -2,7 +2,7 @@
 //! against the describing function.
 //!
 //! The recordings are not part of the project. The directory is that of the environment variable
-//! `HOID_HUMAN_DATA`; without it the test says so and passes.
+//! `HOID_HUMAN_DATA`; without it the test reports it and passes.
 #![allow(clippy::unwrap_used)]
 
 use std::{env, path::PathBuf};

@@ -2,7 +2,7 @@
 //! published with the recordings.
 //!
 //! The recordings are not part of the project. The directory is that of the environment variable
-//! `HOID_HUMAN_DATA`; without it the test says so and passes.
+//! `HOID_HUMAN_DATA`; without it the test reports it and passes.
 #![allow(clippy::unwrap_used)]
 
 use std::{env, path::Path};
@@ -146,8 +146,13 @@ fn describing_functions_are_those_of_the_table() {
             row.coherence,
             0.005 + 1e-9,
         );
-        check("off the lines", h.off_line_share, row.off_line_share, 0.005 + 1e-9);
-        // With the plant as it answered, behind its hold of half a tick.
+        check(
+            "at non-excited frequencies",
+            h.off_line_share,
+            row.off_line_share,
+            0.005 + 1e-9,
+        );
+        // With the plant as it answered, after its hold of half a tick.
         let (by_ratio, by_phase) = (measured.crossover_rad_s.unwrap(), measured.phase_margin_deg.unwrap());
         println!("  with the plant measured: {}, {}", shown(by_ratio), shown(by_phase));
         println!("  noise ratio {}, misfit {:.3}", shown(h.noise_ratio), fit.misfit);

@@ -32,7 +32,7 @@ fn run(simulator: &Simulator, replication: u64) -> Record {
 }
 
 fn options(method: Method) -> TrackOptions {
-    let structure = method.usual_structure();
+    let structure = method.default_structure();
     TrackOptions {
         start: StartAt::Span(Some((0.0, 30.72))),
         ..TrackOptions::new(method, structure, structure.operator_orders(NK))

@@ -1,5 +1,5 @@
 //! All structures of Table 5.1 find the truth from their own starts, and each option does what it
-//! says.
+//! reports.
 #![allow(clippy::unwrap_used)]
 
 #[path = "common/textbook.rs"]
@@ -279,7 +279,7 @@ fn the_focus_on_simulation_minimises_the_simulation_error_and_its_bars_cover() {
 
 #[test]
 fn a_stable_model_can_be_asked_for() {
-    // The output grows: least squares says unstable, and with `stable` the best stable model is
+    // The output grows: least squares reports unstable, and with `stable` the best stable model is
     // given.
     let ts = SampleTime::HUNDREDTH;
     let mut draw = Draw(5);
@@ -314,7 +314,7 @@ fn records_without_input_are_told_from_those_with() {
     assert!(v.cross_correlation.lags.is_empty() && v.quality.vaf_simulation == 0.0);
     assert!(v.quality.vaf_prediction > 50.0);
     assert!(fit.operator().is_err());
-    // A record with an input serves as well; the input is not looked at.
+    // A record with an input serves as well; the input is not examined.
     let with = Truth::of(Structure::Arx).record(200, 1.0, 2);
     assert!(estimator(Structure::Ar).fit(&[with]).is_ok());
 }

@@ -1,5 +1,5 @@
 //! Every structure on records of textbook systems, against independent implementations:
-//! fixtures/textbook, made by make.py there, which says what each library assumes.
+//! fixtures/textbook, made by make.py there, which reports what each library assumes.
 #![allow(clippy::unwrap_used)]
 
 use std::{fs, path::PathBuf};
@@ -10,7 +10,7 @@ use hoid::{
 };
 use serde_json::Value;
 
-/// Half a unit in the fifth digit of a number that begins with 9, so tighter than five digits for
+/// Half a unit in the fifth digit of a number that starts with 9, so tighter than five digits for
 /// all others.
 const FIVE_DIGITS: f64 = 5e-6;
 /// The reference is exact to rounding; the search of hoid then has to go on to the end,

@@ -1,5 +1,5 @@
 //! The fit of an operator who changes once: recovery without noise, bias, spread and coverage over
-//! simulated runs, and what is said when nothing changes.
+//! simulated runs, and the report when nothing changes.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::collections::BTreeMap;
@@ -96,7 +96,7 @@ fn a_change_without_noise_is_recovered() {
         assert_eq!(fit.termination().reason, Reason::ExactFit);
         // Residuals of 1e-15 of the output, information matrix of condition 1e4 at most.
         assert!(worst < 1e-10 && fit.change_found());
-        // Nothing can be said about the noise: no standard errors, no intervals.
+        // Nothing can be reported about the noise: no standard errors, no intervals.
         assert!(fit.covariance().is_none() && fit.midpoint_interval().is_none());
         let here = fit.gains_at(30.0);
         let gain = |name: &str| here.get(name).unwrap().value;
@@ -309,7 +309,7 @@ fn parameters_can_be_held_and_the_time_axis_moved() {
     let moved = record.clone().starting_at(100.0);
     let later = held.fit(one(&moved)).unwrap();
     let shift = value(&later, "t_M").value - value(&fit, "t_M").value;
-    // Of a standard error of half a second; the search stops at 1e-4 of it.
+    // For a standard error of half a second; the search stops at 1e-4 of it.
     assert!((shift - 100.0).abs() < 1e-3, "{shift}");
 
     let trace = fit.trace(record);
@@ -335,7 +335,7 @@ fn residuals_and_simulation_of_a_fit() {
     assert_eq!(residuals.values.len(), fit.residual_count());
     let mean = residuals.values.iter().map(|e| e * e).sum::<f64>() / residuals.values.len() as f64;
     assert!((mean / fit.loss() - 1.0).abs() < 1e-9);
-    // What is left of u is the remnant.
+    // The remainder of u is the remnant.
     let simulated = fit.simulate(record).unwrap();
     let (u, n) = (
         &record.output()[simulated.first..],
@@ -404,7 +404,7 @@ fn what_cannot_be_fitted_is_refused() {
     )
     .unwrap();
     assert!(matches!(error(quick(), one(&silent)), IdentError::NoExcitation { .. }));
-    // A few seconds only: whatever comes out, it is said.
+    // A few seconds only: whatever results, it is reported.
     let brief = record.span(39.0, 44.0).unwrap();
     if let Ok(fit) = SigmoidChange::default().fit(one(&brief)) {
         assert!(fit.parameters().iter().all(|p| p.estimate.value.is_finite()));

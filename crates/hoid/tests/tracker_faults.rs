@@ -18,9 +18,9 @@ fn references(method: &Method, seeds: std::ops::Range<u64>, seconds: f64) -> Vec
         .map(|seed| {
             let remnant_order = 1 + (seed % 3) as usize;
             let run = Run::new(Condition::C1, remnant_order, seed, seconds);
-            let orders = method.usual_orders(29);
+            let orders = method.default_orders(29);
             let nd = orders.nd.max(remnant_order);
-            let options = TrackOptions::new(method.clone(), method.usual_structure(), Orders { nd, ..orders });
+            let options = TrackOptions::new(method.clone(), method.default_structure(), Orders { nd, ..orders });
             let reference = Reference::new(&run, &options.with(&[("guard", "yes")]).unwrap());
             (run, reference)
         })

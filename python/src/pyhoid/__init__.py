@@ -3,7 +3,7 @@ the control output u.
 
 >>> import pyhoid
 >>> record = pyhoid.simulate("C1", seed=1)  # or pyhoid.read("run1.csv"), or pyhoid.Record(...)
->>> fit = pyhoid.identify(record)           # the operator of a person, and what it is worth
+>>> fit = pyhoid.identify(record)           # the operator of a person, and its reliability
 >>> trace = pyhoid.track(record)            # the operator from sample to sample
 >>> pyhoid.plots.bode(fit)                  # matplotlib is imported here, not before
 

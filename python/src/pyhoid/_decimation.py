@@ -10,7 +10,7 @@ __all__ = ["said"]
 
 
 def said(records: Sequence[Record]) -> str:
-    """What was done to the rate of the records, as a line; empty where nothing was."""
+    """What was done to the rate of the records, as a line; empty if nothing was."""
     steps = [
         step.partition(":")[0] for one in records for step in one.steps if "decimated by" in step
     ]

@@ -1,4 +1,4 @@
-"""What was found in the records of a fit, and the records as they were fitted."""
+"""Findings in the records of a fit, and the records as they were fitted."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def used(
     native: _pyhoid.Fit | _pyhoid.OperatorFit | _pyhoid.TimeVaryingFit | _pyhoid.Trace,
     given: Sequence[Record],
 ) -> tuple[Record, ...]:
-    """The records as they were fitted, from those that were given and what was done to them."""
+    """The records as they were fitted, from those that were given and the processing of them."""
     several = []
     for origin, parts, steps in native.records():
         of = given[origin]
@@ -37,5 +37,5 @@ def _same(one: Record, other: Record) -> bool:
 def faults_of(
     native: _pyhoid.Fit | _pyhoid.OperatorFit | _pyhoid.TimeVaryingFit | _pyhoid.Description,
 ) -> list[dict[str, Any]]:
-    """Faults of the records that were looked for, each with the place of its record."""
+    """Faults of the records that were searched for, each with the place of its record."""
     return [{"record": place, **fault} for place, fault in native.faults]

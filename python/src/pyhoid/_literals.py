@@ -1,6 +1,6 @@
 """Choices that people type, as types: mypy and pyright find a wrong one before it runs.
 
-Those of single options are in `_settings`.
+The entries of single options are in `_settings`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ __all__ = [
     "ModelStructure",
 ]
 
-#: What `identify` fits, but for time-varying.
+#: What `identify` fits, except for time-varying.
 ModelStructure = Structure | Literal["operator", "family", "grey-box", "grey_box"]
 
 #: How it is fitted.

@@ -39,7 +39,7 @@ class Series(NamedTuple):
 class FrequencyResponse(NamedTuple):
     """Frequency response from e to u with its standard errors.
 
-    All arrays have shape (n,). Standard errors are NaN where there are none.
+    All arrays have shape (n,). Standard errors are NaN if there are none.
 
     Examples
     --------

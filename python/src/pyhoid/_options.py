@@ -58,7 +58,7 @@ def controlled_element(
     """A controlled element as text, or its numerator and denominator, in one or two values."""
     if isinstance(element, str):
         if den is not None:
-            raise OptionError(f"the controlled element {element!r} is whole, expected no den beside it")
+            raise OptionError(f"the controlled element {element!r} is whole, expected no den next to it")
         return element
     try:
         parts: tuple[Any, ...] = tuple(element) if den is None else (element, den)
@@ -83,7 +83,7 @@ def numbers(name: str, values: Mapping[str, Any]) -> dict[str, float]:
 
 
 def guesses(name: str, values: Any) -> str | None:
-    """Pairs of numbers by name, as NAME=VALUE:WEIGHT; None where there are none.
+    """Pairs of numbers by name, as NAME=VALUE:WEIGHT; None if there are none.
 
     >>> guesses("coefficient_prior", {"f1": (-1.9, 0.5)})
     'f1=-1.9:0.5'
@@ -122,7 +122,7 @@ def delay(value: Any) -> tuple[float, float] | None:
 
 
 def text(name: str, value: Any) -> str | None:
-    """A value as the command line writes it; None where it says nothing.
+    """A value as the command line writes it; None if it carries no information.
 
     >>> text("memory_of", {"b": 256, "f": "inf"})
     'b=256,f=inf'

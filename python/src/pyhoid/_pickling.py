@@ -1,8 +1,8 @@
 """Pickles of results, for joblib, multiprocessing and dask.
 
 A result has a native side that is computed and cannot be stored. Its pickle holds what the native
-side says of itself, and the call that made it. So a result comes back at once and with the same
-digits; what is asked of it that was not said before (a prediction on another record, a page) makes
+side reports about itself, and the call that made it. So a result comes back at once and with the same
+digits; what is asked of it that was not reported before (a prediction on another record, a page) makes
 the native side again, once, by the same call on the same data, and compares.
 """
 
@@ -62,7 +62,7 @@ class Recalled:
         if self._made is None:
             if self._call is None:
                 raise DataError(
-                    "a start fit of a tracker that comes out of a pickle has its numbers alone:"
+                    "a start fit of a tracker that results of a pickle has its numbers alone:"
                     " fit the record again by identify"
                 )
             made = self._call.native()
@@ -125,7 +125,7 @@ def same(one: Any, other: Any) -> bool:
 
 
 def state_of(result: Any, names: Sequence[str]) -> dict[str, Any]:
-    """The state of a result for its pickle: its own attributes, and what its native side says."""
+    """The state of a result for its pickle: its own attributes, and what its native side reports."""
     own = dict(result.__dict__)
     native, call = own.pop("_native"), own.pop("_call", None)
     answers = {name: _answer(native, name) for name in names}
@@ -149,7 +149,7 @@ def recalled(result: Any, state: Any, names: Sequence[str]) -> None:
     expected = {"version", "own", "call", "answers", "seal"}
     if not isinstance(state, dict) or set(state) != expected:
         raise DataError(
-            f"this is no pickle of a {type(result).__name__}: expected a state with"
+            f"this is not a pickle of a {type(result).__name__}: expected a state with"
             f" {', '.join(sorted(expected))}; pickle the result again"
         )
     answers = state["answers"]

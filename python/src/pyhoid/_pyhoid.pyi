@@ -364,13 +364,13 @@ class Tracker:
 
     @property
     def trouble(self) -> str | None:
-        """Why the last start fit failed, or why the warm-up began again."""
+        """Why the last start fit failed, or why the warm-up started again."""
 
     @property
     def sample_time(self) -> float: ...
     @property
     def decimation(self) -> str | None:
-        """How a high rate is lowered; None where it is not."""
+        """How a high rate is lowered; None if it is not."""
 
     @property
     def method(self) -> str: ...
@@ -390,7 +390,7 @@ class Tracker:
     def operator(self) -> dict[str, Any] | None: ...
     @property
     def at(self) -> list[float]:
-        """Frequencies in rad/s at which gain and phase are told."""
+        """Frequencies in rad/s at which gain and phase are reported."""
 
     @property
     def controlled_element(self) -> str | None:
@@ -417,7 +417,7 @@ class Tracker:
 
     @property
     def paused(self) -> bool:
-        """True while the guard lets the estimate stand still."""
+        """True while the guard lets the estimate stay constant."""
 
     @property
     def start(self) -> Fit | None: ...

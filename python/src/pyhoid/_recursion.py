@@ -40,7 +40,7 @@ _OF_METHODS = {name for *_, keywords in _pyhoid.recursive_methods() for name in 
 
 
 def name_of_now(method: RecursiveMethod) -> RecursiveMethod:
-    """The name of a method; of an earlier name that of now, with a warning to who called."""
+    """The name of a method; of an earlier name the current one, with a warning to who called."""
     renamed = _pyhoid.renamed_method(method) if isinstance(method, str) else None
     if renamed is None:
         return method
@@ -110,4 +110,4 @@ def _person(prior: Any) -> tuple[str | None, tuple[str, str] | None]:
     except OSError as error:
         raise OptionError(f"prior {path}: {error.strerror or error}") from None
     except UnicodeDecodeError:
-        raise FormatError(f"prior {path}: it is no text in UTF-8") from None
+        raise FormatError(f"prior {path}: it is not a text in UTF-8") from None

@@ -1,6 +1,6 @@
-"""Figures of the reproduction of the reference text, from the tables beside its own figures.
+"""Figures of the reproduction of the thesis, from the tables next to its own figures.
 
-The columns of a table tell what kind of figure it is: box plots over nk and the noise level, maps
+The columns of a table show what kind of figure it is: box plots over nk and the noise level, maps
 over nk and m, Bode plots, estimates over time, or curves.
 """
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Columns = Mapping[str, Any]
 
-#: Columns that tell which curve a row belongs to.
+#: Columns that show which curve a row belongs to.
 KEYS = (
     "model",
     "estimator",

@@ -1,7 +1,7 @@
 """What the results of `identify` share: records, settings, JSON both ways, equality, pickles.
 
 A result is written as the JSON of ``hoid identify --json``, with a state from which the model comes back as
-it was, every bit of it. What is equal and what a pickle holds is that text.
+it was, every bit of it. Equality and pickles use that text.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ class Result:
     settings: dict[str, Any]
     #: Names of those that are not the default.
     given: frozenset[str]
-    #: Units of e and u; empty where none is declared.
+    #: Units of e and u; empty if none is declared.
     units: tuple[str, str]
-    #: Faults of the records that were looked for: record, kind, channel, from, to, samples, size,
+    #: Faults of the records that were searched for: record, kind, channel, from, to, samples, size,
     #: deviations, action, words.
     faults: list[dict[str, Any]]
 
@@ -98,7 +98,7 @@ class Result:
         name = type(self).__name__
         if not isinstance(state, dict) or set(state) != _PARTS or not isinstance(state["text"], str):
             raise DataError(
-                f"this is no pickle of a {name}: expected a state with {', '.join(sorted(_PARTS))};"
+                f"this is not a pickle of a {name}: expected a state with {', '.join(sorted(_PARTS))};"
                 " pickle the result again"
             )
         text = state["text"]

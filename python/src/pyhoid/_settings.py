@@ -58,7 +58,7 @@ class MethodSettings(TypedDict, total=False):
     """Options of the recursive methods."""
 
     # Covariance P at the start: X times the unit matrix, in units of the innovation variance
-    # (the reference text: 0.1). For rls, rpem, physical, fused.
+    # (the thesis: 0.1). For rls, rpem, physical, fused.
     covariance: float | None
 
     # Standard deviations beyond which an innovation moves the estimate no further. For rls,
@@ -103,7 +103,7 @@ class MethodSettings(TypedDict, total=False):
     rate: float | None
 
     # Guard: outliers of e and u are held back, spans that no tracking makes are left out, and
-    # the estimate begins again after them. For rls, rpem, physical, multiple-model, adaptive.
+    # the estimate starts again after them. For rls, rpem, physical, multiple-model, adaptive.
     guard: Literal["yes", "no"] | None
 
     # Signals of psi: gradient (D/(C F) as one filter), cascade (1/F before D/C; for
@@ -133,8 +133,8 @@ class MethodSettings(TypedDict, total=False):
     # Logarithm of the odds from which a change is declared. For multiple-model.
     alarm: float | None
 
-    # At each sample what all of a recorded run says of it, by hypotheses run from both ends, in
-    # place of what the past alone says. For multiple-model.
+    # At each sample what all of a recorded run shows about it, by hypotheses run from both ends, in
+    # place of the prediction from the past alone. For multiple-model.
     smooth: bool | None
 
     # False alarms in an hour that are accepted: a lower number finds fewer changes, later. For
@@ -160,7 +160,7 @@ class MethodSettings(TypedDict, total=False):
     # dual-ekf.
     delay_drift: float | None
 
-    # Error that enters the neuromuscular part beside e, share of the size of e. For dual-ekf.
+    # Error that enters the neuromuscular part next to e, share of the size of e. For dual-ekf.
     state_noise: float | None
 
     # Root mean square of e. For dual-ekf.
@@ -283,7 +283,7 @@ class BatchSettings(TypedDict, total=False):
     # For pem.
     coefficient_prior: Mapping[str, tuple[float, float]] | None
 
-    # Loss of Huber instead of squares: residuals beyond so many standard deviations count
+    # Loss of Huber instead of squares: residuals beyond a given number of standard deviations count
     # linearly; of no number 1.345. For pem.
     robust: float | bool | None
 
@@ -302,7 +302,7 @@ METHODS = """``"rls"``: recursive least squares;
         ``"window"``: a batch fit of the last seconds, again and again;
         ``"rriv"``: recursive refined instrumental variable;
         ``"multiple-model"``: a bank of hypotheses of when the person changed, which sets its
-        memory itself and tells of changes;
+        memory itself and reports changes;
         ``"adaptive"``: gains in a basis that people share, with a noise model of its own;
         starts without a fit;
         ``"fused"``: least squares for B with the poles of rpem, for comparison;
@@ -310,19 +310,19 @@ METHODS = """``"rls"``: recursive least squares;
         ``"ukf"``: unscented Kalman filter of state and parameters, for comparison;
         ``"dual-ekf"``: two extended Kalman filters that take turns, of state and of parameters,
         for comparison;
-        ``"linear-network"``: single linear layer that learns K_e and K_e_dot behind a known
+        ``"linear-network"``: single linear layer that learns K_e and K_e_dot after a known
         neuromuscular part, for comparison."""
 
 #: The options, as the documentation of `track` lists them.
 SETTINGS = """covariance : float
             Covariance P at the start: X times the unit matrix, in units of the innovation
-            variance (the reference text: 0.1). For rls, rpem, physical, fused.
+            variance (the thesis: 0.1). For rls, rpem, physical, fused.
         limit : float
             Standard deviations beyond which an innovation moves the estimate no further. For
             rls, rpem, physical, multiple-model, adaptive, fused.
         windup_guard : float | Literal['off']
             How far each variance in P may grow where nothing excites its parameter, as a
-            multiple of what it is at the start; off: without end. For rls, rpem, physical.
+            multiple of its initial value; off: without end. For rls, rpem, physical.
         memory_of : Mapping[str, float | str]
             Memory of single parameters, or of all of one letter, as b0=256,f=inf,K_e=5s. For
             rls, rpem, physical, rriv, fused.
@@ -342,7 +342,7 @@ SETTINGS = """covariance : float
             For forgetting by the gradient: step size. For rls, rpem, physical.
         guard : Literal['yes', 'no']
             Guard: outliers of e and u are held back, spans that no tracking makes are left out,
-            and the estimate begins again after them. For rls, rpem, physical, multiple-model,
+            and the estimate starts again after them. For rls, rpem, physical, multiple-model,
             adaptive.
         regressor : Literal['gradient', 'cascade', 'pseudo-linear']
             Signals of psi: gradient (D/(C F) as one filter), cascade (1/F before D/C; for
@@ -366,8 +366,8 @@ SETTINGS = """covariance : float
         alarm : float
             Logarithm of the odds from which a change is declared. For multiple-model.
         smooth : bool
-            At each sample what all of a recorded run says of it, by hypotheses run from both
-            ends, in place of what the past alone says. For multiple-model.
+            At each sample what all of a recorded run shows about it, by hypotheses run from both
+            ends, in place of the prediction from the past alone. For multiple-model.
         false_alarms : float
             False alarms in an hour that are accepted: a lower number finds fewer changes,
             later. For adaptive.
@@ -386,7 +386,7 @@ SETTINGS = """covariance : float
             Drift of tau_e in a root second, share of its start, behind a Padé approximation.
             For dual-ekf.
         state_noise : float
-            Error that enters the neuromuscular part beside e, share of the size of e. For
+            Error that enters the neuromuscular part next to e, share of the size of e. For
             dual-ekf.
         error_size : float
             Root mean square of e. For dual-ekf.
@@ -468,7 +468,7 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
             Guesses of coefficients with a weight W, as f1=-1.9:0.5: the loss grows by W (f1 +
             1.9)^2. For pem.
         robust : float | bool
-            Loss of Huber instead of squares: residuals beyond so many standard deviations count
+            Loss of Huber instead of squares: residuals beyond a given number of standard deviations count
             linearly; of no number 1.345. For pem.
         stable : bool
             Take only models that are stable from e to u (C and F always are stable). For pem.

@@ -87,7 +87,7 @@ class Comparison:
         Raises
         ------
         DataError
-            For a text that is none, was changed, or is of another version.
+            For a text that is not a result, was changed, or is of another version.
         """
         _pyhoid.comparison_figure_of(text)
         return cls(text)
@@ -142,7 +142,7 @@ def compare(
         ``"crossover"``, ``"phase_margin"``, ``"tau_e"`` (these three by default), ``"gain_db@2.5"``,
         ``"phase_deg@2.5"``, ``"rms_e"``, ``"rms_u"``, or parameters of one form.
     covariate : {"run"}
-        Takes learning over the runs out, and tells it.
+        Takes learning over the runs out, and reports it.
     adjust : {"holm", "none"}
         What is done about many tests.
     weights : {"penalised", "reml"}

@@ -1,8 +1,8 @@
 """Studies spread over a Dask cluster, shard by shard.
 
 A plan is cut into shards. Each shard runs as one task in a folder of its worker, and its files come
-back as soon as it is done. The shards are kept beside the result until they are merged: a lost
-worker costs only the shard that it was running, and an interrupted study goes on with the shards
+back as soon as it is done. The shards are kept next to the result until they are merged: a lost
+worker costs only the shard that it was running, and an interrupted study continues with the shards
 that it has. The merged tables have the same bytes as those of a run on one machine.
 
 >>> from dask.distributed import Client
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = ["study"]
 
-#: Folder of the shards beside the result.
+#: Folder of the shards next to the result.
 SHARDS = "shards"
 
 
@@ -45,7 +45,7 @@ def _run_shard(text: str, replications: int, index: int, count: int, jobs: int) 
 
 
 def _keep(files: dict[str, bytes], target: Path) -> None:
-    """Write a shard beside its place and rename it: it is there as a whole or not at all."""
+    """Write a shard next to its place and rename it: it is there as a whole or not at all."""
     beside = target.with_name(f".{target.name}.{os.getpid()}")
     shutil.rmtree(beside, ignore_errors=True)
     for name, content in files.items():
@@ -75,7 +75,7 @@ def study(
         As in `pyhoid.plan`. Workers get its text, and need nothing but pyhoid.
     directory : path
         Where the tables are written, on the machine of the client. A study that was stopped there
-        goes on.
+        continues.
     client : distributed.Client
         A client of any scheduler.
     shards : int, optional

@@ -33,7 +33,7 @@ class DescribingFunction:
 
     Columns are read by name, and have one value for each line: ``omega`` (rad/s), ``harmonic``,
     ``response`` (complex), ``response_se``, ``coherence``, ``magnitude_db``, ``phase_deg``, with
-    ``_se`` for standard errors (NaN where there is only one run).
+    ``_se`` for standard errors (NaN if there is only one run).
 
     Examples
     --------
@@ -248,7 +248,7 @@ def describing_function(
 
 
 class Description:
-    """A describing function, its loop, and what it is worth. `describe` makes it.
+    """A describing function, its loop, and its reliability. `describe` makes it.
 
     Attributes
     ----------
@@ -260,11 +260,11 @@ class Description:
         Crossover frequency (rad/s), phase margin (deg), gain margin (dB) and its frequency, each an
         Estimate or None; None without a controlled element.
     remnant_share, noise_ratio : Estimate
-        Share of the power of u off the lines, and with its part at the lines (P_n).
+        Share of the power of u at non-excited frequencies, and with its part at the lines (P_n).
     verdict : {"trustworthy", "doubtful", "not determined"}
         What the result is worth.
     reasons, notes : list of str
-        What speaks against it, and what is worth knowing besides.
+        What speaks against it, and additional notes.
     excitation : str or None
         The channel that the average refers to.
     period : float
@@ -280,7 +280,7 @@ class Description:
         self._json: str = native.to_json()
         #: The settings that were used, by name.
         self.settings: dict[str, str] = {name: value for name, value, _ in native.settings}
-        #: Faults of the records that were looked for: kind, channel, from, to, size, action.
+        #: Faults of the records that were searched for: kind, channel, from, to, size, action.
         self.faults: list[dict[str, Any]] = faults_of(native)
         self.phase_deg: FloatArray = native.phase_deg
         found = native.open_loop
@@ -304,7 +304,7 @@ class Description:
         parts = [f"Verdict: {self.verdict}", *(f"- {reason}" for reason in self.reasons)]
         parts.append(repr(self.function))
         parts.extend(f"{name}: {value}" for name, value in (self.open_loop or {}).items())
-        parts.append(f"remnant: {self.remnant_share} of the power of u off the lines")
+        parts.append(f"remnant: {self.remnant_share} of the power of u at non-excited frequencies")
         return "\n".join(parts)
 
 
@@ -332,7 +332,7 @@ def describe(
     records : Record or sequence of Record
         Runs of one person in one task, each over whole periods of the excitation.
     excitation : str, optional
-        Channel of the recorded disturbance or target; by default the first of the usual names that
+        Channel of the recorded disturbance or target; by default the first of the common names that
         there is with lines.
     lines : sequence of float, optional
         Its lines in rad/s, which need `period`; by default those found.

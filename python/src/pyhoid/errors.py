@@ -1,7 +1,7 @@
 """Exceptions of pyhoid, by kind.
 
 Each is a `pyhoid.Error`, and also a `ValueError` for a wrong value or an `OSError` for a file. The
-messages name the quantity, what was found, what was expected, and the remedy.
+messages name the quantity, what was found, the expected value, and the remedy.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class EstimationError(Error, ArithmeticError):
 
 
 class NotConvertibleError(Error, ValueError):
-    """A model that does not represent an operator; the message says why."""
+    """A model that does not represent an operator; the message gives the reason."""
 
 
 class FileError(Error, OSError):
@@ -44,7 +44,7 @@ class FileError(Error, OSError):
 
 
 class FileMissingError(FileError, FileNotFoundError):
-    """A file that is not there."""
+    """A file that does not exist."""
 
 
 class FormatError(Error, ValueError):

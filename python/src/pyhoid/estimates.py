@@ -15,7 +15,7 @@ __all__ = ["Estimate", "Operator", "Remnant"]
 
 _T = TypeVar("_T")
 
-#: Units of parameters, those of gains beside the units of u and e.
+#: Units of parameters, those of gains next to the units of u and e.
 UNITS: Mapping[str, str] = {
     "K_e": "",
     "T_L": "s",
@@ -39,7 +39,7 @@ _GAINS = ("K", "K_e", "K_e_dot", "K_over_T_I", "K_I")
 def unit_of(name: str, units: tuple[str, str] = ("", ""), own: str | None = None) -> str:
     """The unit of a parameter; of a gain only where those of e and u are declared.
 
-    `own` is the unit that it has beside that of u/e; by default that of its name.
+    `own` is the unit that it has next to that of u/e; by default that of its name.
 
     >>> unit_of("T_L"), unit_of("K_e")
     ('s', '')
@@ -58,7 +58,7 @@ def unit_of(name: str, units: tuple[str, str] = ("", ""), own: str | None = None
 
 
 def channel_units(records: Sequence[Record]) -> tuple[str, str]:
-    """The units of input and output, whatever their columns are called; empty where none is said."""
+    """The units of input and output, whatever their columns are called; empty if none is given."""
     if not records:
         return ("", "")
     record, units = records[0], records[0].units
@@ -71,7 +71,7 @@ def channel_units(records: Sequence[Record]) -> tuple[str, str]:
 class Estimate(NamedTuple):
     """A value and its standard error.
 
-    The standard error is None where there is none: for a delay of whole samples, or an exact fit.
+    The standard error is None if there is none: for a delay of whole samples, or an exact fit.
 
     Examples
     --------
@@ -184,7 +184,7 @@ class Operator(_Converted):
 
     A mapping from names to `Estimate`; the entries are also attributes (``operator.K_e.value``).
     Where the coefficients do not represent a continuous operator, `convertible` is False, `reason`
-    says why, and reading a parameter raises `NotConvertibleError`.
+    gives the reason, and reading a parameter raises `NotConvertibleError`.
 
     Attributes
     ----------

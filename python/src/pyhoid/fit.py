@@ -105,7 +105,7 @@ class Fit(Model, Result):
     def polynomials(self) -> dict[str, FloatArray]:
         """A, B, C, D and F by ascending powers of q^-1.
 
-        B begins with the zeros of its delay, the others with 1.
+        B starts with the zeros of its delay, the others with 1.
         """
         return self._native.polynomials
 
@@ -143,7 +143,7 @@ class Fit(Model, Result):
 
     @property
     def operator(self) -> Operator | None:
-        """The human operator; None where the structure cannot represent one."""
+        """The human operator; None if the structure cannot represent one."""
         found = self._native.operator
         return None if found is None else Operator(found, self.units)
 
@@ -157,9 +157,9 @@ class Fit(Model, Result):
 
     @property
     def levels(self) -> list[Estimate | None]:
-        """The level of u of each record: the constant that is no response to e, in the unit of u.
+        """The level of u of each record: the constant that is not a response to e, in the unit of u.
 
-        Estimated of recorded data; empty for simulated runs and with ``faults="keep"``. None where
+        Estimated of recorded data; empty for simulated runs and with ``faults="keep"``. None if
         the model has no static gain.
         """
         return [None if pair is None else Estimate(*pair) for pair in self._native.levels]
@@ -220,7 +220,7 @@ class Fit(Model, Result):
 
     @property
     def delay_interval(self) -> tuple[int, int] | None:
-        """Range of nk among the candidates that the data cannot tell apart, if nk was searched."""
+        """Range of nk among the candidates that the data cannot distinguish, if nk was searched."""
         return self._native.delay_interval
 
     @property

@@ -61,7 +61,7 @@ def group(
     )
     if not finished:
         raise StudyStateError(
-            f"the group was stopped; what is done is in {directory}; go on with resume=True"
+            f"the group was stopped; completed parts are in {directory}; continue with resume=True"
         )
     return Results(directory, finished=finished, estimates=estimates)
 

@@ -118,11 +118,11 @@ def identify(
         rivbj for bj (Young 2011).
     faults : {{"bridge", "cut", "report", "keep"}}
         What is done about faults of the records (spikes, dropouts, frozen and idle stretches):
-        bridge what lasts up to 0.1 s and cut at what is longer, cut all, report only, or look for
-        none. What was found is ``fit.faults``. Of recorded data a level of u is estimated too
+        bridge faults of up to 0.1 s and cut at longer ones, cut all, report only, or look for
+        none. What was found is ``fit.faults``. For recorded data a level of u is estimated too
         (``fit.levels``), and ``fit.records`` are without their means; keep leaves data as they are.
     decimate : "auto", "off" or int
-        Keep every n-th sample behind a linear-phase low-pass filter. ``"auto"``: above 200 Hz by the
+        Keep every n-th sample after a linear-phase low-pass filter. ``"auto"``: above 200 Hz by the
         number that comes nearest to 100 Hz for operators; polynomial structures, whose orders and
         delay count samples, take all samples unless a number is given.
         ``fit.records`` are the decimated records.
@@ -203,7 +203,7 @@ def from_json(text: str) -> OperatorFit | Fit | TimeVaryingFit:
     Raises
     ------
     DataError
-        For a text that is no result, was changed, or is of another version.
+        For a text that is not a result, was changed, or is of another version.
 
     Examples
     --------
@@ -267,7 +267,7 @@ def _roles(record: Record, inputs: Sequence[str] | None, roles: Mapping[str, str
 
 
 def _texts(settings: Mapping[str, Any]) -> dict[str, str]:
-    """Options as texts, as the library reads them; those that say nothing are left out.
+    """Options as texts, as the library reads them; those that carry no information are left out.
 
     >>> _texts({"nk": (20, 40), "individual": ("K", "T_L"), "stable": False, "neuromuscular": False})
     {'nk': '20..40', 'individual': 'K,T_L', 'neuromuscular': 'no'}

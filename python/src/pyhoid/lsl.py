@@ -2,7 +2,7 @@
 
 The stream of a person has a channel for e and one for u, by their labels, or the first two. Each
 sample is taken by a `Tracker`, and each estimate pushed with the time stamp of its sample: it lies
-beside it in a recording. Clocks are brought to that of this computer by LabStreamingLayer itself.
+next to it in a recording. Clocks are brought to that of this computer by LabStreamingLayer itself.
 By the time stamps samples are found that are lost: the tracker bridges them, and they are counted.
 
 >>> tracker = pyhoid.Tracker(sample_time=0.01, controlled_element="90/(s(s+6))")

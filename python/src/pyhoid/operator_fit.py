@@ -1,4 +1,4 @@
-"""The operator of a person: which form, its parameters with honest errors, and what it is worth."""
+"""The operator of a person: which form, its parameters with honest errors, and its reliability."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class OperatorFit(Model, Result):
     excitation : str or None
         Its channel.
     agreement : dict or None
-        The methods beside each other: coordinates (each by ``prediction_error``, ``lines`` and
+        The methods next to each other: coordinates (each by ``prediction_error``, ``lines`` and
         ``riv_bj``), pairs of methods with chi2 and p_value, and chi2 and p_value of the pair that
         agrees least (p_value times the number of pairs).
     riv_bj : dict or None
@@ -70,7 +70,7 @@ class OperatorFit(Model, Result):
         The whole of that loop: ``crossovers`` (every frequency in rad/s at which its gain is one, with
         its phase margin in deg, a pair of Estimates each), ``smallest_phase_margin_deg``,
         ``gain_margin_db``, ``phase_crossover_rad_s`` (None where there is none), and ``stable``: True,
-        False, or None where that cannot be told. None without a controlled element.
+        False, or None if that cannot be determined. None without a controlled element.
     open_loop_intervals : dict or None
         Their intervals of 95 %, (low, high) each, Student's: the errors rest on few runs or blocks.
     open_loop_person : dict or None
@@ -91,7 +91,7 @@ class OperatorFit(Model, Result):
     intersample : dict
         What e does between its samples: ``used`` (``"auto"``, ``"zoh"`` or ``"foh"``), and
         ``tau_e_if_straight``, the delay in s if e was logged from what is faster or continuous; None
-        where the data show or `intersample` says what e does.
+        where the data show or `intersample` states what e does.
     prior : dict of str to (float, float)
         Centre, and standard deviation of the logarithm.
     loss, innovation_variance : float
@@ -105,7 +105,7 @@ class OperatorFit(Model, Result):
         The same model as polynomials, one for each of `operators`: prediction, simulation,
         residuals, frequency response. They take records without their mean, such as `records`.
     faults : list of dict
-        Faults of the records that were looked for: record, kind, channel, from, to, samples, size,
+        Faults of the records that were searched for: record, kind, channel, from, to, samples, size,
         deviations, action, words.
     settings : dict
         The keywords of the call, defaults included.

@@ -1,4 +1,4 @@
-"""Parameters of an operator, and how much of each the data say."""
+"""Parameters of an operator, and how much of each the data show."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ __all__ = ["OperatorParameter", "OperatorParameters"]
 
 
 class OperatorParameter(NamedTuple):
-    """A parameter of an operator, and how much of it the data say.
+    """A parameter of an operator, and how much of it the data show.
 
     Attributes
     ----------
     value : float
         Infinite for the lag of a pure integration.
     standard_error : float or None
-        To first order, of the operator of these runs; None where there is none, such as at a bound.
+        To first order, of the operator of these runs; None if there is none, such as at a bound.
     standard_error_person : float or None
         That of the person, whose gain varies from one run to the next.
     interval : (float, float) or None
@@ -30,7 +30,7 @@ class OperatorParameter(NamedTuple):
         Whether the data determine the parameter.
     unit : str
     averaged_over : tuple of str
-        The forms whose estimates it is the mean of; empty where it is that of one form alone.
+        The forms over which the estimate is averaged; empty for a single form.
 
     Examples
     --------
@@ -58,7 +58,7 @@ class OperatorParameter(NamedTuple):
         return "(the prior alone)" if self.prior_share > 0.5 else "(not determined)"
 
     def _shown(self) -> str:
-        """Value and error; nothing where the data say nothing, and no prior either."""
+        """Value and error; nothing if the data carry no information, and no prior either."""
         if not self.determined and self.prior_share <= 0.5:
             return ""
         if self.standard_error is not None and self.standard_error > abs(self.value):

@@ -1,6 +1,6 @@
 """Figures with matplotlib in the style of hoid's reports, on new axes or on yours.
 
-The hue tells the model or method (blue, vermillion, green, ... of Okabe and Ito); black is the
+The hue reports the model or method (blue, vermillion, green, ... of Okabe and Ito); black is the
 truth or the measurement. Bands are two standard errors wide on each side (`deviations`), error bars
 one. Every function returns the axes that it has drawn on.
 """
@@ -413,7 +413,7 @@ def trace(
 
 
 def _mark_changes(ax: Axes, traces: Iterable[Trace], *, words: bool) -> None:
-    """A dashed line where a change was declared, with what changed."""
+    """A dashed line where a change was declared, with the change."""
     for change in (change for one in traces for change in one.changes):
         ax.axvline(change["t"], color="#444444", linestyle=(0, (6, 3)), linewidth=0.9)
         if words:
@@ -493,7 +493,7 @@ def box_plots(
 
 
 def reference(name: str, directory: str | PathLike[str]) -> Figure:
-    """Draw a figure of the reproduction of the reference text from its data.
+    """Draw a figure of the reproduction of the thesis from its data.
 
     Parameters
     ----------

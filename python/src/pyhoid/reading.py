@@ -73,7 +73,7 @@ def read(
         output.
     time : str, optional
         Column of the time, with its unit where that is not found: ``"clock:ms"`` (s, ms, us, ns,
-        min, h, iso, sec+nanosec). Without it ``t``, or the column with a usual name of a time.
+        min, h, iso, sec+nanosec). Without it ``t``, or the column with a common name of a time.
     trial : str, optional
         The trial to read of a file with several: ``"trial=3"``. `read_trials` reads all.
     sampling_frequency : float, optional
@@ -87,7 +87,7 @@ def read(
     drop_repeated : bool
         Drop rows that occur twice, with the same time.
     unit : mapping, optional
-        Units that the file does not say, by channel: ``{"e": "deg", "u": "V"}``. No number changes.
+        Units that the file does not report, by channel: ``{"e": "deg", "u": "V"}``. No number changes.
     scale : mapping, optional
         Factors by channel (``e`` and ``u`` are input and output): ``{"u": 12.5}``, into a unit
         ``{"u": "12.5:deg"}``, or from unit to unit ``{"e": "rad:deg"}``.
@@ -99,7 +99,7 @@ def read(
     new_sampling_frequency : float, optional
         Another sampling frequency in Hz, after a low-pass filter.
     run_in : float
-        Seconds dropped at the beginning.
+        Seconds dropped at the start.
     detrend : {"none", "mean", "linear"}
         The trend removed from input and output, as the last step.
 
@@ -110,7 +110,7 @@ def read(
     Raises
     ------
     FileError
-        When the file is not there (`FileNotFoundError`) or cannot be read (`OSError`).
+        When the file is missing (`FileNotFoundError`) or cannot be read (`OSError`).
     FormatError
         When the content is not as expected; the message names the row.
 
@@ -118,7 +118,7 @@ def read(
     -----
     UserWarning
         What a person should know about the file: columns left out, trouble with the sampling.
-        `Record.steps` lists what was done to the numbers.
+        `Record.steps` lists the processing applied to the numbers.
 
     Examples
     --------
@@ -157,7 +157,7 @@ def read_segments(
     shortest: float = 2.0,
     **options: Unpack[ReadOptions],
 ) -> list[Record]:
-    """Read the good segments of a file, between what is wrong with its sampling.
+    """Read the good segments of a file, between the problems of its sampling.
 
     Each segment is a record: `identify` gives each its own initial states. Leaving samples out can
     bias the result: without the samples at a rail, for example, the largest responses are gone.
@@ -167,7 +167,7 @@ def read_segments(
     path : path
     mask : sequence of str
         What is left out: any of ``"missing"``, ``"gap"``, ``"stalled"`` and ``"saturated"``
-        (`info` tells what a file has).
+        (`info` shows what a file has).
     shortest : float
         Length in s of the shortest segment to use.
     **options
@@ -310,7 +310,7 @@ def info(
     ----------
     path : path
     input, output, excitation : str, optional
-        Columns that are known, which are not looked for; ``excitation="none"`` looks for none.
+        Columns that are known, which are not searched for; ``excitation="none"`` looks for none.
     controlled_element : str, optional
         As ``"90/(s(s+6))"``: with it and a column y it is found by how many samples the control was
         recorded late.
@@ -323,10 +323,10 @@ def info(
     -------
     dict
         ``format``; ``columns`` with unit, type, rows and the range of their values; ``samplings``
-        with frequency, gaps and jitter; ``trouble`` with what is wrong with the sampling, where,
+        with frequency, gaps and jitter; ``trouble`` with the problems of the sampling, where,
         how much, and the remedy; ``notes``; ``look`` with the columns of error and control, the
         excitation and its longest span of whole periods, by how much the control is late, and in
-        ``read`` the keywords by which `read` takes the file so (None where that is not certain).
+        ``read`` the keywords by which `read` takes the file so (None if that is not certain).
 
     Raises
     ------

@@ -24,7 +24,7 @@ __all__ = ["Record"]
 
 
 def _is_frozen(array: FloatArray) -> bool:
-    """Whether nobody can write into an array: it owns its numbers or looks at such a one, and none
+    """Whether no one can write into an array: it owns its numbers or looks at such a one, and none
     of them is writeable."""
     at: Any = array
     while isinstance(at, np.ndarray):
@@ -35,7 +35,7 @@ def _is_frozen(array: FloatArray) -> bool:
 
 
 def _read_only(array: FloatArray) -> FloatArray:
-    """The array as nobody can change it: a copy, unless it is so already."""
+    """The array as no one can change it: a copy, unless it is so already."""
     if _is_frozen(array):
         return array
     own = np.array(array, dtype=np.float64, copy=True)
@@ -55,7 +55,7 @@ def _seconds(times: npt.NDArray[Any]) -> npt.NDArray[Any]:
             return np.asarray(times, dtype=np.float64)
         except (TypeError, ValueError):
             raise DataError(
-                f"the times are no numbers (the first is {times[0]!r}), expected s, dates or durations;"
+                f"the times are not numbers (the first is {times[0]!r}), expected s, dates or durations;"
                 " pandas.to_datetime makes dates of text"
             ) from None
     if np.isnat(times).any():
@@ -68,7 +68,7 @@ def _seconds(times: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 
 def _own(array: FloatArray) -> FloatArray:
-    """An array that nobody else holds, frozen as it is."""
+    """An array that no other code holds, frozen as it is."""
     array.flags.writeable = False
     return array.view()
 
@@ -77,7 +77,7 @@ class Record:
     """The signals of one run, with one value for each sample.
 
     The numbers are the record's own: arrays that others can write into are copied, so that nothing
-    changes behind its back; arrays that nobody can write into (such as those of another record) are
+    changes behind its back; arrays that no one can write into (such as those of another record) are
     not.
 
     Parameters
@@ -158,7 +158,7 @@ class Record:
         }
         self.input_name: str = input_name
         self.output_name: str = output_name
-        #: By how much a sample of e is taken later than that of u beside it, s: in the middle of its
+        #: By how much a sample of e is taken later than that of u next to it, s: in the middle of its
         #: hold where the record was decimated.
         self.input_lead: float = input_lead
         #: What was done to the numbers, when the record was read from a file and since.
@@ -231,7 +231,7 @@ class Record:
         output: str,
         sample_time: float | None,
     ) -> Record:
-        """A record from columns by name, and from the times beside them where there is no column t."""
+        """A record from columns by name, and from the times next to them where there is no column t."""
         for name in (input, output):
             if name is not None and name not in columns:
                 if "-" in name:
@@ -365,11 +365,11 @@ class Record:
         return record
 
     def decimated(self, decimate: int | str = "auto") -> Record:
-        """The record at a lower rate: every n-th sample behind a linear-phase low-pass filter.
+        """The record at a lower rate: every n-th sample after a linear-phase low-pass filter.
 
         The filter is the same for all channels; the input is taken in the middle of the n samples
         over which it is held then, so that delays stay. It is what `identify`, `track` and
-        `describe` do by themselves above 200 Hz.
+        `describe` do automatically above 200 Hz.
 
         Parameters
         ----------
@@ -400,7 +400,7 @@ class Record:
         )
 
     def to_polars(self) -> pl.DataFrame:
-        """All channels as a table of polars, behind the time in s as column ``t``.
+        """All channels as a table of polars, after the time in s as column ``t``.
 
         >>> record.to_polars()
         """

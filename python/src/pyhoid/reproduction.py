@@ -1,4 +1,4 @@
-"""The tables, figures and claims of the reference text."""
+"""The tables, figures and claims of the thesis."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Reproduction(NamedTuple):
     tables: dict[str, Table]
     #: Results of the studies by name.
     studies: dict[str, Results]
-    #: How many claims hold, hold in part, do not hold and cannot be tested; None if not asked for.
+    #: How many claims hold, hold in part, do not hold and cannot be tested; None if not requested.
     claims: dict[str, int] | None
 
 
@@ -43,10 +43,10 @@ def reproduce(
     jobs: int | None = None,
     progress: Progress = False,
 ) -> Reproduction:
-    """Make the tables, figures and claims of the reference text (Ortiz Moya 2023).
+    """Make the tables, figures and claims of the thesis (Ortiz Moya 2023).
 
     This does what ``hoid reproduce`` does. Studies that are already there are not run again; one
-    that was interrupted goes on.
+    that was interrupted continues.
 
     Parameters
     ----------
@@ -86,8 +86,8 @@ def reproduce(
     )
     if made is None:
         raise StudyStateError(
-            f"the reproduction was stopped; what is done is in {target};"
-            " make the same call again to go on"
+            f"the reproduction was stopped; completed parts are in {target};"
+            " make the same call again to continue"
         )
     page, _, tally = made
     names = ("hold", "hold, and more so", "hold in part", "do not hold", "cannot be tested")

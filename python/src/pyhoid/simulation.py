@@ -45,7 +45,7 @@ def simulate(
     Parameters
     ----------
     condition : {"C1", ..., "C6"}, optional
-        A condition of the reference text (Ortiz Moya 2023, Table 4.4).
+        A condition of the thesis (Ortiz Moya 2023, Table 4.4).
     scenario : path or str, optional
         A scenario file (TOML), or the text of one.
     remnant_order : int, optional
@@ -59,7 +59,7 @@ def simulate(
     sample_time : float, optional
         Ts in s; default 0.01.
     realisation : {"input", "output"}, optional
-        Where K_c stands in the controlled element, which matters when it changes.
+        Where K_c is in the controlled element, which matters when it changes.
     seed, cell, replication : int
         They select the random stream; runs with different replications are independent.
     keep_run_in : bool
@@ -118,7 +118,7 @@ def margins(
     -------
     dict
         ``crossover_rad_s``, ``phase_margin_deg``, ``gain_margin_db``, ``phase_crossover_rad_s``
-        (None where there is none), and ``remnant_gain``, a list of dicts with ``remnant_order``,
+        (None if there is none), and ``remnant_gain``, a list of dicts with ``remnant_order``,
         ``noise_level``, ``definition`` and ``K_n``.
 
     Examples

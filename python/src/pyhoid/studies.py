@@ -116,7 +116,7 @@ class Results(Mapping[str, Table]):
     estimates : int
         Number of estimates that this run made.
     pages : list of Path
-        The pages beside the tables, for a group.
+        The pages next to the tables, for a group.
 
     Examples
     --------
@@ -213,7 +213,7 @@ def study(
 ) -> Results:
     """Run a study, or a share of it, and write its tables into a directory.
 
-    An interrupt stops it within a second; ``resume=True`` then goes on, with nothing lost or done
+    An interrupt stops it within a second; ``resume=True`` then continues, with nothing lost or done
     twice.
 
     Parameters
@@ -228,7 +228,7 @@ def study(
     replications : int, optional
         Replaces the number in the plan.
     resume : bool
-        Go on with a study that was stopped.
+        Continue with a study that was stopped.
     csv : bool
         Write the tables as CSV instead of Parquet.
     progress : bool or callable
@@ -261,7 +261,7 @@ def study(
     )
     if not finished:
         raise StudyStateError(
-            f"{found.name} was stopped; what is done is in {target}; go on with resume=True"
+            f"{found.name} was stopped; completed parts are in {target}; continue with resume=True"
         )
     return Results(target, finished=bool(tables), estimates=estimates)
 

@@ -94,9 +94,9 @@ class TimeVaryingFit(Result):
 
     @property
     def levels(self) -> list[Estimate | None]:
-        """The level of u of each record: the constant that is no response to e, in the unit of u.
+        """The level of u of each record: the constant that is not a response to e, in the unit of u.
 
-        None where it was not estimated: of simulated runs and with ``faults="keep"``.
+        None if it was not estimated: of simulated runs and with ``faults="keep"``.
         """
         return [None if pair is None else Estimate(*pair) for pair in self._native.levels]
 

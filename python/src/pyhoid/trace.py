@@ -52,7 +52,7 @@ class Trace:
     """The estimate at every sample that was kept, with its uncertainty. `track` makes it.
 
     Columns are read by name: ``trace["K_e"]``, and ``trace["K_e_se"]`` for its standard errors. All
-    have shape (N,), and NaN where a row has no operator. With `at` and `controlled_element` there
+    have shape (N,), and NaN if a row has no operator. With `at` and `controlled_element` there
     are ``trace["gain_db@2.5"]``, ``trace["phase_deg@2.5"]``, ``trace["crossover_rad_s"]`` and
     ``trace["phase_margin_deg"]``; ``"adaptive"`` adds ``trace["omega_nm_determined"]`` and the
     like, 1 where the data determine a parameter.
@@ -86,7 +86,7 @@ class Trace:
         self._verdict: Verdict | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        # What a table and a summary show is said before it is stored.
+        # What a table and a summary show is reported before it is stored.
         _ = self.columns, self.verdict
         return state_of(self, _ANSWERS)
 
@@ -154,7 +154,7 @@ class Trace:
     @property
     def response_names(self) -> list[str]:
         """Names of gain and phase at the frequencies of `at`, crossover and margin: of those
-        that were asked for, without their errors."""
+        that were requested, without their errors."""
         starts = ("gain_db@", "phase_deg@", "crossover_rad_s", "phase_margin_deg")
         return [n for n in self.columns if n.startswith(starts) and not n.endswith("_se")]
 

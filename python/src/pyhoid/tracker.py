@@ -25,8 +25,8 @@ class Tracker(_pyhoid.Tracker):
     """A recursive estimate that takes one sample at a time.
 
     The default, ``"adaptive"``, speaks at once. Other methods without a start collect `warm_up`
-    seconds, fit them, and go on from there; until then `ready` is False. It can be pickled, and
-    goes on with the same digits.
+    seconds, fit them, and continue from there; until then `ready` is False. It can be pickled, and
+    continues with the same digits.
 
     Parameters
     ----------
@@ -37,12 +37,12 @@ class Tracker(_pyhoid.Tracker):
     warm_up : float, default 20
         Seconds collected before the start fit.
     at : sequence of float
-        Frequencies in rad/s that `responses` tells.
+        Frequencies in rad/s that `responses` reports.
     controlled_element : str or (sequence of float, sequence of float), optional
-        What the person controls, as in `track`: then `crossover` and `phase_margin` are told.
+        What the person controls, as in `track`: then `crossover` and `phase_margin` are reported.
     decimate : "auto", "off" or int
-        As in `track`: above 200 Hz every n-th sample is tracked by default, .15 s behind the last one
-        taken; between them the estimate stays, and `step` returns NaN. `decimation` says what is
+        As in `track`: above 200 Hz every n-th sample is tracked by default, .15 s after the last one
+        taken; between them the estimate stays, and `step` returns NaN. `decimation` states what is
         done.
     record : Record, optional
         A record to start from, instead of the warm-up: its fit is the start, and the filters have
@@ -141,7 +141,7 @@ class Tracker(_pyhoid.Tracker):
     def crossover(self) -> Estimate | None:
         """Crossover frequency in rad/s.
 
-        None without a controlled element, and where there is none; then `no_crossover` says why.
+        None without a controlled element, and where there is none; then `no_crossover` gives the reason.
         """
         found = self.open_loop
         return None if found is None or found[0] is None else Estimate(*found[0][0])
@@ -180,7 +180,7 @@ class Tracker(_pyhoid.Tracker):
         return told
 
     def operator_estimate(self) -> Operator | None:
-        """The operator with standard errors; None where the structure cannot represent one.
+        """The operator with standard errors; None if the structure cannot represent one.
 
         >>> tracker.operator_estimate()
         """

@@ -96,7 +96,7 @@ def track(
     every : int
         Keep every n-th sample.
     decimate : "auto", "off" or int
-        Track every n-th sample behind a linear-phase low-pass filter; ``"auto"``: above 200 Hz by the
+        Track every n-th sample after a linear-phase low-pass filter; ``"auto"``: above 200 Hz by the
         number that comes nearest to 100 Hz, unless `nk` is given or the method counts samples (its
         memory or orders are those of a polynomial). ``trace.record`` is the decimated record.
     progress : bool or callable

@@ -10,8 +10,8 @@ __all__ = ["Verdict"]
 class Verdict(NamedTuple):
     """What a result is worth, and why.
 
-    `level` is ``"trustworthy"``, ``"doubtful"`` or ``"not determined"``; `reasons` say what speaks
-    against the result, `notes` what is worth knowing besides.
+    `level` is ``"trustworthy"``, ``"doubtful"`` or ``"not determined"``; `reasons` report what speaks
+    against the result, `notes` additional notes.
 
     Examples
     --------

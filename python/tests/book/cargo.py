@@ -62,7 +62,7 @@ def example(program: Path, name: str) -> str:
 
 
 def real_cargo() -> str:
-    """The cargo behind this one."""
+    """The cargo after this one."""
     behind = os.environ["PATH"].split(os.pathsep)[1:]
     return next(
         str(Path(folder) / "cargo") for folder in behind if (Path(folder) / "cargo").exists()

@@ -1,8 +1,8 @@
-"""A fresh interpreter that runs the Python blocks of a page one after another.
+"""A fresh interpreter that runs the Python blocks of a page one after the other.
 
 It reads a block a line, as JSON, and answers by a line of JSON on the file that its first argument
-numbers: null, or what went wrong. A comment behind an expression that is a number, a list or a text
-is what the reader is told to expect, and compared.
+numbers: null, or what went wrong. A comment after an expression that is a number, a list or a text
+is what the reader is reported to expect, and compared.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def run(code: str, names: dict[str, Any]) -> None:
         if expected and expected[0] in "0123456789-['\"":
             found = repr(value) if isinstance(value, (str, list)) else str(value)
             if found != expected:
-                raise AssertionError(f"{ast.unparse(node)} is {found}, the page says {expected}")
+                raise AssertionError(f"{ast.unparse(node)} is {found}, the page states {expected}")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
-"""Pages, their code blocks, and the marks that stand before them.
+"""Pages, their code blocks, and the marks that are before them.
 
 A mark is a comment of HTML, which readers do not see:
 
-| mark | says |
+| mark | states |
 |---|---|
 | `<!-- file: NAME -->` | the block is the file of this name, which blocks after it use |
 | `<!-- given: CODE -->` | what the reader has already: run before the block, with it |
@@ -36,7 +36,7 @@ MARK = re.compile(r"<!--\s*(file|given|then|picture|smaller|ends with|not run):\
 
 @dataclass
 class Block:
-    """One code block, with the marks that stand before it."""
+    """One code block, with the marks that are before it."""
 
     line: int
     language: str
@@ -47,12 +47,12 @@ class Block:
         return next((value for kind, value in self.marks if kind == name), None)
 
     def as_run(self) -> str:
-        """The text, smaller where a mark says so."""
+        """The text, smaller where a mark reports it."""
         text = self.text
         for kind, value in self.marks:
             if kind == "smaller":
                 old, new = (side.strip() for side in value.split("=>"))
-                assert old in text, f"line {self.line}: nothing says {old!r}, to be made smaller"
+                assert old in text, f"line {self.line}: nothing states {old!r}, to be made smaller"
                 text = text.replace(old, new)
         return text
 

@@ -41,7 +41,7 @@ class Reader:
         cargo.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} {script} "$@"\n')
         cargo.chmod(0o755)
         beside = Path(sys.executable).parent
-        # The pages are as wide as they are: pytest-xdist tells its workers a width.
+        # The pages are as wide as they are: pytest-xdist reports its workers a width.
         self.environment = {
             **{name: value for name, value in os.environ.items() if name != "COLUMNS"},
             "PATH": os.pathsep.join([str(programs), str(beside), os.environ["PATH"]]),
@@ -86,7 +86,7 @@ class Reader:
                     f"no line of the output is {shown}"
                 )
         else:
-            what = "say by a mark which file it is" if block.language == "toml" else "no such block"
+            what = "state by a mark which file it is" if block.language == "toml" else "no such block"
             raise AssertionError(f"a block of {block.language!r}: {what}")
         then = block.mark("then")
         if then:
@@ -146,7 +146,7 @@ class Reader:
 
 
 def lines_are_in(shown: str, printed: str) -> None:
-    """Each line that a page shows was printed, in that order; `...` stands for anything."""
+    """Each line that a page shows was printed, in that order; `...` represents anything."""
     lines = iter(printed.splitlines())
     for line in filter(str.strip, shown.splitlines()):
         parts = map(re.escape, line.rstrip().split("..."))

@@ -1,13 +1,13 @@
 """The places in which hoid runs: one run through each, its estimates, and the time of a sample.
 
-A place takes e and u of 82 s of C4, a sample at a time, and tells the operator after each.
+A place takes e and u of 82 s of C4, a sample at a time, and reports the operator after each.
 ``test_places.py`` compares all of them with `hoid track`, to the last digit; ``python -m places``
 (by ``cargo xtask places``) writes the table of the book. What a place needs and is not here makes
 it `Missing`, with the reason.
 
 | file | holds |
 |---|---|
-| ``told.py`` | what a place tells, and how it is compared |
+| ``told.py`` | the output of a place, and its comparison |
 | ``tools.py`` | what is built and installed |
 | ``programs.py`` | programs that read lines: `hoid`, Rust, C, C++, WebAssembly, Cortex-M4 |
 | ``within.py`` | what runs within this process: Python, functional mock-up units |

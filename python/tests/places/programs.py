@@ -51,7 +51,7 @@ def stream(run: Run, tools: Tools) -> Told:
 
 
 def of_line(line: dict[str, Any]) -> list[float]:
-    """What a line of `hoid stream` tells."""
+    """The output of a line of `hoid stream`."""
     known = {**(line["operator"] or {}), **(line["open_loop"] or {})}
     pairs = [known.get(name) or {} for name in (*OPERATOR, *LOOP)]
     numbers = [pair.get(of) for pair in pairs for of in ("value", "standard_error")]

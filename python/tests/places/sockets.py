@@ -33,7 +33,7 @@ def udp_stream(tools: Tools) -> Iterator[socket.socket]:
     here = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     here.bind(("127.0.0.1", 0))
     here.settimeout(PATIENCE)
-    # The system chooses the port, and the stream says it.
+    # The system chooses the port, and the stream reports it.
     places = f"0:{here.getsockname()[1]}"
     command = [
         tools.binary,

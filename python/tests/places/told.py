@@ -1,4 +1,4 @@
-"""What a place tells, and how it is compared."""
+"""The output of a place, and its comparison."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Floats = np.ndarray[Any, np.dtype[np.float64]]
 STEP = 0.01
 #: Parameters of the operator, and their columns in a trace.
 OPERATOR = ("K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e")
-#: What the person controls, and what is told of the loop.
+#: What the person controls, and what is reported of the loop.
 ELEMENT = "90/(s(s+6))"
 LOOP = ("crossover_rad_s", "phase_margin_deg")
 OF_LOOP = tuple(f"{name}{end}" for name in LOOP for end in ("", "_se"))
@@ -87,7 +87,7 @@ class Compared:
 @dataclass(frozen=True)
 class Place:
     name: str
-    #: What a sample is there, of which the time is told.
+    #: What a sample is there, of which the time is reported.
     sample: str
     run: Callable[[Run, Tools], Told]
     #: Options of `hoid track` that it is compared with.

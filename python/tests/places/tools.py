@@ -17,7 +17,7 @@ HERE = Path(__file__).parent
 
 @dataclass(frozen=True)
 class Tools:
-    #: The program hoid; what is built with it lies beside it.
+    #: The program hoid; what is built with it lies next to it.
     binary: Path
     #: Where work may be done.
     folder: Path
@@ -82,7 +82,7 @@ def program(*names: str) -> str:
 
 
 def output(command: list[Any], **options: Any) -> str:
-    """What a program prints; what it says where it fails."""
+    """What a program prints; what it reports where it fails."""
     words = [str(word) for word in command]
     done = subprocess.run(words, capture_output=True, text=True, check=False, **options)
     assert done.returncode == 0, f"{words}: {done.stderr}"

@@ -17,7 +17,7 @@ from .tools import Tools, stripped
 
 
 def of_tracker(tracker: Any) -> list[float]:
-    """What a tracker of Python tells."""
+    """The output of a tracker in Python."""
     operator = tracker.operator_estimate()
     is_known = operator is not None and operator.convertible
     pairs = [operator[name] if is_known else None for name in OPERATOR]

@@ -9,7 +9,7 @@
 
 use std::{path::PathBuf, process::ExitCode};
 
-use hoid_challenge::{ChallengeOptions, Portion, Seeds, cases, challenge, contestants, page, tables};
+use hoid_challenge::{ChallengeOptions, Portion, Seeds, cases, challenge, entrants, page, tables};
 
 fn main() -> ExitCode {
     match run() {
@@ -37,7 +37,7 @@ fn run() -> Result<(), String> {
             for case in cases() {
                 println!("{:28} {:20} {}", case.name, case.theme.to_string(), case.meaning);
             }
-            let names: Vec<String> = contestants().iter().map(|c| c.name()).collect();
+            let names: Vec<String> = entrants().iter().map(|c| c.name()).collect();
             println!("\ncontestants: {}, batch", names.join(", "));
             return Ok(());
         }
@@ -56,14 +56,14 @@ fn run() -> Result<(), String> {
             "--out" => options.directory = PathBuf::from(value),
             "--page" => file = Some(PathBuf::from(value)),
             "--measured" => measured = Some(value),
-            _ => return Err(format!("{name} is no option; see the head of this example")),
+            _ => return Err(format!("{name} is not an option; see the head of this example")),
         }
     }
     let lines = challenge(&options, &|run| eprintln!("{run}")).map_err(|e| e.to_string())?;
     println!("{}", tables(&lines));
     if let Some(file) = file {
-        let usual = format!("{} runs of each case, {} seeds.", options.runs, options.seeds);
-        let text = page(&lines, &measured.unwrap_or(usual));
+        let default = format!("{} runs of each case, {} seeds.", options.runs, options.seeds);
+        let text = page(&lines, &measured.unwrap_or(default));
         std::fs::write(&file, text).map_err(|e| format!("{}: {e}", file.display()))?;
     }
     Ok(())

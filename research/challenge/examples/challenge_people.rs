@@ -45,7 +45,7 @@ fn run() -> Result<(), String> {
             }
             "--part" => options.portion = value.parse()?,
             "--out" => options.directory = PathBuf::from(value),
-            _ => return Err(format!("{name} is no option; see the head of this example")),
+            _ => return Err(format!("{name} is not an option; see the head of this example")),
         }
     }
     let lines = challenge_people(&options, &|run| eprintln!("{run}")).map_err(|e| e.to_string())?;

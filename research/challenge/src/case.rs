@@ -1,11 +1,11 @@
-//! What a case of the challenge is: data, no code.
+//! Definition of a case of the challenge: data, no code.
 
 use super::operator::{Parameter, Plant};
 
-/// The operator's form; its parameters are drawn anew in each run.
+/// The operator's form; its parameters are drawn again in each run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
-    /// Gain and lead: the operator of the reference text.
+    /// Gain and lead: the operator of the thesis.
     Lead,
     /// A gain alone.
     Gain,
@@ -13,13 +13,13 @@ pub enum Form {
     LeadLag,
     /// Gain, two leads and a lag: people on plants of second order.
     Lead2Lag,
-    /// Gain and lead behind a neuromuscular system of third order.
+    /// Gain and lead after a neuromuscular system of third order.
     ThirdOrder,
     /// Gain and lead, and the dynamics of a stick of 20 to 30 rad/s.
     StickDynamics,
 }
 
-/// The excitation; its phases are drawn anew in each run.
+/// The excitation; its phases are drawn again in each run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Forcing {
     /// A disturbance at the input of the plant: primes times 0.05 Hz up to 1.55 Hz, amplitudes as
@@ -35,10 +35,10 @@ pub enum Forcing {
 /// When the person looks and acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sight {
-    /// Error and control are held over each sample, as on a display that is drawn anew and a stick
+    /// Error and control are held over each sample, as on a display that is drawn again and a stick
     /// that is read.
     Held,
-    /// All the time; the recorder samples.
+    /// Continuously; the recorder samples.
     Continuous,
 }
 
@@ -53,7 +53,7 @@ pub enum Spectrum {
     Tremor,
 }
 
-/// How the strength of the remnant goes on.
+/// How the strength of the remnant continues.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Course {
     /// It stays.
@@ -74,7 +74,7 @@ pub enum Course {
     Intermittent,
 }
 
-/// What stick and recorder do.
+/// Effects of stick and recorder.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Blemish {
     /// Nothing.
@@ -85,16 +85,16 @@ pub enum Blemish {
     Offset(f64),
     /// The stick reads in steps of this part of the rms of u, in the loop.
     Quantised(f64),
-    /// The stick ends at so many rms of u, in the loop.
+    /// The stick ends at a given number of rms of u, in the loop.
     Saturated(f64),
-    /// Every 50 s in the mean one recorded sample of u is off by so many standard deviations of the
-    /// innovations.
+    /// Every 50 s in the mean one recorded sample of u is off by a given number of standard
+    /// deviations of the innovations.
     Glitches(f64),
     /// Recorded e and u are NaN for 3 s from 60 s on.
     Missing,
     /// They are zero for 3 s from 60 s on.
     Silent,
-    /// Nobody acts and nothing moves for the first so many seconds.
+    /// No one acts and nothing moves for the first a given number of seconds.
     IdleStart(f64),
     /// From so many seconds on u is recorded with the wrong sign.
     Polarity(f64),
@@ -103,17 +103,17 @@ pub enum Blemish {
 /// A change of the operator alone: remnant, plant and forcing stay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shift {
-    /// When it begins, s.
+    /// When it starts, s.
     pub at_s: f64,
     /// How long it takes, s; the factor grows geometrically.
     pub takes_s: f64,
-    /// What changes.
+    /// The part that changes.
     pub parameter: Parameter,
     /// By which factor.
     pub factor: f64,
 }
 
-/// What a method is told of the delay.
+/// Information about the delay that a method gets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DelayKnown {
     /// Its value, which is a whole number of samples.
@@ -160,7 +160,7 @@ pub struct Case {
     pub name: String,
     /// Its theme.
     pub theme: Theme,
-    /// What it is, in a line.
+    /// Its definition, in a line.
     pub meaning: String,
     /// Samples a second.
     pub rate_hz: f64,
@@ -184,14 +184,14 @@ pub struct Case {
     pub blemish: Blemish,
     /// Changes in order of time.
     pub shifts: Vec<Shift>,
-    /// What is told of the delay.
+    /// The report of the delay.
     pub delay: DelayKnown,
 }
 
 impl Case {
     /// The case that all others are variants of: gain and lead on `1/s^2`, a disturbance, a steady
-    /// remnant of first order, 100 Hz, 90 s, nobody changes.
-    pub(super) fn usual(theme: Theme, name: impl Into<String>, meaning: impl Into<String>) -> Self {
+    /// remnant of first order, 100 Hz, 90 s, no one changes.
+    pub(super) fn baseline(theme: Theme, name: impl Into<String>, meaning: impl Into<String>) -> Self {
         Self {
             name: name.into(),
             theme,
@@ -226,7 +226,7 @@ impl Case {
         times
     }
 
-    /// True where all that changes does so within two seconds: there is a moment to be found.
+    /// True if all that changes does so within two seconds: there is a moment to be found.
     pub fn changes_at_once(&self) -> bool {
         self.shifts.iter().all(|shift| shift.takes_s <= 2.0)
     }

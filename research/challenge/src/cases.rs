@@ -1,7 +1,7 @@
 //! The cases.
 //!
-//! A change begins at 45 s where nothing else is said and takes half a second. Sizes that no loop
-//! bears (a delay times two on `1/s^2`) are those of the persons who bear them: who would lose
+//! A change starts at 45 s where nothing else is specified and takes half a second. Sizes that no
+//! loop bears (a delay times two on `1/s^2`) are those of the persons who bear them: who would lose
 //! control is drawn again ([`draw`](super::draw)).
 
 use super::{
@@ -9,7 +9,7 @@ use super::{
     operator::{Parameter, Plant},
 };
 
-/// When a change begins, and how long it takes, s.
+/// When a change starts, and how long it takes, s.
 const AT_S: f64 = 45.0;
 const TAKES_S: f64 = 0.5;
 
@@ -34,7 +34,7 @@ pub fn cases() -> Vec<Case> {
     all
 }
 
-/// A spectrum, a course, a blemish under a name.
+/// A named spectrum, course or blemish.
 type Kind = (&'static str, &'static str, Spectrum, Course, Blemish);
 
 /// Every remnant, and every thing that stick and recorder do.
@@ -168,7 +168,7 @@ fn of_kind(theme: Theme, name: String, (_, meaning, spectrum, course, blemish): 
         spectrum,
         course,
         blemish,
-        ..Case::usual(theme, name, meaning)
+        ..Case::baseline(theme, name, meaning)
     }
 }
 
@@ -178,16 +178,16 @@ fn remnants() -> Vec<Case> {
         .collect();
     all.push(Case {
         length_s: 330.0,
-        ..Case::usual(
+        ..Case::baseline(
             Theme::Remnants,
             "none-long",
-            "nobody changes for 300 s after the start span",
+            "no one changes for 300 s after the start span",
         )
     });
     all.push(Case {
         ratio: 0.6,
         spectrum: Spectrum::Rich,
-        ..Case::usual(Theme::Remnants, "none-strong", "a remnant twice as strong")
+        ..Case::baseline(Theme::Remnants, "none-strong", "a remnant twice as strong")
     });
     all
 }
@@ -214,7 +214,7 @@ fn changes() -> Vec<Case> {
             let meaning = format!("{name} of the operator alone times {factor:.2}");
             all.push(Case {
                 shifts: vec![shift(parameter, factor)],
-                ..Case::usual(Theme::Changes, format!("change-{name}-{percent}"), meaning)
+                ..Case::baseline(Theme::Changes, format!("change-{name}-{percent}"), meaning)
             });
         }
     }
@@ -222,7 +222,7 @@ fn changes() -> Vec<Case> {
 }
 
 fn courses() -> Vec<Case> {
-    let usual = |name, meaning| Case::usual(Theme::Courses, name, meaning);
+    let default = |name, meaning| Case::baseline(Theme::Courses, name, meaning);
     let twice = shift(Parameter::KEDot, 2.0);
     let six = (0..6)
         .map(|i| Shift {
@@ -238,38 +238,38 @@ fn courses() -> Vec<Case> {
                 takes_s: 40.0,
                 ..twice
             }],
-            ..usual("slow-drift", "K_e_dot doubles within 40 s")
+            ..default("slow-drift", "K_e_dot doubles within 40 s")
         },
         Case {
             length_s: 120.0,
             shifts: six,
-            ..usual("six-changes", "K_e_dot times 1.8 and back, every 12 s")
+            ..default("six-changes", "K_e_dot times 1.8 and back, every 12 s")
         },
         Case {
             shifts: vec![Shift { at_s: 15.0, ..twice }],
-            ..usual("within-start", "K_e_dot doubles in the middle of the start span")
+            ..default("within-start", "K_e_dot doubles in the middle of the start span")
         },
         Case {
             shifts: vec![Shift { at_s: 80.0, ..twice }],
-            ..usual("near-end", "K_e_dot doubles 10 s before the end")
+            ..default("near-end", "K_e_dot doubles 10 s before the end")
         },
         Case {
             blemish: Blemish::Polarity(AT_S),
-            ..usual("polarity", "u is recorded with the wrong sign from 45 s on")
+            ..default("polarity", "u is recorded with the wrong sign from 45 s on")
         },
         Case {
             blemish: Blemish::Missing,
             shifts: vec![Shift { at_s: 60.0, ..twice }],
-            ..usual("missing-change", "K_e_dot doubles as 3 s of NaN begin")
+            ..default("missing-change", "K_e_dot doubles as 3 s of NaN start")
         },
         Case {
             blemish: Blemish::IdleStart(15.0),
-            ..usual("idle-start", "nothing happens in the first 15 s")
+            ..default("idle-start", "nothing happens in the first 15 s")
         },
         Case {
             blemish: Blemish::IdleStart(15.0),
             delay: DelayKnown::No,
-            ..usual("idle-start-unknown", "the same, the delay unknown")
+            ..default("idle-start-unknown", "the same, the delay unknown")
         },
     ]
 }
@@ -293,39 +293,39 @@ fn changes_in_remnants() -> Vec<Case> {
 }
 
 fn delays() -> Vec<Case> {
-    let usual = |name, meaning| Case {
+    let default = |name, meaning| Case {
         shifts: vec![shift(Parameter::KEDot, 1.5)],
-        ..Case::usual(Theme::Delays, name, meaning)
+        ..Case::baseline(Theme::Delays, name, meaning)
     };
     vec![
         Case {
             delay: DelayKnown::Fraction,
-            ..usual("delay-half", "half a sample beside what is told")
+            ..default("delay-half", "half a sample next to the report")
         },
         Case {
             rate_hz: 60.0,
             delay: DelayKnown::Fraction,
-            ..usual("delay-half-60", "the same at 60 Hz")
+            ..default("delay-half-60", "the same at 60 Hz")
         },
         Case {
             rate_hz: 60.0,
             sight: Sight::Continuous,
-            ..usual("continuous-60", "a person who sees and acts all the time, 60 Hz")
+            ..default("continuous-60", "a person who sees and acts all the time, 60 Hz")
         },
         Case {
             sight: Sight::Continuous,
-            ..usual("continuous-100", "the same at 100 Hz")
+            ..default("continuous-100", "the same at 100 Hz")
         },
         Case {
             delay: DelayKnown::No,
-            ..usual("delay-unknown", "the delay is not told")
+            ..default("delay-unknown", "the delay is not told")
         },
         Case {
             rate_hz: 60.0,
             sight: Sight::Continuous,
             delay: DelayKnown::No,
             spectrum: Spectrum::Rich,
-            ..usual(
+            ..default(
                 "all-unknown-60",
                 "a continuous person at 60 Hz with a rich remnant and an unknown delay",
             )
@@ -334,35 +334,35 @@ fn delays() -> Vec<Case> {
 }
 
 fn loops() -> Vec<Case> {
-    let usual = |name, meaning, plant, form| Case {
+    let default = |name, meaning, plant, form| Case {
         plant,
         form,
         shifts: vec![shift(Parameter::Gain, 1.0 / 1.6)],
-        ..Case::usual(Theme::Loops, name, meaning)
+        ..Case::baseline(Theme::Loops, name, meaning)
     };
     let mut all = vec![
-        usual("gain-on-integrator", "1/s, a gain alone", Plant::Integrator, Form::Gain),
-        usual(
+        default("gain-on-integrator", "1/s, a gain alone", Plant::Integrator, Form::Gain),
+        default(
             "lead-lag-on-integrator",
             "1/s, gain, lead and lag: people",
             Plant::Integrator,
             Form::LeadLag,
         ),
-        usual("lead-on-lagged", "1/(s(s+1)), gain and lead", Plant::Lagged, Form::Lead),
-        usual(
+        default("lead-on-lagged", "1/(s(s+1)), gain and lead", Plant::Lagged, Form::Lead),
+        default(
             "lead2-lag-on-lagged",
             "1/(s(s+1)), gain, two leads and a lag: people",
             Plant::Lagged,
             Form::Lead2Lag,
         ),
-        usual("gain-on-unstable", "1/(s-1), a gain alone", Plant::Unstable, Form::Gain),
-        usual(
+        default("gain-on-unstable", "1/(s-1), a gain alone", Plant::Unstable, Form::Gain),
+        default(
             "stick-dynamics",
             "1/s^2, the dynamics of a stick besides",
             Plant::DoubleIntegrator,
             Form::StickDynamics,
         ),
-        usual(
+        default(
             "third-order",
             "1/s^2, a neuromuscular system of third order",
             Plant::DoubleIntegrator,
@@ -380,7 +380,7 @@ fn loops() -> Vec<Case> {
         all.push(Case {
             forcing,
             shifts: vec![shift(Parameter::KEDot, 1.6)],
-            ..Case::usual(Theme::Loops, name, meaning)
+            ..Case::baseline(Theme::Loops, name, meaning)
         });
     }
     all
@@ -390,7 +390,7 @@ fn rates() -> Vec<Case> {
     let of = |rate: u32| Case {
         rate_hz: f64::from(rate),
         shifts: vec![shift(Parameter::KEDot, 1.6)],
-        ..Case::usual(
+        ..Case::baseline(
             Theme::Rates,
             format!("rate-{rate}"),
             format!("{rate} Hz, K_e_dot times 1.6"),

@@ -1,4 +1,4 @@
-//! Who acts in a run: seeds and persons.
+//! Participants of a run: seeds and persons.
 //!
 //! Every run has a person of its own, so that no method can know the numbers. Parameters are
 //! uniform over ranges of people (see [`hoid_sim::people`] for the sources), the gain follows from a
@@ -71,7 +71,7 @@ impl Portion {
     /// All of it.
     pub const ALL: Self = Self { index: 1, of: 1 };
 
-    /// True where item i belongs to it.
+    /// True if item i belongs to it.
     pub fn holds(self, i: usize) -> bool {
         i % self.of + 1 == self.index
     }
@@ -95,7 +95,7 @@ impl fmt::Display for Portion {
     }
 }
 
-/// Draws before a case counts as one that nobody bears.
+/// Draws before a case counts as one that no person can stabilise.
 const MOST_DRAWS: usize = 2000;
 const NUMBERS: usize = 10;
 /// Largest `|1/(1 + Y P)|`.
@@ -186,7 +186,7 @@ fn drawn(case: &Case, ts: SampleTime, draw: &[f64]) -> Result<Option<Operator>, 
     Ok(Some(first))
 }
 
-/// True where the loop is stable and does not ring.
+/// True if the loop is stable and does not ring.
 fn is_borne(operator: &Operator, plant: Plant) -> Result<bool, ModelError> {
     let sensitivity = |i: i32| {
         let omega = 0.1 * 10f64.powf(f64::from(i) / 40.0);

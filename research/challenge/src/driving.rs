@@ -1,5 +1,5 @@
-//! What drives the loop of a case: target or disturbance, their size in u and e, and the course of
-//! the remnant's strength.
+//! Excitation of the loop of a case: target or disturbance, their size in u and e, and the course
+//! of the remnant's strength.
 
 use std::f64::consts::TAU;
 

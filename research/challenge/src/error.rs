@@ -3,14 +3,14 @@
 use hoid_io::IoError;
 use thiserror::Error;
 
-/// What can go wrong with a challenge as a whole. A contestant that fails is a line with its reason, not an error.
+/// Errors of a challenge as a whole. An entrant that fails is a line with its reason, not an error.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ChallengeError {
-    /// A case, a contestant, a recording or a line that cannot be used.
+    /// A case, an entrant, a recording or a line that cannot be used.
     #[error("challenge: {reason}")]
     Refused {
-        /// What is wrong and what was expected.
+        /// The problem and the expected value.
         reason: String,
     },
     /// A file that cannot be read or written.

@@ -1,10 +1,9 @@
-//! What an answer is worth: the line of a contestant in a run.
+//! Reliability of an answer: the line of an entrant in a run.
 //!
-//! The response is asked for at seven lines from .5 to 6 rad/s, at +2, +4, +8, +13, +18 and +28 s
-//! after each change, once before the first, and every 10 s where nobody changes. The error is the
-//! mean of `|dH|/|H|` over the lines; who says nothing, or no number, has the error 1, that of saying
-//! zero. The band of a line covers when real and imaginary part lie within 1.96 standard errors, each
-//! counted by itself.
+//! The response is requested at seven lines from .5 to 6 rad/s, at +2, +4, +8, +13, +18 and +28 s after each change,
+//! once before the first, and every 10 s without a change. The error is the mean of `|dH|/|H|` over the lines; who
+//! carries no information, or no number, has the error 1, that of saying zero. The band of a line covers when real and
+//! imaginary part lie within 1.96 standard errors, each counted by itself.
 
 use std::collections::BTreeMap;
 
@@ -13,20 +12,20 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     case::{Blemish, Case},
-    contestant::{Answer, Contestant, Said, Task},
     draw::RunOf,
+    entrant::{Entrant, EntrantResult, ReportedResponse, Task},
     oracle::{batch, evidence},
     simulate::{Run, Truth, simulate},
 };
 
-/// Seconds after a change at which the response is asked for.
+/// Seconds after a change at which the response is requested.
 pub const AFTER_S: [f64; 6] = [2.0, 4.0, 8.0, 13.0, 18.0, 28.0];
 /// Lines, rad/s: seven from .5 to 6 on a logarithmic scale.
 const LINES: usize = 7;
 const LINES_RAD_S: (f64, f64) = (0.5, 6.0);
-/// Seconds before the first change at which it is asked for.
+/// Seconds before the first change at which it is requested.
 const BEFORE_S: f64 = 0.5;
-/// Seconds between two where nobody changes, and times of its own of the long case.
+/// Seconds between two without a change, and times of its own of the long case.
 const STEADY_S: f64 = 10.0;
 const LONG_S: [f64; 4] = [60.0, 120.0, 200.0, 300.0];
 /// Largest error that is kept: a response that runs away counts as this.
@@ -40,32 +39,32 @@ pub const FOUND_S: [f64; 2] = [5.0, 8.0];
 /// The name of the batch fit that knows the changes.
 pub const BATCH: &str = "batch (oracle)";
 
-/// A contestant in a run.
+/// An entrant in a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Line {
     /// The case.
     pub case: String,
     /// Its number in the seeds.
     pub run: u64,
-    /// The contestant.
+    /// The entrant.
     pub method: String,
     /// Why it could not follow.
     pub failed: Option<String>,
-    /// What it said at each time.
+    /// What it reported at each time.
     pub moments: Vec<Moment>,
     /// Alarms that no change explains; none for one that declares none.
     pub false_alarms: Option<usize>,
-    /// Those among them that are said to be of the remnant alone.
+    /// Those among them that are reported to be of the remnant alone.
     pub of_remnant: usize,
     /// Seconds in which an alarm is false.
     pub exposed_s: f64,
     /// The changes.
-    pub changes: Vec<Found>,
-    /// What speaks against the result.
+    pub changes: Vec<ChangeOutcome>,
+    /// Findings against the result.
     pub findings: Vec<String>,
 }
 
-/// What was said at a time.
+/// The report at a time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Moment {
     /// `+8` after a change, `before`, `steady`, or the time of the long case.
@@ -82,8 +81,8 @@ pub struct Moment {
 
 /// A change, and whether it was found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Found {
-    /// When it began, s.
+pub struct ChangeOutcome {
+    /// When it started, s.
     pub at_s: f64,
     /// Logarithm of the true likelihood ratio within 5 and 8 s.
     pub evidence: [f64; 2],
@@ -98,7 +97,7 @@ pub(super) fn lines_rad_s() -> Vec<f64> {
     (0..LINES).map(of).collect()
 }
 
-/// Times that are asked for, each with its label.
+/// Times that are requested, each with its label.
 pub(super) fn asked(changes_s: &[f64], start_s: f64, length_s: f64, is_long: bool) -> Vec<(String, f64)> {
     let mut all = Vec::new();
     let steady = |from: f64| {
@@ -119,7 +118,7 @@ pub(super) fn asked(changes_s: &[f64], start_s: f64, length_s: f64, is_long: boo
     all
 }
 
-/// A run with what is asked of it.
+/// A run with its task.
 pub struct Posed {
     case: Case,
     number: u64,
@@ -127,14 +126,14 @@ pub struct Posed {
     task: Task,
     labels: Vec<String>,
     /// Changes that have a moment.
-    changes: Vec<Found>,
+    changes: Vec<ChangeOutcome>,
 }
 
 impl Posed {
     /// The run of a case.
     ///
     /// # Errors
-    /// Where nobody bears the case.
+    /// Where no one bears the case.
     pub fn new(case: &Case, of: RunOf) -> Result<Self, String> {
         let run = simulate(case, of).map_err(|e| e.to_string())?;
         let changes_s = if case.changes_at_once() {
@@ -146,7 +145,7 @@ impl Posed {
         let asked = asked(&changes_s, start_s.1, case.length_s, case.length_s > 200.0);
         let (labels, asked_s) = asked.into_iter().unzip();
         let changes = (changes_s.iter().enumerate())
-            .map(|(i, at_s)| Found {
+            .map(|(i, at_s)| ChangeOutcome {
                 at_s: *at_s,
                 evidence: FOUND_S.map(|seconds| evidence(case, &run, i, seconds)),
                 after_s: None,
@@ -173,11 +172,11 @@ impl Posed {
         })
     }
 
-    /// The line of a contestant.
-    pub fn line(&self, contestant: &dyn Contestant) -> Line {
-        let mut line = self.measured(contestant.name(), contestant.follow(&self.task));
+    /// The line of an entrant.
+    pub fn line(&self, entrant: &dyn Entrant) -> Line {
+        let mut line = self.measured(entrant.name(), entrant.follow(&self.task));
         if !self.case.changes_at_once() {
-            // While somebody changes slowly an alarm is neither false nor late.
+            // While someone changes slowly an alarm is neither false nor late.
             (line.false_alarms, line.exposed_s, line.of_remnant) = (None, 0.0, 0);
         }
         line
@@ -187,19 +186,19 @@ impl Posed {
     pub fn batch(&self) -> Line {
         let changes_s: Vec<f64> = self.changes.iter().map(|change| change.at_s).collect();
         let tau_e_s = self.run.truth.operator(0.0).tau_e_s;
-        let answer = Answer {
+        let answer = EntrantResult {
             said: batch(&self.task, &changes_s, tau_e_s),
-            ..Answer::default()
+            ..EntrantResult::default()
         };
         self.measured(BATCH.to_owned(), Ok(answer))
     }
 
-    fn measured(&self, method: String, answer: Result<Answer, String>) -> Line {
+    fn measured(&self, method: String, answer: Result<EntrantResult, String>) -> Line {
         let truth = &self.run.truth;
         let at = |omega: f64, t_s: f64| truth.response(omega, t_s);
         let mut line = scored(&self.task, &self.labels, &at, method, answer, &self.changes);
         (line.case, line.run) = (self.case.name.clone(), self.number);
-        // Parameters have names where the operator is that of the reference text, as it was recorded.
+        // Parameters have names where the operator is that of the thesis, as it was recorded.
         let named = truth.operator(0.0).is_lead() && !matches!(self.case.blemish, Blemish::Polarity(_));
         for moment in &mut line.moments {
             match named {
@@ -227,20 +226,20 @@ fn with_truth(parameters: &mut BTreeMap<String, (f64, Option<bool>)>, truth: &Tr
     }
 }
 
-/// The line of an answer against a true response; parameters are left as they were said.
+/// The line of an answer against a true response; parameters are left as they were reported.
 pub(super) fn scored(
     task: &Task,
     labels: &[String],
     truth: &dyn Fn(f64, f64) -> Complex64,
     method: String,
-    answer: Result<Answer, String>,
-    changes: &[Found],
+    answer: Result<EntrantResult, String>,
+    changes: &[ChangeOutcome],
 ) -> Line {
     let (answer, failed) = match answer {
         Ok(answer) => (answer, None),
-        Err(reason) => (Answer::default(), Some(reason)),
+        Err(reason) => (EntrantResult::default(), Some(reason)),
     };
-    let nothing = Said::default();
+    let nothing = ReportedResponse::default();
     let moments = (labels.iter().zip(&task.asked_s).enumerate())
         .map(|(i, (label, t_s))| {
             let said = answer.said.get(i).unwrap_or(&nothing);
@@ -274,7 +273,7 @@ pub(super) fn scored(
         let first = (answer.alarms.iter().flatten()).find(|alarm| !alarm.of_remnant && own(alarm.t_s));
         change.after_s = first.map(|alarm| alarm.t_s - change.at_s);
     }
-    let false_ones = |alarms: &Vec<super::contestant::Alarm>| {
+    let false_ones = |alarms: &Vec<super::entrant::Alarm>| {
         let outside = alarms.iter().filter(|a| a.t_s >= from && !of_change(a.t_s));
         let of_remnant = outside.clone().filter(|a| a.of_remnant).count();
         (outside.count(), of_remnant)
@@ -295,7 +294,7 @@ pub(super) fn scored(
 }
 
 /// Mean of |dH|/|H|, bands that hold and all.
-fn of_response(said: &Said, truths: &[Complex64]) -> (f64, [usize; 2]) {
+fn of_response(said: &ReportedResponse, truths: &[Complex64]) -> (f64, [usize; 2]) {
     if said.response.len() != truths.len() {
         return (1.0, [0, 0]);
     }
@@ -313,7 +312,7 @@ fn of_response(said: &Said, truths: &[Complex64]) -> (f64, [usize; 2]) {
     (error, covered)
 }
 
-/// What is asked in a run, for tests of contestants.
+/// Task of a run, for tests of entrants.
 #[cfg(test)]
 pub(super) fn posed_task(case: &Case, of: RunOf) -> Task {
     Posed::new(case, of).unwrap_or_else(|e| panic!("{e}")).task
@@ -322,7 +321,7 @@ pub(super) fn posed_task(case: &Case, of: RunOf) -> Task {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contestant::Alarm;
+    use crate::entrant::Alarm;
 
     #[test]
     fn what_is_asked_lies_between_changes() {
@@ -336,14 +335,14 @@ mod tests {
         assert!(asked(&[15.0], 30.0, 90.0, false).iter().all(|(_, t)| *t >= 30.0));
     }
 
-    struct Says(Answer);
+    struct Says(EntrantResult);
 
-    impl Contestant for Says {
+    impl Entrant for Says {
         fn name(&self) -> String {
             "says".to_owned()
         }
 
-        fn follow(&self, _: &Task) -> Result<Answer, String> {
+        fn follow(&self, _: &Task) -> Result<EntrantResult, String> {
             Ok(self.0.clone())
         }
     }
@@ -368,14 +367,14 @@ mod tests {
             .map(|t| {
                 let lines = posed.task.lines_rad_s.iter();
                 let response: Vec<Complex64> = lines.map(|w| posed.run.truth.response(*w, *t)).collect();
-                Said {
+                ReportedResponse {
                     covariance: Some(vec![[1e-12, 1e-12, 0.0]; response.len()]),
                     response,
                     parameters: vec![("K_e", posed.run.truth.operator(*t).gain, Some(0.1))],
                 }
             })
             .collect();
-        let answer = Answer {
+        let answer = EntrantResult {
             said,
             alarms: Some(vec![alarm(33.0), alarm(48.5), alarm(56.0), alarm(80.0)]),
             findings: Vec::new(),
@@ -386,7 +385,7 @@ mod tests {
         assert_eq!(line.changes[0].after_s, Some(3.5));
         assert_eq!(line.false_alarms, Some(2));
         assert!((line.exposed_s - 48.0).abs() < 0.05, "{}", line.exposed_s);
-        let silent = posed.line(&Says(Answer::default()));
+        let silent = posed.line(&Says(EntrantResult::default()));
         assert!(silent.moments.iter().all(|m| m.error == 1.0) && silent.false_alarms.is_none());
     }
 }

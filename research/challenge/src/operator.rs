@@ -7,13 +7,13 @@
 //! Trans. Human Factors in Electronics 8 (1967) 231-249), the neuromuscular system of third order
 //! (R. E. Magdaleno and D. T. McRuer, NASA CR-1757 (1971)), the dynamics of a stick.
 //!
-//! Between recorded samples stands what the record can tell: where the person sees each error held
-//! over a sample, the response from sampled e to sampled u at low frequencies is `Y(j omega)` times
-//! the hold `(1 - e^(-j omega Ts))/(j omega Ts)`; where they see it all the time, `Y(j omega)`.
+//! Between recorded samples, the record can determine: where the person sees each error held over a
+//! sample, the response from sampled e to sampled u at low frequencies is `Y(j omega)` times the
+//! hold `(1 - e^(-j omega Ts))/(j omega Ts)`; where they see it all the time, `Y(j omega)`.
 
 use hoid_model::{Complex64, ContinuousTransferFunction, ModelError, SampleTime, polynomial};
 
-/// An operator. Times in s, frequencies in rad/s; zero where a factor is not there.
+/// An operator. Times in s, frequencies in rad/s; zero if a factor is missing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Operator {
     /// K, control per error.
@@ -36,7 +36,7 @@ pub struct Operator {
     pub tau_e_s: f64,
 }
 
-/// What of an operator changes.
+/// Parameter of an operator that changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Parameter {
     /// K_e: the gain at low frequencies, K_e_dot stays.
@@ -104,8 +104,8 @@ impl Operator {
         polynomial::value(&self.numerator(), s) / polynomial::value(&self.denominator(), s) * (-s * self.tau_e_s).exp()
     }
 
-    /// Its names and values as those of the operator of the reference text: K_e, K_e_dot in s,
-    /// omega_nm in rad/s, zeta_nm, tau_e in s.
+    /// Its names and values as those of the operator of the thesis: K_e, K_e_dot in s, omega_nm in
+    /// rad/s, zeta_nm, tau_e in s.
     pub fn named(&self) -> [(&'static str, f64); 5] {
         [
             ("K_e", self.gain),
@@ -116,7 +116,7 @@ impl Operator {
         ]
     }
 
-    /// True where it is the operator of the reference text: gain, lead, neuromuscular system, delay.
+    /// True if it is the operator of the thesis: gain, lead, neuromuscular system, delay.
     pub fn is_lead(&self) -> bool {
         self.leads == 1 && self.lag_s == 0.0 && self.third_s == 0.0 && self.stick_rad_s == 0.0
     }
@@ -124,7 +124,7 @@ impl Operator {
     /// `Y P`.
     ///
     /// # Errors
-    /// [`ModelError`] for numbers that are no transfer function.
+    /// [`ModelError`] for numbers that are not a transfer function.
     pub(super) fn open_loop(&self, plant: Plant) -> Result<ContinuousTransferFunction, ModelError> {
         let descending = |ascending: Vec<f64>| ascending.into_iter().rev().collect::<Vec<_>>();
         let own = ContinuousTransferFunction::new(&descending(self.numerator()), &descending(self.denominator()))?;
@@ -133,7 +133,7 @@ impl Operator {
     }
 }
 
-/// What is controlled.
+/// The controlled element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Plant {
     /// `1/s`.
@@ -223,7 +223,7 @@ impl Canonical {
 mod tests {
     use super::*;
 
-    fn usual() -> Operator {
+    fn typical() -> Operator {
         Operator {
             gain: 1.5,
             lead_s: 0.6,
@@ -239,7 +239,7 @@ mod tests {
 
     #[test]
     fn the_response_is_that_of_the_transfer_function() {
-        let operator = usual();
+        let operator = typical();
         let open_loop = operator.open_loop(Plant::Lagged).unwrap();
         for omega in [0.1, 1.0, 5.0, 20.0] {
             let here = operator.response(omega) * Plant::Lagged.response(omega);
@@ -251,7 +251,7 @@ mod tests {
     fn a_stepped_system_answers_a_sine_with_its_response() {
         let operator = Operator {
             tau_e_s: 0.0,
-            ..usual()
+            ..typical()
         };
         let (num, den, h, omega) = (operator.numerator(), operator.denominator(), 0.001, 3.0);
         let mut system = Canonical::at_rest();
@@ -274,9 +274,9 @@ mod tests {
             lag_s: 0.0,
             third_s: 0.0,
             stick_rad_s: 0.0,
-            ..usual()
+            ..typical()
         };
-        assert!(lead.is_lead() && !usual().is_lead());
+        assert!(lead.is_lead() && !typical().is_lead());
         let parameters = [
             Parameter::KE,
             Parameter::KEDot,

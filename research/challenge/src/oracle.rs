@@ -1,11 +1,11 @@
-//! What could be known: bounds that no method can be asked to pass.
+//! The available information: bounds that no method can exceed.
 //!
-//! **Evidence of a change.** The logarithm of the likelihood ratio of the true model after a change
-//! against the true model before it, the change's time, the remnant's spectrum, density and course
-//! known: `sum over k of log f(A n/s) - log f(A (n + delta)/s)`, n the remnant, delta the response of
-//! the person now less that of the person of before to the same errors, A the whitening filter. Over
-//! 12 a change is certain: no test at one false alarm an hour misses it but by its own fault. It is
-//! computed before stick and recorder, where the model is exact.
+//! **Evidence of a change.** The logarithm of the likelihood ratio of the true model after a change against the true
+//! model before it, the change's time, the remnant's spectrum, density and course known:
+//! `sum over k of log f(A n/s) - log f(A (n + delta)/s)`, n the remnant, delta the response of the person now less that
+//! of the person before the change to the same errors, A the whitening filter. Over 12 a change is certain: no test at
+//! one false alarm an hour misses it but by its own fault. It is computed before stick and recorder, where the model is
+//! exact.
 //!
 //! **The batch fit that knows the change.** Box-Jenkins by the prediction error method with the true
 //! delay and a noise model of order 4 on everything since the last change: it uses every sample, and
@@ -16,14 +16,15 @@ use hoid_model::{Orders, Structure};
 
 use super::{
     case::Case,
-    contestant::{Said, Task, of_complex},
+    entrant::{ReportedResponse, Task, of_complex},
     noise::density,
     simulate::Run,
 };
 
 /// Logarithm of the likelihood ratio from which a change is certain.
 pub const CERTAIN: f64 = 12.0;
-/// Least course of the strength: at a zero of the error the remnant would say everything.
+/// Lower limit of the strength: at a zero of the error the remnant would vanish and reveal the
+/// response.
 const LEAST_LEVEL: f64 = 0.05;
 /// Order of the noise model of the batch fit, and the least seconds that it takes.
 const ND: usize = 4;
@@ -63,9 +64,9 @@ pub fn evidence(case: &Case, run: &Run, change: usize, seconds: f64) -> f64 {
         .sum()
 }
 
-/// What the batch fit says at the times that are asked for, `changes_s` known; nothing where it has
-/// too few seconds or fails.
-pub fn batch(task: &Task, changes_s: &[f64], tau_e_s: f64) -> Vec<Said> {
+/// Batch fit at the requested times, with known `changes_s`; nothing if it has too few seconds or
+/// fails.
+pub fn batch(task: &Task, changes_s: &[f64], tau_e_s: f64) -> Vec<ReportedResponse> {
     let nk = (tau_e_s / task.sample_time.s()).round() as usize + 1;
     let structure = Structure::BoxJenkins;
     let orders = Orders {
@@ -73,7 +74,7 @@ pub fn batch(task: &Task, changes_s: &[f64], tau_e_s: f64) -> Vec<Said> {
         ..structure.operator_orders(nk)
     };
     let estimator = Estimator::new(structure, orders);
-    let at = |t_s: &f64| -> Option<Said> {
+    let at = |t_s: &f64| -> Option<ReportedResponse> {
         // What changes takes half a second.
         let from = (changes_s.iter().rev().find(|c| *c < t_s)).map_or(task.start_s.0, |c| c + 0.5);
         if t_s - from < LEAST_S {
@@ -97,7 +98,7 @@ pub fn batch(task: &Task, changes_s: &[f64], tau_e_s: f64) -> Vec<Said> {
             .map(|(name, e)| (name, e.value, e.standard_error))
             .into()
         });
-        Some(Said {
+        Some(ReportedResponse {
             response: each.into_iter().map(|(h, _)| h).collect(),
             covariance,
             parameters,

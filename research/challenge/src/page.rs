@@ -4,17 +4,17 @@ use std::fmt::Write as _;
 
 use super::{cases::cases, measure::Line, tables::tables};
 
-/// The page; `measured` says when, how, and with how many runs.
+/// The page; `measured` states when, how, and with how many runs.
 pub fn page(lines: &[Line], measured: &str) -> String {
     let mut text = format!(
         "# The challenge: cases that can refute a tracker\n\n{measured}\n\n\
          The loop is integrated in continuous time and shares nothing with the simulators on which\n\
          the methods were made; every run has a person of its own, with parameters from ranges of\n\
-         people. Methods have default options and a start span of 30 s. Where nothing else is said: gain\n\
+         people. Methods have default options and a start span of 30 s. Where nothing else is reported: gain\n\
          and lead on `1/s^2` against a disturbance at primes times 0.05 Hz, a remnant `1/(T_n s + 1)` of\n\
-         .3 of the standard deviation that u has without it, 100 Hz, 90 s; a change begins at 45 s, takes\n\
+         .3 of the standard deviation that u has without it, 100 Hz, 90 s; a change starts at 45 s, takes\n\
          half a second, and is of the operator alone. Remnant, plant and forcing stay.\n\n\
-         H is asked for at seven lines from .5 to 6 rad/s. Who says nothing, or fails, has the error 1.\n\
+         H is requested at seven lines from .5 to 6 rad/s. Who carries no information, or fails, has the error 1.\n\
          `batch (oracle)` knows the changes and the delay: Box-Jenkins on everything since the last change\n\
          (none before 7.5 s), without a constant and over no missing sample, so that offsets, drift and\n\
          gaps cost it. A change is certain where the logarithm of the likelihood ratio of the true\n\
@@ -24,7 +24,7 @@ pub fn page(lines: &[Line], measured: &str) -> String {
          ## Results\n"
     );
     text += &tables(lines);
-    text += "\n## The cases\n\n| case | theme | what it is |\n|---|---|---|\n";
+    text += "\n## The cases\n\n| case | theme | description |\n|---|---|---|\n";
     for case in cases() {
         let _ = writeln!(text, "| {} | {} | {} |", case.name, case.theme, case.meaning);
     }

@@ -1,13 +1,11 @@
 //! The same measures on recorded people.
 //!
-//! Trials of one person, each 40 s behind its ramp at 60 Hz, are joined: one on `1/s` to one on
-//! `1/(s(s+1))` and the other way round, a change of the plant and so of the person at 40 s, and two
-//! of one plant, a seam without a change. The second trial brings its own ramp as history
-//! ([`Seam`]): no filter jumps. Single trials are time without a change. The truth is the person's
-//! average describing function over their other trials on that plant, at the seven lowest lines of
-//! the disturbance: `sum U conj(D) / sum E conj(D)` over trials of two whole periods. Nothing is told
-//! of the delay. The control of a row was read a sample before it was written: e(k) stands beside
-//! u(k+1).
+//! Trials of one person, each 40 s after its ramp at 60 Hz, are joined: one on `1/s` to one on `1/(s(s+1))` and the
+//! other way round, a change of the plant and so of the person at 40 s, and two of one plant, a seam without a change.
+//! The second trial brings its own ramp as history ([`Seam`]): no filter jumps. Single trials are time without a
+//! change. The truth is the person's average describing function over their other trials on that plant, at the seven
+//! lowest lines of the disturbance: `sum U conj(D) / sum E conj(D)` over trials of two whole periods. Nothing is
+//! reported of the delay. The control of a row was read a sample before it was written: e(k) is next to u(k+1).
 //!
 //! The recordings are not part of the project.
 
@@ -18,14 +16,14 @@ use hoid_model::{Complex64, SampleTime};
 use rayon::prelude::*;
 
 use super::{
-    contestant::{Contestant, Seam, Task},
     draw::Portion,
-    measure::{Found, Line, asked, scored},
-    run::{chosen_contestants, kept, refused},
+    entrant::{Entrant, Seam, Task},
+    measure::{ChangeOutcome, Line, asked, scored},
+    run::{chosen_entrants, kept, refused},
 };
 use crate::ChallengeError;
 
-/// Seconds of the ramp, of a trial behind it, and of a period.
+/// Seconds of the ramp, of a trial after it, and of a period.
 const RAMP_S: f64 = 5.0;
 const TRIAL_S: f64 = 40.0;
 const PERIOD_S: f64 = 20.0;
@@ -39,7 +37,7 @@ const SINGLE_START_S: (f64, f64) = (5.0, 20.0);
 /// The change of the plant is known: its evidence is not computed.
 const SURE: f64 = 1e9;
 
-/// What is to be run.
+/// Tasks to run.
 #[derive(Debug, Clone)]
 pub struct PeopleOptions {
     /// Directory of the recordings.
@@ -50,13 +48,13 @@ pub struct PeopleOptions {
     pub runs: usize,
     /// Kinds: `fo-so`, `so-fo`, `fo-fo`, `so-so`, `fo`, `so`; none for all.
     pub kinds: Vec<String>,
-    /// Names of contestants; none for all.
+    /// Names of entrants; none for all.
     pub methods: Vec<String>,
     /// Part of the runs.
     pub portion: Portion,
 }
 
-/// A trial: e and u with the ramp, and what they have at the lines behind it.
+/// A trial: e and u with the ramp, and what they have at the lines after it.
 struct Trial {
     e: Vec<f64>,
     u: Vec<f64>,
@@ -67,13 +65,13 @@ struct Trial {
 /// The trials of a person on a plant.
 type Cells = BTreeMap<(String, String), Vec<Trial>>;
 
-/// Runs what is not there yet.
+/// Runs the missing parts.
 ///
 /// # Errors
-/// [`ChallengeError`] for recordings that cannot be read, names that are none, files.
+/// [`ChallengeError`] for recordings that cannot be read, unknown names, and failures of files.
 pub fn challenge_people(options: &PeopleOptions, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Line>, ChallengeError> {
     let cells = read_all(&options.recordings)?;
-    let (contestants, _) = chosen_contestants(&options.methods)?;
+    let (entrants, _) = chosen_entrants(&options.methods)?;
     let mut all = Vec::new();
     for (person, plant) in cells.keys() {
         let count = cells[&(person.clone(), plant.clone())].len();
@@ -102,11 +100,9 @@ pub fn challenge_people(options: &PeopleOptions, each: &(dyn Fn(&str) + Sync)) -
                 .join("people")
                 .join(&joined.person)
                 .join(joined.kind());
-            let lines = kept(&folder, joined.first.1 as u64, &contestants, false, &mut || {
+            let lines = kept(&folder, joined.first.1 as u64, &entrants, false, &mut || {
                 let posed = joined.posed(&cells)?;
-                Ok(Box::new(move |contestant: Option<&dyn Contestant>| {
-                    posed.line(contestant)
-                }))
+                Ok(Box::new(move |entrant: Option<&dyn Entrant>| posed.line(entrant)))
             });
             each(&format!("{} {} {}", joined.person, joined.kind(), joined.first.1));
             lines
@@ -131,7 +127,7 @@ fn read_all(directory: &Path) -> Result<Cells, ChallengeError> {
         let record = read_record(&directory.join(name), &options)?.record;
         let own = Trial::new(record.input(), record.output(), record.channel("d")).ok_or_else(|| {
             refused(format!(
-                "{name} is no trial of {} s with the column d",
+                "{name} is not a trial of {} s with the column d",
                 RAMP_S + TRIAL_S
             ))
         })?;
@@ -245,7 +241,7 @@ impl Joined {
         // A seam is asked about at the same times as a change.
         let at_s: &[f64] = if self.second.is_some() { &[TRIAL_S] } else { &[] };
         let (labels, asked_s): (Vec<String>, Vec<f64>) = asked(at_s, start_s.1, length_s, false).into_iter().unzip();
-        let found = Found {
+        let found = ChangeOutcome {
             at_s: TRIAL_S,
             evidence: [SURE; 2],
             after_s: None,
@@ -271,19 +267,19 @@ impl Joined {
     }
 }
 
-/// A joined record with what is asked of it.
+/// A joined record with its task.
 struct Posed {
     case: String,
     number: u64,
     task: Task,
     labels: Vec<String>,
-    changes: Vec<Found>,
+    changes: Vec<ChangeOutcome>,
     /// The response at the lines before and after the seam.
     truths: [Vec<Complex64>; 2],
 }
 
 impl Posed {
-    fn line(&self, contestant: Option<&dyn Contestant>) -> Line {
+    fn line(&self, entrant: Option<&dyn Entrant>) -> Line {
         let truth = |omega: f64, t_s: f64| {
             let at = self
                 .task
@@ -293,8 +289,8 @@ impl Posed {
                 .unwrap_or(0);
             self.truths[usize::from(t_s >= TRIAL_S && self.task.seam.is_some())][at]
         };
-        let (name, answer) = match contestant {
-            Some(contestant) => (contestant.name(), contestant.follow(&self.task)),
+        let (name, answer) = match entrant {
+            Some(entrant) => (entrant.name(), entrant.follow(&self.task)),
             None => (String::new(), Err("nobody".to_owned())),
         };
         let mut line = scored(&self.task, &self.labels, &truth, name, answer, &self.changes);
@@ -308,7 +304,7 @@ impl Posed {
 mod tests {
     use super::*;
 
-    /// A trial whose control is its error behind a delay of one sample and a gain: the describing
+    /// A trial whose control is its error after a delay of one sample and a gain: the describing
     /// function is that gain, the sample is the shift of the recorder.
     #[test]
     fn the_describing_function_of_a_gain_is_the_gain() {

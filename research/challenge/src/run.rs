@@ -1,8 +1,8 @@
 //! Runs of the challenge, on all threads, kept on disk.
 //!
-//! Each run of a case is a file, a line of JSON for each contestant. It is written beside and
-//! renamed; what is there is not computed again, so that a challenge can be stopped, go on, take in
-//! another contestant, or be done in parts on several machines. Nothing depends on the number of
+//! Each run of a case is a file, a line of JSON for each entrant. It is written next to and
+//! renamed; what is there is not computed again, so that a challenge can be stopped, continue, take
+//! in another entrant, or be done in parts on several machines. Nothing depends on the number of
 //! threads.
 
 use std::path::{Path, PathBuf};
@@ -12,14 +12,14 @@ use rayon::prelude::*;
 use super::{
     case::Case,
     cases::cases,
-    contestant::Contestant,
-    contestants::contestants,
     draw::{Portion, RunOf, Seeds},
+    entrant::Entrant,
+    entrants::entrants,
     measure::{BATCH, Line, Posed},
 };
 use crate::ChallengeError;
 
-/// What is to be run.
+/// Tasks to run.
 #[derive(Debug, Clone)]
 pub struct ChallengeOptions {
     /// Directory of the lines.
@@ -28,24 +28,24 @@ pub struct ChallengeOptions {
     pub seeds: Seeds,
     /// Runs of each case.
     pub runs: u64,
-    /// Names of cases, their beginnings (`none-`), or themes; none for all.
+    /// Names of cases, their starts (`none-`), or themes; none for all.
     pub cases: Vec<String>,
-    /// Names of contestants; none for all. `batch` is the batch fit that knows the changes.
+    /// Names of entrants; none for all. `batch` is the batch fit that knows the changes.
     pub methods: Vec<String>,
     /// Part of the runs.
     pub portion: Portion,
 }
 
-/// The contestants of these names, all where there are none, and whether the batch fit is among them.
+/// The entrants of these names, all where there are none, and whether the batch fit is among them.
 ///
 /// # Errors
-/// [`ChallengeError::Refused`] for a name that is none.
-pub(super) fn chosen_contestants(names: &[String]) -> Result<(Vec<Box<dyn Contestant>>, bool), ChallengeError> {
-    let mut all = contestants();
+/// [`ChallengeError::Refused`] for a name that is invalid.
+pub(super) fn chosen_entrants(names: &[String]) -> Result<(Vec<Box<dyn Entrant>>, bool), ChallengeError> {
+    let mut all = entrants();
     let known: Vec<String> = all.iter().map(|c| c.name()).chain(["batch".to_owned()]).collect();
     if let Some(unknown) = names.iter().find(|name| !known.contains(name)) {
         return Err(refused(format!(
-            "no contestant is called {unknown}; there is {}",
+            "no entrant is called {unknown}; there is {}",
             known.join(", ")
         )));
     }
@@ -53,7 +53,7 @@ pub(super) fn chosen_contestants(names: &[String]) -> Result<(Vec<Box<dyn Contes
     Ok((all, names.is_empty() || names.iter().any(|n| n == "batch")))
 }
 
-/// The cases of these names, beginnings or themes; all where there are none.
+/// The cases of these names, starts or themes; all where there are none.
 ///
 /// # Errors
 /// [`ChallengeError::Refused`] for a name of nothing.
@@ -79,14 +79,14 @@ pub(super) fn refused(reason: String) -> ChallengeError {
     ChallengeError::Refused { reason }
 }
 
-/// Runs what is not there yet; the lines of all that was chosen, in the order of cases, runs and
-/// contestants. `each` is called after every run.
+/// Runs the missing parts; the lines of all that was chosen, in the order of cases, runs and
+/// entrants. `each` is called after every run.
 ///
 /// # Errors
-/// [`ChallengeError`] for names that are none, files, and cases that nobody bears.
+/// [`ChallengeError`] for invalid names, files, and cases that no person can stabilise.
 pub fn challenge(options: &ChallengeOptions, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Line>, ChallengeError> {
     let cases = chosen_cases(&options.cases)?;
-    let (contestants, batch) = chosen_contestants(&options.methods)?;
+    let (entrants, batch) = chosen_entrants(&options.methods)?;
     let all: Vec<(&Case, u64)> = (cases.iter())
         .flat_map(|case| (0..options.runs).map(move |number| (case, number)))
         .collect();
@@ -98,14 +98,14 @@ pub fn challenge(options: &ChallengeOptions, each: &(dyn Fn(&str) + Sync)) -> Re
         .into_par_iter()
         .map(|(case, number)| {
             let folder = options.directory.join(options.seeds.to_string()).join(&case.name);
-            let lines = kept(&folder, number, &contestants, batch, &mut || {
+            let lines = kept(&folder, number, &entrants, batch, &mut || {
                 let of = RunOf {
                     seeds: options.seeds,
                     number,
                 };
                 let posed = Posed::new(case, of).map_err(refused)?;
-                Ok(Box::new(move |contestant: Option<&dyn Contestant>| match contestant {
-                    Some(contestant) => posed.line(contestant),
+                Ok(Box::new(move |entrant: Option<&dyn Entrant>| match entrant {
+                    Some(entrant) => posed.line(entrant),
                     None => posed.batch(),
                 }))
             });
@@ -116,21 +116,21 @@ pub fn challenge(options: &ChallengeOptions, each: &(dyn Fn(&str) + Sync)) -> Re
     Ok(lines.concat())
 }
 
-/// Gives the line of a contestant, or of the batch fit.
-pub(super) type LineOf = Box<dyn Fn(Option<&dyn Contestant>) -> Line>;
+/// Gives the line of an entrant, or of the batch fit.
+pub(super) type LineOf = Box<dyn Fn(Option<&dyn Entrant>) -> Line>;
 
-/// The lines of a run: those of the file, and those that are not there computed and added.
+/// The lines of a run: those of the file, and those that do not exist computed and added.
 pub(super) fn kept(
     folder: &Path,
     number: u64,
-    contestants: &[Box<dyn Contestant>],
+    entrants: &[Box<dyn Entrant>],
     batch: bool,
     pose: &mut dyn FnMut() -> Result<LineOf, ChallengeError>,
 ) -> Result<Vec<Line>, ChallengeError> {
     let path = folder.join(format!("{number}.jsonl"));
     let mut lines = if path.exists() { read(&path)? } else { Vec::new() };
-    let mut wanted: Vec<(String, Option<&dyn Contestant>)> =
-        contestants.iter().map(|c| (c.name(), Some(c.as_ref()))).collect();
+    let mut wanted: Vec<(String, Option<&dyn Entrant>)> =
+        entrants.iter().map(|c| (c.name(), Some(c.as_ref()))).collect();
     if batch {
         wanted.push((BATCH.to_owned(), None));
     }
@@ -139,9 +139,9 @@ pub(super) fn kept(
         .collect();
     if !missing.is_empty() {
         let line_of = pose()?;
-        lines.extend(missing.into_iter().map(|(_, contestant)| line_of(*contestant)));
+        lines.extend(missing.into_iter().map(|(_, entrant)| line_of(*entrant)));
         write(&path, folder, &lines)?;
-        // As they will be read: the last digit of a number may differ from what was written.
+        // As they will be read: the last digit of a number may differ from the written data.
         lines = read(&path)?;
     }
     let of = |(name, _): &(String, _)| lines.iter().find(|line| line.method == *name).cloned();
@@ -192,8 +192,8 @@ mod tests {
     #[test]
     fn what_is_there_is_not_computed_again() {
         let directory = tempfile::tempdir().unwrap();
-        let usual = options(directory.path());
-        let all = challenge(&usual, &|_| ()).unwrap();
+        let default = options(directory.path());
+        let all = challenge(&default, &|_| ()).unwrap();
         assert_eq!(all.len(), 4);
         assert!(all.iter().all(|line| line.failed.is_none()), "{all:?}");
         let path = directory.path().join("open/change-K_e_dot-100/0.jsonl");
@@ -201,7 +201,7 @@ mod tests {
             .unwrap()
             .replace("\"exposed_s\":", "\"exposed_s\":1");
         std::fs::write(&path, text).unwrap();
-        let again = challenge(&usual, &|_| ()).unwrap();
+        let again = challenge(&default, &|_| ()).unwrap();
         assert!(again[0].exposed_s > 100.0 && again[2..] == all[2..]);
         // One thread, another directory.
         let other = tempfile::tempdir().unwrap();
@@ -219,8 +219,8 @@ mod tests {
             refused.contains("nothing") && refused.contains("none-lag-1"),
             "{refused}"
         );
-        assert!(chosen_contestants(&["oracle".to_owned()]).is_err());
-        let (all, batch) = chosen_contestants(&[]).unwrap();
+        assert!(chosen_entrants(&["oracle".to_owned()]).is_err());
+        let (all, batch) = chosen_entrants(&[]).unwrap();
         assert!(batch && all.iter().any(|c| c.name() == "chow"));
     }
 }

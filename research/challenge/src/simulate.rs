@@ -6,9 +6,9 @@
 //! that is seen all the time with its values between the steps. Nothing here is shared with the
 //! simulators of [`hoid_sim`] but the random streams.
 //!
-//! Beside the signals a run keeps what only an oracle knows: the remnant, the course of its
-//! strength, the true response, and what the person of before each change would have answered to
-//! the same errors.
+//! Next to the signals a run keeps what only an oracle knows: the remnant, the course of its
+//! strength, the true response, and what the person before the change each change would have
+//! answered to the same errors.
 
 use std::f64::consts::TAU;
 
@@ -29,7 +29,7 @@ use super::{
 pub struct Run {
     /// Time between two samples.
     pub sample_time: SampleTime,
-    /// Recorded error; NaN where nothing was recorded.
+    /// Recorded error; NaN if nothing was recorded.
     pub e: Vec<f64>,
     /// Recorded control.
     pub u: Vec<f64>,
@@ -37,7 +37,7 @@ pub struct Run {
     pub excitation: Vec<f64>,
     /// The operator over time.
     pub truth: Truth,
-    /// What an oracle knows.
+    /// True values for an oracle.
     pub hidden: Hidden,
 }
 
@@ -76,7 +76,7 @@ impl Truth {
         }
     }
 
-    /// The operator's delay in samples of `q^-nk`, where it is told: with the one of the hold.
+    /// The operator's delay in samples of `q^-nk`, where it is reported: with the one of the hold.
     pub fn told_nk(&self) -> Option<usize> {
         let samples = self.first.tau_e_s / self.sample_time.s();
         match self.case.delay {
@@ -100,7 +100,7 @@ fn held(operator: &Operator, omega_rad_s: f64, sample_time: SampleTime) -> Compl
 /// Aliases on either side; they fall as the square of their number, or faster.
 const ALIASES: i32 = 100;
 
-/// What only an oracle knows, sample by sample.
+/// True values, sample by sample.
 #[derive(Debug, Clone)]
 pub struct Hidden {
     /// Remnant, before stick and recorder.
@@ -109,7 +109,8 @@ pub struct Hidden {
     pub(super) level: Vec<f64>,
     /// Response to the error, before stick and recorder, with the recorded sign.
     pub(super) response: Vec<f64>,
-    /// For each change its first sample, and from there on the response of the person of before.
+    /// For each change its first sample, and from there on the response of the person before the
+    /// change.
     pub(super) before: Vec<(usize, Vec<f64>)>,
     /// Whitening filter of n over its standard deviation.
     pub(super) whitening: Vec<f64>,
@@ -130,7 +131,7 @@ const WALK: u64 = 5;
 /// A run of a case.
 ///
 /// # Errors
-/// [`SimError`] where nobody bears the case.
+/// [`SimError`] that are not feasible for any person the case.
 pub fn simulate(case: &Case, run: RunOf) -> Result<Run, SimError> {
     let sample_time = SampleTime::new(1.0 / case.rate_hz)?;
     let mut outcome = Err(SimError::Diverged {
@@ -164,7 +165,7 @@ fn of_person(case: &Case, run: RunOf, operator: Operator, sample_time: SampleTim
         Blemish::IdleStart(s) => s,
         _ => f64::NEG_INFINITY,
     };
-    // One sample more, for what lies between two.
+    // One sample more, for anything between two.
     let mut excitation = lines.samples(time(0), sample_time, total + 1);
     for (k, value) in excitation.iter_mut().enumerate() {
         if time(k) < idle_s {
@@ -285,7 +286,7 @@ fn of_person(case: &Case, run: RunOf, operator: Operator, sample_time: SampleTim
 }
 
 impl Run {
-    /// What the recorder makes of it.
+    /// The signals as recorded.
     fn recorded(&mut self, case: &Case, run: RunOf, [sigma_u, sigma_e]: [f64; 2]) {
         let ts = self.sample_time.s();
         let at = |t_s: f64| ((t_s / ts).round() as usize).min(self.e.len());
@@ -359,7 +360,7 @@ mod tests {
             };
             let run = simulate(&quiet, RUN).unwrap();
             let per_second = quiet.rate_hz as usize;
-            // Late enough for what the start stirs up to be gone.
+            // Late enough for the transient of the start to be gone.
             let span = 60 * per_second..80 * per_second;
             for multiple in [2.0, 3.0, 5.0, 11.0, 19.0] {
                 let omega = multiple * TAU / 20.0;

@@ -7,7 +7,8 @@ use super::{
     oracle::CERTAIN,
 };
 
-/// Methods beside each other in a table that fits a page 1200 pixels wide: of numbers, and of words.
+/// Methods next to each other in a table that fits a page 1200 pixels wide: of numbers, and of
+/// words.
 const BESIDE: usize = 7;
 const WORDS_BESIDE: usize = 5;
 
@@ -19,14 +20,14 @@ pub fn tables(lines: &[Line]) -> String {
     let cases = in_order(lines.iter().map(|line| line.case.as_str()));
     text += &overview(lines, &methods, &cases);
 
-    text += "\n### Error of H\n\nMean of |dH|/|H| over the lines, from 8 s after a change on or where nobody changes; median over the runs.\n\n";
+    text += "\n### Error of H\n\nMean of |dH|/|H| over the lines, from 8 s after a change on or without a change; median over the runs.\n\n";
     by_case(&mut text, &cases, &methods, BESIDE, |case, method| {
         let of = own(lines, case, method).flat_map(|line| &line.moments);
         let settled = of.filter(|m| is_settled(&m.label)).map(|m| m.error);
         median(settled.collect()).map_or("–".to_owned(), |e| format!("{e:.2}"))
     });
 
-    text += "\n### Course of the error of H\n\nMedian over all runs in which somebody changes at once.\n\n";
+    text += "\n### Course of the error of H\n\nMedian over all runs in which someone changes at once.\n\n";
     let labels: Vec<String> = ["before".to_owned()]
         .into_iter()
         .chain(AFTER_S.map(|s| format!("+{s:.0}")))
@@ -57,7 +58,7 @@ pub fn tables(lines: &[Line]) -> String {
                 .any(|line| line.method == *m && line.false_alarms.is_some())
         })
         .collect();
-    text += "\n### Alarms an hour without a change\n\nThose that are said to be of the remnant alone are behind the plus sign.\n\n";
+    text += "\n### Alarms an hour without a change\n\nThose that are reported to be of the remnant alone are after the plus sign.\n\n";
     head(&mut text, "case", &[&["hours"], declaring.as_slice()].concat());
     for case in &cases {
         let hours = |method: &str| own(lines, case, method).map(|line| line.exposed_s).sum::<f64>() / 3600.0;
@@ -112,7 +113,7 @@ pub fn tables(lines: &[Line]) -> String {
         row(&mut text, case, head.into_iter().chain(declaring.iter().map(cell)));
     }
 
-    text += "\n### Coverage\n\nBands of 1.96 standard errors of real and imaginary part of H that hold the truth, in percent; from 8 s after a change on or where nobody changes.\n\n";
+    text += "\n### Coverage\n\nBands of 1.96 standard errors of real and imaginary part of H that hold the truth, in percent; from 8 s after a change on or without a change.\n\n";
     by_case(&mut text, &cases, &methods, BESIDE, |case, method| {
         let of = own(lines, case, method)
             .flat_map(|line| &line.moments)
@@ -121,7 +122,7 @@ pub fn tables(lines: &[Line]) -> String {
         share(inside, all)
     });
 
-    text += "\n### Parameters\n\nMedian relative error in percent and coverage, in runs whose operator is that of the reference text; from 8 s after a change on or where nobody changes.\n\n";
+    text += "\n### Parameters\n\nMedian relative error in percent and coverage, in runs whose operator is that of the thesis; from 8 s after a change on or without a change.\n\n";
     let names = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
     head(&mut text, "method", &names);
     let named = |m: &&&str| {
@@ -150,7 +151,7 @@ pub fn tables(lines: &[Line]) -> String {
         .filter(|m| lines.iter().any(|line| line.method == *m && !line.findings.is_empty()))
         .collect();
     if !judged.is_empty() {
-        text += "\n### What their verdicts say\n\nThe two findings that a verdict has most often, with the runs that have them.\n\n";
+        text += "\n### What their verdicts report\n\nThe two findings that a verdict has most often, with the runs that have them.\n\n";
         by_case(&mut text, &cases, &judged, WORDS_BESIDE, |case, method| {
             commonest(own(lines, case, method))
         });
@@ -160,9 +161,9 @@ pub fn tables(lines: &[Line]) -> String {
     text
 }
 
-/// Each contestant in a row.
+/// Each entrant in a row.
 fn overview(lines: &[Line], methods: &[&str], cases: &[&str]) -> String {
-    let mut text = "\n### In a row each\n\nError of H from 8 s after a change on or where nobody changes: median and largest of the cases. Coverage of its bands in percent. Alarms an hour in runs without a change, those of the remnant alone behind the plus sign. Changes found of those that the oracle finds with certainty, within 5 and 8 s.\n\n".to_owned();
+    let mut text = "\n### In a row each\n\nError of H from 8 s after a change on or without a change: median and largest of the cases. Coverage of its bands in percent. Alarms an hour in runs without a change, those of the remnant alone after the plus sign. Changes found of those that the oracle finds with certainty, within 5 and 8 s.\n\n".to_owned();
     head(
         &mut text,
         "method",
@@ -226,7 +227,7 @@ fn overview(lines: &[Line], methods: &[&str], cases: &[&str]) -> String {
     text
 }
 
-/// Who could not follow, why, and where.
+/// Entrants that failed, why, and where.
 fn failures(lines: &[Line]) -> String {
     let failed = || (lines.iter()).filter_map(|line| Some((line, line.failed.as_deref()?)));
     let mut text = String::new();
@@ -275,7 +276,7 @@ fn commonest<'a>(lines: impl Iterator<Item = &'a Line> + Clone) -> String {
     }
 }
 
-/// True from 8 s after a change on, and where nobody changes.
+/// True from 8 s after a change on, and without a change.
 fn is_settled(label: &str) -> bool {
     !matches!(label, "+2" | "+4" | "before")
 }
@@ -297,7 +298,7 @@ fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 }
 
 /// A row for each case and a column for each method, in as many tables, one below the other, as a page needs that has
-/// room for so many methods beside each other.
+/// room for this many methods next to each other.
 fn by_case(text: &mut String, cases: &[&str], methods: &[&str], beside: usize, cell: impl Fn(&str, &str) -> String) {
     let each = methods.len().div_ceil(methods.len().div_ceil(beside).max(1)).max(1);
     for (i, some) in methods.chunks(each).enumerate() {
@@ -347,7 +348,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use crate::measure::{Found, Moment};
+    use crate::measure::{ChangeOutcome, Moment};
 
     #[test]
     fn numbers_are_where_they_belong() {
@@ -367,7 +368,7 @@ mod tests {
             false_alarms: Some(3),
             of_remnant: 1,
             exposed_s: 1800.0,
-            changes: vec![Found {
+            changes: vec![ChangeOutcome {
                 at_s: 45.0,
                 evidence: [11.0, 20.0],
                 after_s: found,

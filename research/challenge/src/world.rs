@@ -106,7 +106,7 @@ impl World {
         }
     }
 
-    /// What reaches the operator at start, middle and end of the step that begins at a place, in steps.
+    /// Input of the operator at start, middle and end of the step that starts at a place, in steps.
     fn input(&self, place: f64) -> [f64; 3] {
         match self.sight {
             Sight::Held => [self.mean_held(place); 3],
@@ -114,7 +114,7 @@ impl World {
         }
     }
 
-    /// Mean of the held error over the step that begins at a place, in steps.
+    /// Mean of the held error over the step that starts at a place, in steps.
     fn mean_held(&self, place: f64) -> f64 {
         let n = self.steps as f64;
         let (first, last) = (place / n, (place + 1.0) / n);
@@ -125,7 +125,7 @@ impl World {
                 self.errors.get(sample as usize).copied().unwrap_or(0.0)
             }
         };
-        // A place on the border but for rounding is on it.
+        // A place on the border except for rounding is on it.
         let edge = (first + 1.0 - 1e-9).floor();
         if edge >= last || edge <= first {
             return value(first + 1e-9);

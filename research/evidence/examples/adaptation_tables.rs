@@ -19,7 +19,7 @@ const OTHERS: [(&str, &str); 4] = [
     ("again and again", "C4, C6, and back every 10.24 s"),
     ("neuromuscular", "ω_nm to 8 rad/s, ζ_nm to .5"),
 ];
-/// Delays that are not what is supposed.
+/// Delays that are not the prior.
 const DELAYS: [(&str, &str); 3] = [
     ("delay alone", "C1, C2, τ_e to .34 s"),
     ("delay too", "C4, C6, τ_e to .34 s"),
@@ -91,7 +91,7 @@ impl Tables {
     /// Median errors over the better of RLS and RPEM, cell by cell.
     fn relative(&self, quantity: &str, conditions: &[&str], name: &str) -> Vec<f64> {
         let of = |name: &str| self.medians(quantity, "all", conditions, name);
-        // A method without a single convertible estimate is no number, which min leaves out.
+        // A method without a single convertible estimate is not a number, which min leaves out.
         let better: Vec<f64> = of("RLS").iter().zip(of("RPEM")).map(|(a, b)| a.min(b)).collect();
         of(name)
             .iter()
@@ -126,7 +126,7 @@ impl Tables {
                     let rows = self.rows(&format!("{what}_{p}"), "all", &CHANGING, name);
                     let bias: Vec<f64> = rows.iter().map(|row| row.statistics.median.abs()).collect();
                     let spread = |row: &&SummaryRow| {
-                        // Of a normal sample the standard deviation; a few that diverged do not
+                        // For a normal sample the standard deviation; a few that diverged do not
                         // count.
                         (row.statistics.upper_quartile - row.statistics.lower_quartile) / 1.349
                     };
@@ -191,7 +191,7 @@ impl Tables {
         }
     }
 
-    /// What a method declares: false alarms, hours, found in %, median lag in s.
+    /// Declared changes of a method: false alarms, hours, found in %, median lag in s.
     fn declared(&self, name: &str, scenario: &str, conditions: &[&str]) -> [f64; 4] {
         let all = |quantity: &str| -> Vec<f64> {
             let of = |condition: &&str| {
@@ -227,7 +227,7 @@ impl Tables {
         println!();
     }
 
-    /// Errors of all methods in other cases, and what those that declare changes say there.
+    /// Errors of all methods in other cases, and what those that declare changes report there.
     fn elsewhere(&self, cases: &[(&str, &str)], quantities: &[&str], telling: &[&str]) {
         let titles: Vec<&str> = cases.iter().map(|(_, title)| *title).collect();
         println!(
@@ -326,7 +326,7 @@ fn line(name: &str, cells: impl Iterator<Item = String>) {
     println!("| {name} | {} |", cells.collect::<Vec<_>>().join(" | "));
 }
 
-/// Two digits behind the point below ten, none above a hundred.
+/// Two digits after the point below ten, none above a hundred.
 fn short(value: f64) -> String {
     match value.abs() {
         v if v > 999.0 => ">999".to_owned(),

@@ -1,11 +1,11 @@
-//! The default tracker beside what came before it in the conditions of the reference text: errors, coverage
-//! and changes of each cell, and the ratio of the errors to those of the best of the others.
+//! The default tracker next to what came before it in the conditions of the thesis: errors, coverage and changes of
+//! each cell, and the ratio of the errors to those of the best of the others.
 //!
 //! `cargo run --release -p hoid-evidence --example conditions_evidence -- [RUNS] [M,..] [LEVEL,..] [METHOD,..] [CONDITION,..]`
 //!
-//! Methods: `adaptive` is told nothing; `multiple-model`, `rls` and `rpem` are told the delay and start from a fit
-//! of the first 30.72 s (RLS and RPEM by the settings of the text). Their first rows are therefore not causal:
-//! the ratios are of the rows from then on, and those of 10 s on stand beside.
+//! Methods: `adaptive` gets no information; `multiple-model`, `rls` and `rpem` are given the delay and start from a fit
+//! of the first 30.72 s (RLS and RPEM by the settings of the text). Their first rows are therefore not causal: the
+//! ratios are of the rows from then on, and those of 10 s on are alongside.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid_evidence::task::{CHANGE_S, START_S, median, on_all_cores, scenario};
@@ -35,7 +35,7 @@ impl Cell {
         !matches!(self.condition, Condition::C1 | Condition::C2)
     }
 
-    /// When the change begins: 1.8 % of a sigmoid are through 4/G before its middle.
+    /// When the change starts: 1.8 % of a sigmoid are through 4/G before its middle.
     fn begins_s(&self) -> f64 {
         match self.condition {
             Condition::C3 | Condition::C5 => CHANGE_S - 8.0,
@@ -44,10 +44,10 @@ impl Cell {
     }
 }
 
-/// What a run of a method gave: RMS relative errors from 30.72 s and from 10 s on in per cent, coverage of
-/// 1.96 standard errors in each span, changes declared where there is none, and the delay of the first one
-/// from where the change begins to 10 s behind its middle, after the middle.
-struct Found {
+/// Result of a run of a method: RMS relative errors from 30.72 s and from 10 s on in per cent, coverage of 1.96
+/// standard errors in each span, changes declared where there is none, and the delay of the first one from where the
+/// change starts to 10 s after its middle, after the middle.
+struct RunResult {
     errors: [[f64; 5]; 2],
     covered: [[f64; 5]; 3],
     alarms: f64,
@@ -57,7 +57,7 @@ struct Found {
 fn tracker(name: &str, record: &Record) -> Tracker {
     let method = hoid_survey::method(name).unwrap();
     if method.starts_itself() {
-        let options = TrackOptions::told_nothing(method, record.sample_time());
+        let options = TrackOptions::without_prior(method, record.sample_time());
         return Tracker::new(&options, None, record.sample_time()).unwrap();
     }
     let options = match name {
@@ -72,7 +72,7 @@ fn tracker(name: &str, record: &Record) -> Tracker {
     .unwrap()
 }
 
-fn follow(name: &str, cell: &Cell, record: &Record) -> Found {
+fn follow(name: &str, cell: &Cell, record: &Record) -> RunResult {
     let truth = COLUMNS.map(|c| record.channel(c).unwrap());
     let mut tracker = tracker(name, record);
     let moves_from = if name == "multiple-model" { START_S - 0.005 } else { 0.0 };
@@ -115,7 +115,7 @@ fn follow(name: &str, cell: &Cell, record: &Record) -> Found {
             }
         }
     }
-    Found {
+    RunResult {
         errors: core::array::from_fn(|f| squares[f].map(|s: f64| 100.0 * (s / rows[f]).sqrt())),
         covered: core::array::from_fn(|s| covered[s].map(|c| c / counts[s])),
         alarms,
@@ -129,7 +129,7 @@ fn listed(values: impl Iterator<Item = f64>, digits: usize) -> String {
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let of = |i: usize, usual: &str| arguments.get(i).map_or(usual, String::as_str).to_owned();
+    let of = |i: usize, default: &str| arguments.get(i).map_or(default, String::as_str).to_owned();
     let runs: usize = of(0, "20").parse().unwrap();
     let numbers = |text: String| text.split(',').map(|n| n.parse().unwrap()).collect::<Vec<f64>>();
     let (orders, levels, methods) = (
@@ -178,7 +178,7 @@ fn main() {
             });
             let error = |from: usize, i: usize| median(found.iter().map(|f| f.errors[from][i]));
             let errors: [[f64; 5]; 2] = core::array::from_fn(|f| core::array::from_fn(|i| error(f, i)));
-            let mean = |of: &dyn Fn(&Found) -> f64| found.iter().map(of).sum::<f64>() / runs as f64;
+            let mean = |of: &dyn Fn(&RunResult) -> f64| found.iter().map(of).sum::<f64>() / runs as f64;
             let covered: Vec<String> = (0..3)
                 .map(|s| listed((0..5).map(|i| mean(&|f| f.covered[s][i])), 2))
                 .collect();

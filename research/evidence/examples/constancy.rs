@@ -19,7 +19,7 @@ use hoid_sim::{
 };
 use rayon::prelude::*;
 
-/// u comes later by so many samples from a share of the record on.
+/// u comes later by a given number of samples from a share of the record on.
 fn late(record: &Record, share: f64, by: usize) -> Record {
     let at = (share * record.len() as f64) as usize;
     let late = |t: usize| record.output()[if t >= at { t.saturating_sub(by) } else { t }];
@@ -44,7 +44,7 @@ fn bare(record: &Record) -> Record {
     with_output(record, record.output().to_vec())
 }
 
-/// What was fitted, what was done to it, and whether it was called not constant.
+/// The fitted model, the processing of it, and whether it was called not constant.
 type Row = (String, String, Option<bool>);
 
 fn told(verdict: &Verdict) -> bool {
@@ -123,9 +123,9 @@ fn of_person(kind: RemnantKind, plant: Plant, seed: u64) -> Vec<Row> {
 
 fn main() {
     let arguments: Vec<String> = env::args().skip(1).collect();
-    let number = |name: &str, usual: u64| {
+    let number = |name: &str, default: u64| {
         let at = arguments.iter().position(|a| a == name);
-        at.and_then(|at| arguments.get(at + 1)?.parse().ok()).unwrap_or(usual)
+        at.and_then(|at| arguments.get(at + 1)?.parse().ok()).unwrap_or(default)
     };
     let (runs, first) = (number("--runs", 10), number("--seed", 5000));
     let all: Vec<Row> = (first..first + runs)

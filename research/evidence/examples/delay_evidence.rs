@@ -63,7 +63,7 @@ fn main() {
     );
     println!("|---|---|---|---|---|---|---|---|---|");
     for (name, conditions, delays) in cases {
-        let mut found: Vec<Vec<Found>> = methods.iter().map(|_| Vec::new()).collect();
+        let mut found: Vec<Vec<RunResult>> = methods.iter().map(|_| Vec::new()).collect();
         for condition in conditions {
             for &order in orders {
                 for (l, level) in LEVELS.into_iter().enumerate() {
@@ -87,16 +87,16 @@ fn main() {
             }
         }
         for ((method, _), found) in methods.iter().zip(&found) {
-            let mean = |of: &dyn Fn(&Found) -> f64| {
+            let mean = |of: &dyn Fn(&RunResult) -> f64| {
                 let values = found.iter().map(of).filter(|v| !v.is_nan());
                 let (sum, count) = values.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
                 sum / count
             };
-            let row = |of: &dyn Fn(&Found, usize) -> f64, digits: usize| {
+            let row = |of: &dyn Fn(&RunResult, usize) -> f64, digits: usize| {
                 let text = |i: usize| format!("{:.digits$}", of_all(found, &|f| of(f, i)));
                 (0..6).map(text).collect::<Vec<_>>().join(" / ")
             };
-            let means = |of: &dyn Fn(&Found, usize) -> f64| {
+            let means = |of: &dyn Fn(&RunResult, usize) -> f64| {
                 let text = |i: usize| format!("{:.0}", mean(&|f| of(f, i)));
                 (0..6).map(text).collect::<Vec<_>>().join(" / ")
             };
@@ -114,7 +114,7 @@ fn main() {
     }
 }
 
-fn of_all(found: &[Found], of: &dyn Fn(&Found) -> f64) -> f64 {
+fn of_all(found: &[RunResult], of: &dyn Fn(&RunResult) -> f64) -> f64 {
     median(found.iter().map(of))
 }
 
@@ -125,7 +125,7 @@ fn options(method: Method, track_delay_s: Option<(f64, f64)>) -> TrackOptions {
     };
     TrackOptions {
         start: StartAt::Span(Some((0.0, START_S))),
-        ..TrackOptions::new(method.clone(), method.usual_structure(), method.usual_orders(NK))
+        ..TrackOptions::new(method.clone(), method.default_structure(), method.default_orders(NK))
     }
 }
 
@@ -142,8 +142,8 @@ fn with_delay(condition: Condition, order: usize, level: f64, [before, after]: [
     scenario
 }
 
-/// What one run of one method gave, over t in [30.72, 81.92] s.
-struct Found {
+/// Result of one run of one method, over t in [30.72, 81.92] s.
+struct RunResult {
     errors: [f64; 6],
     covered: [f64; 6],
     through: [f64; 6],
@@ -154,7 +154,7 @@ struct Found {
     hours: f64,
 }
 
-fn follow(record: &Record, options: &TrackOptions, changes: bool) -> Found {
+fn follow(record: &Record, options: &TrackOptions, changes: bool) -> RunResult {
     let truth = COLUMNS.map(|c| record.channel(c).unwrap());
     let trace = track(record, options, 4).unwrap();
     let soon = |t: f64| changes && (CHANGE_S..CHANGE_S + FOUND_WITHIN_S).contains(&t);
@@ -181,7 +181,7 @@ fn follow(record: &Record, options: &TrackOptions, changes: bool) -> Found {
         .iter()
         .any(|(t, c)| soon(*t) && c.changed().contains(&"tau_e"));
     let share = |hit: bool| if changes { 100.0 * f64::from(hit) } else { f64::NAN };
-    Found {
+    RunResult {
         errors: squares.map(|s: f64| 100.0 * (s / counts[0]).sqrt()),
         covered: covered.map(|c| 100.0 * c / counts[0]),
         through: through.map(|c| 100.0 * c / counts[1]),

@@ -2,8 +2,8 @@
 //!
 //! `cargo run --release -p hoid-evidence --example evidence -- coverage|efficiency|starts|delay [RUNS]`
 //!
-//! `cargo run --release -p hoid-evidence --example evidence -- speed [RUNS] [PYTHON]` times the Box-Jenkins
-//! fit beside SciPy; PYTHON is an interpreter that has numpy and scipy, `python3` by default.
+//! `cargo run --release -p hoid-evidence --example evidence -- speed [RUNS] [PYTHON]` times the Box-Jenkins fit next to
+//! SciPy; PYTHON is an interpreter that has numpy and scipy, `python3` by default.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../../../crates/hoid/tests/common/textbook.rs"]
@@ -276,7 +276,7 @@ fn delay(runs: u64) {
     }
 }
 
-/// The Box-Jenkins fit from no start beside the same in SciPy, in one sitting on one thread; the
+/// The Box-Jenkins fit from no start next to the same in SciPy, in one sitting on one thread; the
 /// smallest of the times of each.
 fn speed(runs: u64, python: &str) {
     let record = [run(&simulator(Condition::C1, 1, 0.1), 0, 0)];
@@ -315,7 +315,7 @@ fn speed(runs: u64, python: &str) {
         .unwrap_or_default();
     let parts: Vec<&str> = printed.split_whitespace().collect();
     let Some(theirs) = parts.first().and_then(|t| t.parse::<f64>().ok()) else {
-        println!("{python} with numpy and scipy is not there: no comparison");
+        println!("{python} with numpy and scipy is missing: no comparison");
         return;
     };
     println!(

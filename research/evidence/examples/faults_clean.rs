@@ -1,13 +1,13 @@
 //! How often faults are found in runs that have none, and how many are found in those that have one.
 //!
-//! Runs of the conditions of the reference text and of virtual people of every kind of remnant and
-//! controlled element, `--runs N` of each (default 25; 21 kinds). In each run that is clean one sample
-//! of e or of u is then moved by 3, 10 or 20 of its deviations, at a place of its own.
+//! Runs of the conditions of the thesis and of virtual people of every kind of remnant and controlled element,
+//! `--runs N` of each (default 25; 21 kinds). In each run that is clean one sample of e or of u is then moved by 3, 10
+//! or 20 of its deviations, at a place of its own.
 #![allow(clippy::print_stdout, clippy::unwrap_used)]
 
 use std::env;
 
-use hoid_ident::faults::mend;
+use hoid_ident::faults::repair;
 use hoid_model::{
     Channel, FaultHandling, Record,
     scenario::{Condition, Scenario},
@@ -19,15 +19,15 @@ use hoid_sim::{
 
 fn main() {
     let arguments: Vec<String> = env::args().skip(1).collect();
-    let number = |name: &str, usual: u64| {
+    let number = |name: &str, default: u64| {
         let at = arguments.iter().position(|a| a == name);
-        at.and_then(|at| arguments.get(at + 1)?.parse().ok()).unwrap_or(usual)
+        at.and_then(|at| arguments.get(at + 1)?.parse().ok()).unwrap_or(default)
     };
     let (runs, first) = (number("--runs", 25), number("--seed", 1000));
     let (mut all, mut flagged) = (0, 0);
     let mut detected = [[(0, 0); 3]; 2];
     let mut look = |what: &str, seed: u64, record: &Record| {
-        let found = mend(record, FaultHandling::Bridge).unwrap();
+        let found = repair(record, FaultHandling::Bridge).unwrap();
         all += 1;
         if !found.faults.is_empty() {
             flagged += 1;
@@ -44,7 +44,7 @@ fn main() {
                 moved[at] += size * rms;
                 let (e, u) = (Channel::new("e", "", e), Channel::new("u", "", u));
                 let bad = Record::new(record.sample_time(), e, u).unwrap();
-                let found = mend(&bad, FaultHandling::Bridge).unwrap();
+                let found = repair(&bad, FaultHandling::Bridge).unwrap();
                 let time = bad.time_s(at) + 0.5 * bad.sample_time().s();
                 let hit = found.faults.iter().any(|f| f.from_s < time && time < f.to_s);
                 detected[channel][k].0 += usize::from(hit);

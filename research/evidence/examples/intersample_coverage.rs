@@ -5,11 +5,11 @@
 //! cargo xtask slow intersample-coverage [PEOPLE] [SEED]
 //! ```
 //!
-//! Each person has a gain of 1 to 3, a lead of 0.2 to 1 s, muscles of 8 to 14 rad/s and damping 0.2 to 0.5, and a delay of
-//! 0.15 to 0.35 s. The error is a sum of twelve sinusoids from 0.3 to 12 rad/s for 60 s, the noise of u an autoregression with
-//! 0.1 s and a tenth of the power. Held errors pass through the exact model of their rate; continuous ones at 2000 Hz, of
-//! which every k-th sample is logged. What is faster than 200 Hz is decimated to 100 Hz, as `hoid identify` does. A share of
-//! 95 % of so many people has a standard error of `sqrt(.95 .05/n)`.
+//! Each person has a gain of 1 to 3, a lead of 0.2 to 1 s, muscles of 8 to 14 rad/s and damping 0.2 to 0.5, and a delay
+//! of 0.15 to 0.35 s. The error is a sum of twelve sinusoids from 0.3 to 12 rad/s for 60 s, the noise of u an
+//! autoregression with 0.1 s and a tenth of the power. Held errors pass through the exact model of their rate;
+//! continuous ones at 2000 Hz, of which every k-th sample is logged. What is faster than 200 Hz is decimated to 100 Hz,
+//! as `hoid identify` does. A share of 95 % of a given number of people has a standard error of `sqrt(.95 .05/n)`.
 
 #![allow(clippy::print_stdout)]
 
@@ -69,7 +69,7 @@ fn record(
                 .sum()
         })
         .collect();
-    let u = passed(&operator.hold(ts)?, &e);
+    let u = passed(&operator.zoh(ts)?, &e);
     let logged = |x: &[f64]| -> Vec<f64> {
         x[RUN_IN_S * made_hz..]
             .iter()

@@ -71,7 +71,7 @@ fn operator(form: Form, random: &mut Uniform) -> Result<FamilyOperator, Box<dyn 
 /// The discrete model for an error that is held, or runs straight.
 fn discrete(operator: &FamilyOperator, course: Intersample, ts: SampleTime) -> Result<HeldFamily, Box<dyn Error>> {
     if course == Intersample::Zoh {
-        return Ok(operator.hold(ts)?);
+        return Ok(operator.zoh(ts)?);
     }
     let mut earlier = operator.coordinates().to_vec();
     let delay = earlier.len() - 1;

@@ -39,7 +39,7 @@ fn simulator(condition: Condition, remnant_order: usize, level: f64) -> Simulato
     Simulator::new(&scenario(condition, remnant_order, level)).unwrap()
 }
 
-/// Seed 7000; the method was set on seed 9000, and looked at on seed 5000.
+/// Seed 7000; the method was set on seed 9000, and examined on seed 5000.
 fn run(simulator: &Simulator, condition: Condition, order: usize, level: usize, replication: u64) -> Record {
     let run_seed = RunSeed {
         seed: 7000,
@@ -49,8 +49,8 @@ fn run(simulator: &Simulator, condition: Condition, order: usize, level: usize, 
     simulator.run(run_seed, false).unwrap()
 }
 
-/// What one run of one method gave.
-struct Found {
+/// Result of one run of one method.
+struct RunResult {
     /// RMS of the relative error over t in [10, 81.92] s, per cent.
     errors: [f64; 5],
     /// Share of samples after the start fit, and within 5 s after the change, in which 1.96
@@ -63,7 +63,7 @@ struct Found {
     settling_s: [f64; 2],
 }
 
-fn follow(record: &Record, options: &TrackOptions) -> Found {
+fn follow(record: &Record, options: &TrackOptions) -> RunResult {
     let truth = COLUMNS.map(|c| record.channel(c).unwrap());
     let span = record.span(0.0, START_S).unwrap();
     let mut tracker = Tracker::new(options, Some(&span), record.sample_time()).unwrap();
@@ -115,7 +115,7 @@ fn follow(record: &Record, options: &TrackOptions) -> Found {
             }
         }
     }
-    Found {
+    RunResult {
         errors: squares.map(|s: f64| 100.0 * (s / rows).sqrt()),
         covered: covered.map(|c| c / counts[0]),
         covered_through: through.map(|c| c / counts[1]),
@@ -184,7 +184,7 @@ fn detection(runs: usize) {
         }
         both
     };
-    // Of each method and threshold: lags and misses per condition, false alarms and hours.
+    // For each method and threshold: lags and misses per condition, false alarms and hours.
     let thresholds: [Vec<f64>; 2] = [
         vec![-1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0],
         vec![2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 7.0, 8.0, 10.0, 15.0],
@@ -341,7 +341,7 @@ fn set(runs: usize) {
     );
     println!("|---|---|---|---|---|---|---|---|");
     for (name, conditions, change) in &groups {
-        let mut found: Vec<Vec<Found>> = Vec::new();
+        let mut found: Vec<Vec<RunResult>> = Vec::new();
         for (c, condition) in conditions.iter().enumerate() {
             let order = match (name.starts_with("sudden"), conditions[0] == conditions[1]) {
                 (true, _) => [1, 4][c],
@@ -363,8 +363,8 @@ fn set(runs: usize) {
             }
         }
         let columns = [0, 1, 2, 3, 4];
-        let means = |i: usize, of: fn(&Found) -> [f64; 5]| {
-            let mean = |cell: &Vec<Found>| 100.0 * cell.iter().map(|f| of(f)[i]).sum::<f64>() / runs as f64;
+        let means = |i: usize, of: fn(&RunResult) -> [f64; 5]| {
+            let mean = |cell: &Vec<RunResult>| 100.0 * cell.iter().map(|f| of(f)[i]).sum::<f64>() / runs as f64;
             found.iter().map(mean).collect::<Vec<f64>>()
         };
         let errors = columns.map(|i| {
@@ -410,8 +410,8 @@ fn recording(path: &str) -> [Vec<f64>; 2] {
     [e, control]
 }
 
-/// What is declared around the joint of two recordings of a person: the first 30 s start it, up to
-/// 40 s nothing changes.
+/// Changes declared around the junction of two recordings of a person: the first 30 s start it, up
+/// to 40 s nothing changes.
 fn joined(files: &[String]) {
     let (start_s, seam_s) = (30.0, 40.0);
     let sample_time = SampleTime::new(1.0 / 60.0).unwrap();
@@ -428,7 +428,7 @@ fn joined(files: &[String]) {
         // The delay of the least innovation variance of the start fit.
         let fits = (8..=26).filter_map(|nk| {
             let m = hoid_survey::multiple_model();
-            let options = TrackOptions::new(m.clone(), m.usual_structure(), m.usual_orders(nk));
+            let options = TrackOptions::new(m.clone(), m.default_structure(), m.default_orders(nk));
             Tracker::new(&options, Some(&span), sample_time).ok()
         });
         let Some(mut tracker) = fits.min_by(|a, b| a.innovation_variance().total_cmp(&b.innovation_variance())) else {
@@ -480,7 +480,7 @@ fn joined(files: &[String]) {
     }
 }
 
-/// Time of a step with its estimate, the least mean of so many runs, ns.
+/// Time of a step with its estimate, the least mean of a given number of runs, ns.
 fn cost(runs: usize) {
     let simulator = simulator(Condition::C4, 2, 0.1);
     let record = run(&simulator, Condition::C4, 2, 1, 0);

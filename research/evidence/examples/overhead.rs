@@ -54,7 +54,7 @@ fn main() {
     }
 }
 
-/// Median time of so many runs, s.
+/// Median time of a given number of runs, s.
 fn median(runs: usize, mut work: impl FnMut()) -> f64 {
     let mut times: Vec<f64> = (0..runs)
         .map(|_| {

@@ -143,7 +143,7 @@ fn run(method: &str, first: &Trial, second: &Trial, truths: [&[[f64; 2]; 7]; 2],
         method.set(key, value).unwrap();
     }
     let ts = SampleTime::new(1.0 / RATE_HZ).unwrap();
-    let mut options = TrackOptions::usual(method, NK);
+    let mut options = TrackOptions::default_for(method, NK);
     options.start = StartAt::Span(Some((5.0, 30.0)));
     let joined = |c: usize| [first.signals[c].clone(), second.signals[c].clone()].concat();
     let record = Record::new(ts, Channel::new("e", "", joined(0)), Channel::new("u", "", joined(1))).unwrap();

@@ -3,12 +3,12 @@
 //!
 //! `HOID_PILOT_DATA=DIR cargo run --release -p hoid-evidence --example pilots_evidence -- [RUNS|all] [METHOD...]`
 //!
-//! The folder has the recordings `A1_C1_pitch_1.parquet` (t, e, u at 100 Hz), and `reference_h.csv`: logarithm
-//! of the gain and phase of each cell at three frequencies before and after 50 s, by Fourier coefficients over
-//! its six runs. Error of H: `sqrt(mean((ln |H|/|H_ref|)^2 + (arg H/H_ref)^2))` over the frequencies. Everything is
-//! told nothing. Conditions C6 to C8 change at 50 s, C3 to C5 change slowly about it; C1 and C2, and the axis that
-//! does not change, are constant. Alarms are counted there from 20 s on, and before the change. Bands: how often
-//! the 95 % interval of gain and of phase holds the reference.
+//! The folder has the recordings `A1_C1_pitch_1.parquet` (t, e, u at 100 Hz), and `reference_h.csv`: logarithm of the
+//! gain and phase of each cell at three frequencies before and after 50 s, by Fourier coefficients over its six runs.
+//! Error of H: `sqrt(mean((ln |H|/|H_ref|)^2 + (arg H/H_ref)^2))` over the frequencies. Everything gets no information.
+//! Conditions C6 to C8 change at 50 s, C3 to C5 change slowly about it; C1 and C2, and the axis that does not change,
+//! are constant. Alarms are counted there from 20 s on, and before the change. Bands: how often the 95 % interval of
+//! gain and of phase holds the reference.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::{collections::BTreeMap, env, f64::consts::PI, fs, path::Path};
@@ -105,7 +105,7 @@ struct Run {
     /// K_e, T_L, K_e_dot and tau_e before and at the end.
     operator: [[f64; 4]; 2],
     restarts: u64,
-    /// What the guard told, by kind.
+    /// Report of the guard, by kind.
     faults: BTreeMap<&'static str, usize>,
 }
 
@@ -128,7 +128,7 @@ fn run(name: &str, folder: &Path, references: &References, method: &str) -> Run 
         method.set(key, value).unwrap();
     }
     let nk = record.sample_time().nk(0.2);
-    let mut options = TrackOptions::usual(method.clone(), nk);
+    let mut options = TrackOptions::default_for(method.clone(), nk);
     let of_the_text = matches!(name, "rls" | "rpem");
     if of_the_text {
         let mut settings = vec![("memory", "256"), ("covariance", "0.1"), ("limit", "inf")];
@@ -225,7 +225,7 @@ fn alarms(run: &Run, from: f64, to: f64) -> usize {
     count
 }
 
-/// What the guard told, by kind, and in how many recordings it told anything.
+/// Report of the guard, by kind, and in how many recordings it reported anything.
 fn told(all: &[Run]) -> String {
     let mut kinds = BTreeMap::<&str, usize>::new();
     for (kind, count) in all.iter().flat_map(|r| &r.faults) {

@@ -1,12 +1,12 @@
-//! What the guard tells of recordings: of those as they are, and of faults that are put into them.
+//! Events of the guard on recordings: on unmodified ones, and on ones with inserted faults.
 //!
 //! `HOID_PILOT_DATA=DIR cargo run --release -p hoid-evidence --example recorded_faults --
 //! [RUNS|all] [METHOD]`
 //!
-//! The folder is that of the example `pilots_evidence`. Of each recording as it is the first line counts what was told,
-//! by kind. Each fault of the study `tracker-faults` that fits into it, and steps and ramps of a target as well, is put
-//! in at two places; *told* is an event between its first sample and 3 s behind its last that the recording without
-//! it does not have there.
+//! The folder is that of the example `pilots_evidence`. For each recording as it is the first line counts what was
+//! reported, by kind. Each fault of the study `tracker-faults` that fits into it, and steps and ramps of a target as
+//! well, is put in at two places; *told* is an event between its first sample and 3 s after its last that the recording
+//! without it does not have there.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../../../crates/hoid/tests/common/tracker_faults/faults.rs"]
@@ -20,10 +20,10 @@ use hoid_evidence::pilots;
 use hoid_track::{GuardEvent, Sample, TrackOptions, Tracker};
 use rayon::prelude::*;
 
-/// Where faults are put in, s after the beginning, and the longest of them.
+/// Where faults are put in, s after the start, and the longest of them.
 const PLACES_S: [f64; 2] = [33.3, 47.77];
 const LONGEST_S: f64 = 20.0;
-/// Time behind a fault in which it may be told, s.
+/// Time after a fault in which it may be reported, s.
 const BEHIND_S: f64 = 3.0;
 
 struct Recording {
@@ -34,7 +34,7 @@ struct Recording {
 
 fn told(recording: &Recording, e: &[f64], u: &[f64], method: &str) -> Vec<(usize, GuardEvent)> {
     let method = hoid_survey::method(method).unwrap();
-    let options = TrackOptions::told_nothing(method, recording.sample_time);
+    let options = TrackOptions::without_prior(method, recording.sample_time);
     let mut tracker = Tracker::new(&options, None, recording.sample_time).unwrap();
     let mut all = Vec::new();
     for (k, (e, u)) in e.iter().zip(u).enumerate() {

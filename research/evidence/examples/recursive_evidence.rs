@@ -58,7 +58,7 @@ fn on_all_cores<T: Send>(runs: usize, one: impl Fn(u64) -> T + Sync) -> Vec<T> {
 }
 
 fn options(method: Method) -> TrackOptions {
-    let structure = method.usual_structure();
+    let structure = method.default_structure();
     TrackOptions {
         start: StartAt::Span(Some((0.0, 30.72))),
         ..TrackOptions::new(method, structure, structure.operator_orders(NK))
@@ -133,7 +133,7 @@ fn table(runs: usize) {
         (4, 0.1),
         (4, 0.2),
     ];
-    // What the order of the filters of the gradient does.
+    // Behaviour of the order of the filters of the gradient.
     let cascade = of_the_text(Method::rpem()).with(&[("regressor", "cascade")]).unwrap();
     let methods: [(&str, TrackOptions); 5] = [
         ("RLS, text", of_the_text(Method::rls())),

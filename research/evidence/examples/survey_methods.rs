@@ -12,9 +12,9 @@ use hoid_thesis::{
 };
 
 fn main() {
-    let text = |place: usize, usual: &str| {
+    let text = |place: usize, default: &str| {
         let path = std::env::args().nth(place);
-        path.map_or_else(|| usual.to_owned(), |path| std::fs::read_to_string(path).unwrap())
+        path.map_or_else(|| default.to_owned(), |path| std::fs::read_to_string(path).unwrap())
     };
     let path = std::env::args().nth(1);
     let (study, comparators) = (text(1, SURVEY.text), text(2, COMPARATORS));

@@ -1,4 +1,4 @@
-//! What the verdict of a trace says of runs that are not what they claim, and of clean ones.
+//! Verdicts of traces on runs with faults and on clean runs.
 //!
 //! `cargo run --release -p hoid-evidence --example verdict_evidence -- [--runs N] [--seed S] [--method M] [--element]
 //! [--kinds]`
@@ -34,7 +34,7 @@ const RATE: usize = 100;
 const INNER: usize = 10;
 const PRIMES: [f64; 11] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0];
 
-/// Who answers, as `K (T_L s + 1)/(T_I s + 1) e^{-tau s}` behind the neuromuscular system; T_I = 0 for none.
+/// The simulated person, as `K (T_L s + 1)/(T_I s + 1) e^{-tau s}` after the neuromuscular system; T_I = 0 for none.
 #[derive(Debug, Clone, Copy)]
 struct Operator {
     k: f64,
@@ -53,7 +53,7 @@ impl Operator {
     }
 }
 
-/// What is controlled, as its denominator; the numerator is one.
+/// The controlled element, as its denominator; the numerator is one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Element {
     Gain,
@@ -137,7 +137,7 @@ impl Forcing {
     }
 }
 
-/// e and u; `None` where the loop does not stay bounded.
+/// e and u; `None` if the loop does not stay bounded.
 fn simulate(
     who: &Somebody,
     forcing: &Forcing,
@@ -237,7 +237,7 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// What is done to a run.
+/// Treatment of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Attack {
     Clean,
@@ -354,8 +354,8 @@ fn run(kind: Kind, attack: Attack, seed: u64, number: u64) -> Option<(Record, El
     None
 }
 
-/// What is said of a run.
-struct Said {
+/// Report about a run.
+struct RunVerdict {
     what: String,
     level: VerdictLevel,
     declared: bool,
@@ -369,10 +369,10 @@ fn said(
     element: Option<ContinuousTransferFunction>,
     method: &Method,
     once: bool,
-) -> Said {
+) -> RunVerdict {
     let options = TrackOptions {
         controlled_element: element,
-        ..TrackOptions::told_nothing(method.clone(), record.sample_time())
+        ..TrackOptions::without_prior(method.clone(), record.sample_time())
     };
     let trace = track(record, &options, 10).unwrap();
     let from = Instant::now();
@@ -380,7 +380,7 @@ fn said(
     let seconds = from.elapsed().as_secs_f64();
     let near = |t: f64| (t - 45.0).abs() < 15.0;
     let findings = verdict.findings().iter();
-    Said {
+    RunVerdict {
         what,
         level: verdict.level,
         declared: once && trace.changes().iter().any(|(t, change)| near(t - change.seconds_ago)),
@@ -428,7 +428,7 @@ fn main() {
         let at = arguments.iter().position(|a| a == name)?;
         arguments.get(at + 1).cloned()
     };
-    let number = |name: &str, usual: u64| text(name).map_or(usual, |text| text.parse().unwrap());
+    let number = |name: &str, default: u64| text(name).map_or(default, |text| text.parse().unwrap());
     let (runs, seed) = (number("--runs", 20), number("--seed", 9000));
     let is = |name: &str| arguments.iter().any(|a| a == name);
     let method = text("--method").map_or(Method::adaptive(), |name| hoid_survey::method(&name).unwrap());
@@ -448,7 +448,7 @@ fn main() {
     if folder.is_some() {
         asked.clear();
     }
-    let mut all: Vec<Said> = asked
+    let mut all: Vec<RunVerdict> = asked
         .into_par_iter()
         .filter_map(|(kind, attack, number)| {
             let (record, element) = run(kind, attack, seed, number)?;
@@ -460,7 +460,7 @@ fn main() {
     if let Some(folder) = &folder {
         let all_of = recordings(folder);
         let of_people = all_of.par_iter().map(|(name, record)| {
-            // Persons apart, and what they control.
+            // Persons apart, and the controlled element.
             let group: Vec<&str> = name
                 .split('_')
                 .skip(1)
@@ -475,7 +475,7 @@ fn main() {
                 false,
             )
         });
-        all.extend(of_people.collect::<Vec<Said>>());
+        all.extend(of_people.collect::<Vec<RunVerdict>>());
     }
     let simulates = |what: &str| folder.is_none() && only.as_deref().is_none_or(|only| only == what);
     if simulates("people") {
@@ -510,7 +510,7 @@ fn main() {
                 false,
             ))
         });
-        all.extend(of_people.collect::<Vec<Said>>());
+        all.extend(of_people.collect::<Vec<RunVerdict>>());
     }
     if simulates("text") {
         let conditions: Vec<(Condition, u64)> = Condition::ALL
@@ -530,19 +530,19 @@ fn main() {
             let what = format!("clean, the text's conditions|{condition}");
             said(what, &record, None, &method, false)
         });
-        all.extend(of_text.collect::<Vec<Said>>());
+        all.extend(of_text.collect::<Vec<RunVerdict>>());
     }
     println!(
         "{:40}{:>16}{:>6}{:>10}{:>10}{:>10}",
         "", "", "runs", "doubted", "declared", "flagged"
     );
-    let mut table: BTreeMap<&str, Vec<&Said>> = BTreeMap::new();
+    let mut table: BTreeMap<&str, Vec<&RunVerdict>> = BTreeMap::new();
     for said in &all {
         table.entry(&said.what).or_default().push(said);
     }
     for (what, said) in table {
-        let share = |is: &dyn Fn(&Said) -> bool| 100 * said.iter().filter(|s| is(s)).count() / said.len();
-        let doubted = |s: &Said| s.level != VerdictLevel::Trustworthy;
+        let share = |is: &dyn Fn(&RunVerdict) -> bool| 100 * said.iter().filter(|s| is(s)).count() / said.len();
+        let doubted = |s: &RunVerdict| s.level != VerdictLevel::Trustworthy;
         let (words, kind) = what.split_once('|').unwrap();
         println!(
             "{words:40}{kind:>16}{:6}{:>8} %{:>8} %{:>8} %",

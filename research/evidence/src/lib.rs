@@ -1,10 +1,10 @@
-//! What the studies of this crate share. A study is a file in `examples/`; its head says what it
-//! counts and what its arguments are.
+//! Common parts of the studies of this crate. A study is a file in `examples/`; its head states
+//! what it counts and what its arguments are.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
-//! | [`task`] | the conditions of the reference text, and runs on all cores |
-//! | [`told`] | methods that are told the delay |
+//! | [`task`] | the conditions of the thesis, and runs on all cores |
+//! | [`told`] | methods that are given the delay |
 //! | [`oracle`] | what is known at most of a change: both persons are known |
 //! | [`pilots`] | the folder of recorded pilots |
 

@@ -1,14 +1,14 @@
-//! What somebody could know at most: the likelihood ratio of the person after a change against the person
+//! Upper bound of the available information: the likelihood ratio of the person after a change against the person
 //! before it, where both are known.
 //!
-//! The gains s of each are those of all trials of that element (but the one that is looked at), in the
-//! basis of the usual person; behind the whitening filter of the first trial's remnant, with its variance,
+//! The gains s of each are those of all trials of that element (but the one that is examined), in the basis of the
+//! default person; after the whitening filter of the first trial's remnant, with its variance,
 //!
 //! `log Lambda = sum (limited (y - x' s_0))^2 - (limited (y - x' s_1))^2) / 2 sigma^2`
 //!
 //! over the first seconds after the change, each without its mean. It needs about 12 where once an hour may
 //! be wrong; without knowing both persons, more.
-use hoid_core::adaptive::{basis::Basis, usual::Usual};
+use hoid_core::adaptive::{basis::Basis, defaults::DefaultOperator};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 const ORDER: usize = 16;
@@ -25,7 +25,7 @@ pub struct Rows {
 impl Rows {
     /// Of error and output with a ramp of `from` rows before.
     pub fn new(e: &[f64], u: &[f64], from: usize, ts: f64) -> Self {
-        let point = Usual::with_delay(DELAY_S + 0.5 * ts).point;
+        let point = DefaultOperator::with_delay(DELAY_S + 0.5 * ts).point;
         let mut basis = Basis::new(point, ts).unwrap();
         let delay = basis.delay();
         let step = |k: usize| {
@@ -40,7 +40,7 @@ impl Rows {
         }
     }
 
-    /// Rows behind the whitening filter `1 + d_1 q^-1 + ..`, without their means.
+    /// Rows after the whitening filter `1 + d_1 q^-1 + ..`, without their means.
     fn whitened(&self, d: &[f64]) -> (Vec<Vector3<f64>>, Vec<f64>) {
         let rows = self.from..self.u.len();
         let x: Vec<Vector3<f64>> = rows
@@ -87,8 +87,8 @@ fn autoregression(v: &[f64]) -> Vec<f64> {
     core::iter::once(1.0).chain(d.iter().map(|d| -d)).collect()
 }
 
-/// `log Lambda` over the first `samples` of the second trial: `before` are the first person's trials, the one
-/// that is joined first at `joined`; `after` those of the second without the one that is looked at.
+/// `log Lambda` over the first `samples` of the second trial: `before` are the first person's trials, the one that is
+/// joined first at `joined`; `after` those of the second without the one that is examined.
 pub fn log_ratio(before: &[&Rows], joined: usize, after: &[&Rows], second: &Rows, samples: usize) -> f64 {
     let first = before[joined];
     let mut d: Vec<f64> = (0..=ORDER).map(|j| f64::from(j == 0)).collect();

@@ -11,7 +11,7 @@ pub const START_S: f64 = 30.72;
 /// The change, s.
 pub const CHANGE_S: f64 = 40.96;
 
-/// A condition with K_c in the output matrix, as in the reference text.
+/// A condition with K_c in the output matrix, as in the thesis.
 pub fn scenario(condition: Condition, remnant_order: usize, level: f64) -> Scenario {
     let mut scenario = Scenario::condition(condition);
     scenario.remnant.order = remnant_order;
@@ -28,7 +28,7 @@ pub fn on_all_cores<T: Send>(runs: usize, one: impl Fn(u64) -> T + Sync) -> Vec<
     (0..runs).into_par_iter().map(|r| one(r as u64)).collect()
 }
 
-/// Median of what is a number.
+/// Median of the finite values.
 pub fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.filter(|v| !v.is_nan()).collect();
     values.sort_by(f64::total_cmp);

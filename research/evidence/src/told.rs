@@ -1,4 +1,4 @@
-//! Methods that are told the delay, for the examples that compare them.
+//! Methods that are given the delay, for the examples that compare them.
 
 use hoid_track::{Method, StartAt, TrackOptions};
 
@@ -7,11 +7,11 @@ use crate::task::START_S;
 /// Delay of the textbook's operator, samples.
 const NK: usize = 29;
 
-/// A method that is told the delay and starts from a fit of the first 30.72 s.
+/// A method that is given the delay and starts from a fit of the first 30.72 s.
 pub fn options(method: Method) -> TrackOptions {
     TrackOptions {
         start: StartAt::Span(Some((0.0, START_S))),
-        ..TrackOptions::new(method.clone(), method.usual_structure(), method.usual_orders(NK))
+        ..TrackOptions::new(method.clone(), method.default_structure(), method.default_orders(NK))
     }
 }
 

@@ -1,6 +1,6 @@
 //! How time and memory grow with samples, parameters, replications and threads.
 //!
-//! Each point is a process of its own. Our example says itself what its peak was; of the command
+//! Each point is a process of its own. Our example reports itself what its peak was; of the command
 //! line the largest resident memory is read from `/proc` while it runs (Linux; elsewhere the column
 //! is empty). The slope is that of `log time` over `log N` by least squares, from the third
 //! smallest N on, where what a run costs without data no longer counts: 1 is a straight line.
@@ -24,7 +24,7 @@ use crate::process::output;
 struct Point {
     n: usize,
     seconds: f64,
-    /// Memory beyond what stood before, bytes; none where the system does not say.
+    /// Additional memory, bytes; none if the system does not report.
     memory: Option<u64>,
 }
 

@@ -1,10 +1,10 @@
 //! A gate on the instructions that a task takes.
 //!
-//! Times of a shared machine say little; the number of instructions of a program is the same to a
-//! few in a thousand whatever else runs. Callgrind (Valgrind) counts those of one run of the
-//! example `tasks` and of three: half of the difference belongs to one run of the task. The numbers
-//! that are kept stand in [`KEPT`] with the compiler that gave them. More than [`ALLOWED`] above
-//! them fails; with another compiler it is only said.
+//! Times of a shared machine carry little information; the number of instructions of a program is
+//! the same to a few in a thousand whatever else runs. Callgrind (Valgrind) counts those of one run
+//! of the example `tasks` and of three: half of the difference belongs to one run of the task. The
+//! numbers that are kept are in [`KEPT`] with the compiler that gave them. More than [`ALLOWED`]
+//! above them fails; with another compiler it is only reported.
 
 use std::{
     collections::BTreeMap,
@@ -55,8 +55,8 @@ pub fn gate(program: &Path, data: &Path, keep: bool) -> Result<(), String> {
     match (over, same_compiler) {
         (false, _) => Ok(()),
         (true, true) => Err(format!(
-            "a task takes more than {:.0} % more instructions than {KEPT} says; mend it, or keep the new numbers with \
-             `cargo xtask bench --instructions --keep` and say why",
+            "a task takes more than {:.0} % more instructions than {KEPT} states; repair it, or keep the new numbers with \
+             `cargo xtask bench --instructions --keep` and give the reason",
             100.0 * ALLOWED
         )),
         (true, false) => {

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-/// What one peer says of one task.
+/// Report of one peer on one task.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
     pub task: String,
@@ -52,7 +52,7 @@ impl Line {
     }
 }
 
-/// The lines among what was printed; libraries print much else.
+/// The lines among the printed data; libraries print much else.
 pub fn of(printed: &str) -> Vec<Line> {
     printed.lines().filter_map(Line::read).collect()
 }
@@ -76,7 +76,7 @@ pub fn best(lines: Vec<Line>) -> Vec<Line> {
     kept
 }
 
-/// Largest relative difference of two answers; none where they cannot be compared.
+/// Largest relative difference of two answers; none if they cannot be compared.
 pub fn difference(a: &[f64], b: &[f64]) -> Option<f64> {
     let comparable = !a.is_empty() && a.len() == b.len();
     let relative = |(x, y): (&f64, &f64)| (x - y).abs() / x.abs().max(y.abs()).max(f64::MIN_POSITIVE);

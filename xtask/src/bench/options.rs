@@ -10,7 +10,7 @@ pub enum Peers {
     Install,
 }
 
-/// What is measured, and how.
+/// The measured quantity, and how.
 #[derive(Debug, PartialEq)]
 pub struct Options {
     pub only: Vec<String>,

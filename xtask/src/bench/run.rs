@@ -27,11 +27,11 @@ const WORK: &str = "target/bench";
 /// Runs it.
 ///
 /// # Errors
-/// What cannot be run or written, in words.
+/// What cannot be run or written, as text.
 pub fn bench(arguments: &[String]) -> Result<(), String> {
     let options = Options::read(arguments)?;
     if options.instructions {
-        // Of the whole workspace, as the tests: with other features the same crates would be built
+        // For the whole workspace, as the tests: with other features the same crates would be built
         // twice.
         let ours = build(&["--workspace", "--example", "tasks"], "examples/tasks", Profile::Tests)?;
         return instructions::gate(&ours, &data(), options.keep);
@@ -73,7 +73,7 @@ enum Profile {
     Tests,
 }
 
-/// Builds a program and says where it is.
+/// Builds a program and reports where it is.
 fn build(arguments: &[&str], program: &str, profile: Profile) -> Result<PathBuf, String> {
     let mut command = cargo_command();
     command.args(["build", "--quiet"]).args(arguments);
@@ -112,7 +112,7 @@ fn run_ours(program: &Path, options: &Options, first: bool) -> Result<Vec<Line>,
     Ok(lines)
 }
 
-/// A peer that does not run is a line that says so.
+/// A peer that does not run is a line that reports it.
 fn run_peer(script: &Path, python: &str, options: &Options) -> Vec<Line> {
     let record = data().join("record.csv");
     let (program, before, behind): (&str, &[&str], &[&str]) = match script.extension().and_then(|e| e.to_str()) {
@@ -145,7 +145,7 @@ fn data() -> PathBuf {
     Path::new(WORK).join("data")
 }
 
-/// Peers: scripts whose names begin with a letter.
+/// Peers: scripts whose names start with a letter.
 fn scripts() -> Result<Vec<PathBuf>, String> {
     let entries = fs::read_dir(PEERS).map_err(|e| format!("{PEERS}: {e}"))?;
     let mut found: Vec<PathBuf> = entries

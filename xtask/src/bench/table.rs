@@ -7,8 +7,8 @@ use super::lines::{Line, Outcome, difference};
 /// Answers closer than this are the same.
 const SAME: f64 = 1e-6;
 
-/// What the project demands of its own speed: the ratio to a peer whose name contains all the
-/// words, at least.
+/// Limits on the speed of the project: the ratio to a peer whose name contains all the words, at
+/// least.
 const LIMITS: [(&str, &str, f64); 16] = [
     ("arx", "normal equations", 10.0),
     ("arx", "numba", 2.0),

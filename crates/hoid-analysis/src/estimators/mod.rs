@@ -1,5 +1,5 @@
-//! What is identified from recordings: an estimator, what is taken out of the data for it, and what its fit
-//! alone says of itself.
+//! Estimators for recordings: the estimator, the trend that is removed from the data for it, and the verdict on its
+//! fit.
 //!
 //! | file | the estimator |
 //! |---|---|
@@ -29,10 +29,10 @@ use crate::{
 pub trait BatchEstimator: Sized + 'static {
     /// Its result.
     type Fit: Answers;
-    /// Whose records it judges: of a person, who answers an error within a second, one without a response is told.
+    /// Whose records it judges: of a person, who answers an error within a second, one without a response is reported.
     const OF: Of = Of::Person;
 
-    /// What the registry knows of it: one entry, or one for each of its methods.
+    /// Entries of the registry: one entry, or one for each of its methods.
     fn specs() -> Vec<MethodSpec>;
 
     /// Its options and those of the analysis around it that it has use for, in the order in which they are set
@@ -47,13 +47,13 @@ pub trait BatchEstimator: Sized + 'static {
     /// Method and limits of its search.
     fn search(&self) -> &SearchOptions;
 
-    /// What it says of initial states.
+    /// The report about initial states.
     fn initial_state(&self) -> &'static str;
 
     /// The same estimator with its defaults.
     fn by_default(&self) -> Self;
 
-    /// What it is called among the printed settings.
+    /// Its name among the printed settings.
     fn structure(&self) -> Setting {
         Setting::new("structure", OPERATOR)
     }
@@ -73,20 +73,20 @@ pub trait BatchEstimator: Sized + 'static {
     fn judged(_fit: &mut Self::Fit, _verdict: &Verdict) {}
 }
 
-/// A fit, and what is known of it before the recordings are asked.
+/// A fit, and the prior knowledge of it before the recordings are asked.
 #[derive(Debug, Clone)]
 pub struct Fitted<F> {
     /// The fit.
     pub fit: F,
-    /// What it says of itself, and what a second opinion says.
+    /// Its self-description, and what a second opinion reports.
     pub verdict: Verdict,
-    /// The describing function that stands beside it.
+    /// The describing function that is next to it.
     pub described: Option<Description>,
-    /// What was taken out of e and u for it.
+    /// Trend removed from e and u for it.
     pub taken_out: Detrend,
     /// The settings of the estimator as it was used.
     pub used: Vec<Setting>,
-    /// What was found of what was left open.
+    /// Findings about what was left open.
     pub found: Vec<Setting>,
 }
 
@@ -94,7 +94,7 @@ impl<E: BatchEstimator> Identification<E> {
     /// Sets an option of the registry by its name; false for one of another estimator.
     ///
     /// # Errors
-    /// [`AnalysisError`] for a text that is no value of it, or out of its bounds.
+    /// [`AnalysisError`] for a text that is not a value of it, or out of its bounds.
     pub fn set(&mut self, name: &str, text: &str) -> Result<bool, AnalysisError> {
         let option = E::options_of_analysis()
             .into_iter()

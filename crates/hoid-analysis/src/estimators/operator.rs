@@ -1,10 +1,10 @@
-//! The operator of a person, its form by evidence: beside the lines of a recorded excitation, with the loop
-//! in its verdict.
+//! The operator of a person, its form by evidence: next to the lines of a recorded excitation, with the loop in its
+//! verdict.
 
 use hoid_ident::{
     SearchOptions,
+    diagnostics::{other_inputs, second_opinion},
     family::{FamilyEstimator, FamilyFit, Intersample},
-    judgement::{other_inputs, second_opinion},
     settings::MethodSpec,
 };
 use hoid_model::{Detrend, FaultHandling, Structure, Verdict};
@@ -28,7 +28,7 @@ impl BatchEstimator for FamilyEstimator {
         vec![MethodSpec {
             name: OPERATOR,
             help: "the operator of a person: form, parameters with prior, errors by runs, a verdict",
-            source: "McRuer and Jex 1967; the reference text, equation 2.2",
+            source: "McRuer and Jex 1967; the thesis, equation 2.2",
             structures: &[Structure::BoxJenkins],
             settings: known(Self::options_of_analysis()),
         }]
@@ -70,14 +70,14 @@ impl BatchEstimator for FamilyEstimator {
             false => Ok(None),
         };
         let channel = match &described {
-            // What was found, or what was named: instruments need no lines.
+            // The findings, or the named channel: instruments need no lines.
             Ok(Some(found)) => found.channel.clone(),
             _ => with.excitation.named().filter(|_| alone).map(str::to_owned),
         };
         let estimator = Self {
             excitation: channel,
             period_s: with.period_s,
-            // What was asked for in reading has been done.
+            // What was requested in reading has been done.
             detrend: if data.were_detrended() {
                 Detrend::None
             } else {
@@ -85,16 +85,16 @@ impl BatchEstimator for FamilyEstimator {
             },
             ..with.estimator.clone()
         };
-        let mut fit = estimator.fit_beside(&data.records, of_lines(&described, &with.excitation))?;
+        let mut fit = estimator.fit_with_response(&data.records, of_lines(&described, &with.excitation))?;
         fit.lead_s = data.input_lead_s();
         let element = with.controlled_element.as_ref();
         let mut verdict = fit.verdict.clone();
         if with.faults != FaultHandling::Keep {
-            verdict = verdict.and(second_opinion::of_family(&estimator, &fit, &data.records, element));
-            verdict = verdict.and(other_inputs::of_family(&estimator, &fit, &data.records));
+            verdict = verdict.append(second_opinion::of_family(&estimator, &fit, &data.records, element));
+            verdict = verdict.append(other_inputs::of_family(&estimator, &fit, &data.records));
         }
         if let Some(element) = element {
-            verdict = verdict.and(fit.loop_finding(0, element));
+            verdict = verdict.append(fit.loop_finding(0, element));
         }
         let described = described.ok().flatten();
         let channel = described.as_ref().and_then(|d| d.channel.clone());

@@ -1,5 +1,5 @@
-//! What may be chosen of a polynomial structure: the fields of [`Polynomials`], and the names under which texts
-//! set them. An option is declared here and nowhere else.
+//! Options of a polynomial structure: the fields of [`Polynomials`], and the names under which texts set them. An
+//! option is declared here and nowhere else.
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
@@ -24,13 +24,13 @@ pub struct Polynomials {
     pub orders: NamedOrders,
     /// Shortest and longest dead time in s, in place of an order nk.
     pub delay_s: Option<(f64, f64)>,
-    /// What chooses between candidates.
+    /// Criterion that chooses between candidates.
     pub criterion: Criterion,
     /// Where the search starts: all coefficients, by name.
     pub start: Option<BTreeMap<String, f64>>,
     /// Instrumental variables in place of the prediction error method, at the orders that this one chose.
     pub method: Option<IvMethod>,
-    /// What the instruments are made of; by default the forcing function where it is recorded.
+    /// Components of the instruments; by default the forcing function where it is recorded.
     pub instruments: Option<Instruments>,
 }
 
@@ -76,12 +76,12 @@ impl BatchOptions for Polynomials {
 
 /// Orders and delay.
 fn searched() -> Vec<BatchOption<Polynomials>> {
-    let usual = "the operator's: bj nb=2,nd=1..4,nf=2; arx na=2,nb=2";
+    let default = "the operator's: bj nb=2,nd=1..4,nf=2; arx na=2,nb=2";
     let nk =
         "Delay of b0 in samples (29), or dead time in s (0.28s); a number or a range (20..40, 0.1s..0.4s) to search";
     let criterion = "What decides between candidates when something is searched";
     vec![
-        BatchOption::new(shared::orders(usual), |how: &mut Polynomials, option, text| {
+        BatchOption::new(shared::orders(default), |how: &mut Polynomials, option, text| {
             for (name, range) in option.read::<NamedOrders>(text)? {
                 how.order(option, name, range)?;
             }
@@ -126,12 +126,12 @@ fn searched() -> Vec<BatchOption<Polynomials>> {
     ]
 }
 
-/// What the prediction error method alone has.
+/// Options of the prediction error method alone.
 fn by_prediction() -> Vec<BatchOption<Polynomials>> {
     let focus = "What the model is to be good at: one-step prediction, or simulation from the input alone";
     let start = "Start of the search, all coefficients as f1=-1.9,f2=.92,b0=.04,...";
     let guess = "Guesses of coefficients with a weight W, as f1=-1.9:0.5: the loss grows by W (f1 + 1.9)^2";
-    let robust = "Loss of Huber instead of squares: residuals beyond so many standard deviations count linearly; of no number 1.345";
+    let robust = "Loss of Huber instead of squares: residuals beyond a given number of standard deviations count linearly; of no number 1.345";
     let stable = "Take only models that are stable from e to u (C and F always are stable)";
     let mut all = vec![
         BatchOption::new(
@@ -171,7 +171,7 @@ fn by_prediction() -> Vec<BatchOption<Polynomials>> {
             (!all.is_empty()).then(|| all.join(", "))
         }),
         BatchOption::new(
-            Setting::new("robust", Kind::NumberOrUsual("1.345"), robust).bounds(Bounds::Positive),
+            Setting::new("robust", Kind::NumberOrDefault("1.345"), robust).bounds(Bounds::Positive),
             |how: &mut Polynomials, option, text| {
                 let threshold = match text {
                     "true" => HUBER,
@@ -208,7 +208,7 @@ fn by_prediction() -> Vec<BatchOption<Polynomials>> {
     all
 }
 
-/// What instrumental variables alone have.
+/// Options of instrumental variables alone.
 fn by_instruments() -> Vec<BatchOption<Polynomials>> {
     let help = "Instruments: a channel that the noise does not reach, or `simulated` from the input, for an open loop";
     let setting =

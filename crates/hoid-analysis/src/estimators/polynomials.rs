@@ -3,7 +3,7 @@
 
 use hoid_ident::{
     Choice, Estimator, Fit, IdentError, InitialState, InstrumentalVariable, Instruments, IvMethod, Loss, SearchOptions,
-    judgement::second_opinion,
+    diagnostics::second_opinion,
     order_selection::{OrderRanges, default_operator_ranges, fit_or_choose},
     progress,
     settings::MethodSpec,
@@ -43,7 +43,7 @@ impl Answers for PolynomialFit {
 }
 
 impl Polynomials {
-    /// What is searched at a sample time.
+    /// Search ranges at a sample time.
     ///
     /// # Errors
     /// [`AnalysisError`] for orders that the structure does not have, or that are too many.
@@ -65,8 +65,8 @@ impl Polynomials {
         let options = |error: hoid_ident::IdentError| AnalysisError::Options {
             reason: error.to_string(),
         };
-        let usual = default_operator_ranges(self.template.structure, sample_time);
-        let ranges = usual.with(&orders).map_err(options)?;
+        let default = default_operator_ranges(self.template.structure, sample_time);
+        let ranges = default.with(&orders).map_err(options)?;
         ranges.candidates().map_err(options)?;
         Ok(ranges)
     }
@@ -108,7 +108,7 @@ impl BatchEstimator for Polynomials {
         let pem = MethodSpec {
             name: PEM,
             help: "polynomials by the prediction error method",
-            source: "Ljung 1999, chapters 7 and 10; the reference text, section III",
+            source: "Ljung 1999, chapters 7 and 10; the thesis, section III",
             structures: &Structure::ALL,
             settings: without(&of_instruments),
         };
@@ -145,7 +145,7 @@ impl BatchEstimator for Polynomials {
     }
 
     fn structure(&self) -> Setting {
-        // The default is no polynomial structure: whoever has one asked for it.
+        // The default is not a polynomial structure: the caller that has one asked for it.
         Setting::new("structure", self.template.structure.name()).given(true)
     }
 
@@ -166,7 +166,8 @@ impl BatchEstimator for Polynomials {
         let told = progress::counter("candidates", combinations.len());
         let search = |estimator: &Estimator| fit_or_choose(estimator, &ranges, how.criterion, records, &told);
         let (mut fit, choice) = match search(&estimator) {
-            // What is not told from a level, as e that stands still, is fitted beside the means.
+            // What is not distinguished from a level, as e that stays constant, is fitted next to
+            // the means.
             Err(IdentError::SingularRegressors { .. }) if estimator.level => {
                 estimator.level = false;
                 search(&estimator)?
@@ -174,7 +175,10 @@ impl BatchEstimator for Polynomials {
             other => other?,
         };
         if let Some(method) = how.method {
-            let instruments = how.instruments.clone().unwrap_or_else(|| Instruments::usual(records));
+            let instruments = how
+                .instruments
+                .clone()
+                .unwrap_or_else(|| Instruments::default_for(records));
             found.push(Setting::new("method", format!("{method}, {instruments}")).given(true));
             if choice.is_some() {
                 found.push(Setting::new("orders chosen by", "the prediction error method"));
@@ -193,7 +197,7 @@ impl BatchEstimator for Polynomials {
         let mut verdict = fit.verdict(records, choice.as_ref())?;
         let steps = records.iter().all(steps_from_level_to_level);
         if steps {
-            // What happens behind the steps is all that such data tell.
+            // What happens after the steps is all that such data determine.
             let others = verdict.findings().iter().filter(|finding| finding.kind != "stretch");
             verdict = Verdict::of(others.cloned().collect());
         }
@@ -202,10 +206,10 @@ impl BatchEstimator for Polynomials {
             how.method.is_none() && estimator.loss == Loss::Quadratic && !steps && fit.rounding().is_none();
         if with.faults != FaultHandling::Keep && is_asked_again {
             let element = with.controlled_element.as_ref();
-            verdict = verdict.and(second_opinion::of_polynomials(&estimator, &fit, records, element));
+            verdict = verdict.append(second_opinion::of_polynomials(&estimator, &fit, records, element));
             // Where the level is not estimated it may matter.
             if level.is_kept() && !data.were_detrended() {
-                verdict = verdict.and(second_opinion::of_level(&estimator, &fit, records));
+                verdict = verdict.append(second_opinion::of_level(&estimator, &fit, records));
             }
         }
         found.extend(level.told(data, |_, record| fit.level(record)));

@@ -1,6 +1,6 @@
 //! An operator with a gain and a lead, and its remnant of order m, in physical parameters.
 
-use hoid_ident::{GreyBox, GreyBoxFit, SearchOptions, judgement::second_opinion, settings::MethodSpec};
+use hoid_ident::{GreyBox, GreyBoxFit, SearchOptions, diagnostics::second_opinion, settings::MethodSpec};
 use hoid_model::{FaultHandling, Structure};
 
 use super::{BatchEstimator, Fitted, known};
@@ -20,7 +20,7 @@ impl BatchEstimator for GreyBox {
         vec![MethodSpec {
             name: REMNANT,
             help: "operator and remnant in physical parameters, with a real delay",
-            source: "Ljung 1999, section 4.3; the reference text, equation 4",
+            source: "Ljung 1999, section 4.3; the thesis, equation 4",
             structures: &[Structure::BoxJenkins],
             settings: known(Self::options_of_analysis()),
         }]
@@ -51,7 +51,7 @@ impl BatchEstimator for GreyBox {
         let mut verdict = fit.verdict(&data.records)?;
         if with.faults != FaultHandling::Keep {
             let element = with.controlled_element.as_ref();
-            verdict = verdict.and(second_opinion::of_grey_box(estimator, &fit, &data.records, element));
+            verdict = verdict.append(second_opinion::of_grey_box(estimator, &fit, &data.records, element));
         }
         let found = level.told(data, |k, record| fit.polynomial_fit(k).level(record));
         Ok(Fitted {

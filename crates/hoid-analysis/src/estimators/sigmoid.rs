@@ -2,7 +2,7 @@
 //! of two persons.
 
 use hoid_ident::{
-    InitialState, SearchOptions, SigmoidChange, SigmoidFit, judgement::second_opinion, settings::MethodSpec,
+    InitialState, SearchOptions, SigmoidChange, SigmoidFit, diagnostics::second_opinion, settings::MethodSpec,
 };
 use hoid_model::{Detrend, FaultHandling, Structure};
 
@@ -24,7 +24,7 @@ impl BatchEstimator for SigmoidChange {
         vec![MethodSpec {
             name: CHANGE,
             help: "the operator's gains change once, by a sigmoid; any form",
-            source: "Zaal 2016; the reference text, section II",
+            source: "Zaal 2016; the thesis, section II",
             structures: &[Structure::BoxJenkins],
             settings: known(Self::options_of_analysis()),
         }]
@@ -56,7 +56,7 @@ impl BatchEstimator for SigmoidChange {
         let fit = estimator.fit(&data.records)?;
         let mut verdict = fit.verdict(&data.records)?;
         if with.faults != FaultHandling::Keep {
-            verdict = verdict.and(second_opinion::of_sigmoid(&estimator, &fit, &data.records));
+            verdict = verdict.append(second_opinion::of_sigmoid(&estimator, &fit, &data.records));
         }
         if estimator.level {
             levels_into(&mut data.accounts, &data.records, |_, record| fit.level(record));

@@ -1,9 +1,9 @@
 //! Results as JSON objects, the contract with other programs, and back.
 //!
-//! Every result has the same envelope: `hoid` (the version), `kind`, `records`, `data` (what was done to the
-//! records), `settings` (each with its value, given or not) and `verdict`; the rest is of its kind. What a batch
-//! fit is, so that it can predict again without its recordings, is in `state` ([`state`]). Values are those of
-//! `serde_json`, which keeps the order of keys.
+//! Every result has the same envelope: `hoid` (the version), `kind`, `records`, `data` (the processing of the records),
+//! `settings` (each with its value, given or not) and `verdict`; the rest is of its kind. Definition of a batch fit, so
+//! that it can predict again without its recordings, is in `state` ([`state`]). Values are those of `serde_json`, which
+//! keeps the order of keys.
 //!
 //! | file | kind |
 //! |---|---|
@@ -36,12 +36,12 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 pub use polynomials::{PolynomialAnswer, of_family};
-pub use result::{Answer, BatchAnswer};
+pub use result::{BatchAnswer, BatchResult};
 pub use trace::{change, open_loop, responses, track_fault, tracked_operator};
 
 use crate::{found::FoundFault, recordings::Account, settings::Setting};
 
-/// The envelope of a result: version, kind, records, what was done to them, settings, verdict.
+/// The envelope of a result: version, kind, records, the processing of them, settings, verdict.
 pub fn envelope(
     kind: &str,
     files: &[String],
@@ -60,7 +60,7 @@ pub fn envelope(
         "data",
         json!({"faults": faults(files, accounts), "warnings": warnings(files, accounts)}),
     );
-    // Names of before, for one release.
+    // Earlier names, for one release.
     set("warnings", warnings(files, accounts));
     set("faults", faults(files, accounts));
     set("settings", settings(settings_of));
@@ -74,7 +74,7 @@ pub fn settings(all: &[Setting]) -> Value {
         .collect()
 }
 
-/// A number, or null where there is none: JSON has no NaN.
+/// A number, or null if there is none: JSON has no NaN.
 pub fn number(value: f64) -> Value {
     serde_json::Number::from_f64(value).map_or(Value::Null, Value::Number)
 }
@@ -89,7 +89,7 @@ pub fn estimate(e: &Estimate) -> Value {
     json!({"value": number(e.value), "standard_error": optional(e.standard_error)})
 }
 
-/// The same with its interval of 95 %, null where there is none.
+/// The same with its interval of 95 %, null if there is none.
 pub fn estimate_within(e: &Estimate, interval: Option<(f64, f64)>) -> Value {
     json!({
         "value": number(e.value),
@@ -98,8 +98,8 @@ pub fn estimate_within(e: &Estimate, interval: Option<(f64, f64)>) -> Value {
     })
 }
 
-/// What a result is worth: the level, what speaks against it, what is worth knowing besides, and
-/// all of it with its names for programs.
+/// Reliability of a result: the level, the findings against it, additional notes, and all of it
+/// with its names for programs.
 pub fn verdict(v: &Verdict) -> Value {
     json!({
         "level": v.level.name(),
@@ -109,7 +109,7 @@ pub fn verdict(v: &Verdict) -> Value {
     })
 }
 
-/// What each answer is worth, by its name.
+/// Reliability of each answer, by its name.
 pub fn answers(all: &[(String, Verdict)]) -> Map<String, Value> {
     let one = |v: &Verdict| {
         let reasons = v.findings().iter().filter(|finding| finding.severity > Severity::Note);
@@ -118,9 +118,9 @@ pub fn answers(all: &[(String, Verdict)]) -> Map<String, Value> {
     all.iter().map(|(name, verdict)| (name.clone(), one(verdict))).collect()
 }
 
-/// What makes a result doubtful, or is worth knowing.
+/// Findings that make a result doubtful, or is worth knowing.
 pub fn finding(f: &Finding) -> Value {
-    json!({"kind": f.kind, "severity": f.severity.name(), "message": f.words, "words": f.words})
+    json!({"kind": f.kind, "severity": f.severity.name(), "message": f.message, "words": f.message})
 }
 
 /// Orders by name.
@@ -204,7 +204,7 @@ pub fn ljung_box(test: Option<&LjungBox>) -> Value {
     })
 }
 
-/// How well a model tells the records that it was fitted to, or others.
+/// How well a model predicts the records that it was fitted to, or others.
 pub fn goodness(q: &GoodnessOfFit) -> Map<String, Value> {
     let rows = [
         ("vaf_simulation", q.vaf_simulation),
@@ -237,7 +237,7 @@ pub fn named(name: &str, e: &Estimate) -> Value {
     json!({"name": name, "value": number(e.value), "standard_error": optional(e.standard_error)})
 }
 
-/// Files and sampling of the records, and what was done to them.
+/// Files and sampling of the records, and the processing of them.
 pub fn records(files: &[String], records: &[Record], accounts: &[Account]) -> Value {
     let record = |((file, r), account): ((&String, &Record), &Account)| {
         let mut one = json!({
@@ -259,7 +259,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account]) -> Va
     files.iter().zip(records).zip(accounts).map(record).collect()
 }
 
-/// What is wrong with the sampling, in words.
+/// Problems with the sampling, as text.
 pub fn warnings(files: &[String], accounts: &[Account]) -> Value {
     let all = files.iter().zip(accounts);
     all.flat_map(|(file, account)| {
@@ -271,7 +271,7 @@ pub fn warnings(files: &[String], accounts: &[Account]) -> Value {
     .collect()
 }
 
-/// All faults of the records, and what is wrong with their files, one object each.
+/// All faults of the records, and the problems of their files, one object each.
 pub fn faults(files: &[String], accounts: &[Account]) -> Value {
     let all = files.iter().zip(accounts);
     all.flat_map(|(file, account)| account.found().into_iter().map(move |found| fault(file, &found)))
@@ -285,7 +285,7 @@ pub fn fault(record: &str, found: &FoundFault) -> Value {
     object
 }
 
-/// What the library writes about itself, one object each.
+/// List of serialised items, one object each.
 pub fn list<T: Serialize>(items: &[T]) -> Value {
     // Numbers that JSON does not have become null; nothing else can fail.
     serde_json::to_value(items).unwrap_or(Value::Null)

@@ -226,7 +226,7 @@ fn agreement(found: &Identified) -> Value {
     })
 }
 
-/// Of a method that gave nothing: the reason, where there is one.
+/// For a method that gave nothing: the reason, where there is one.
 fn why_not(reason: Option<&String>) -> Value {
     reason.map_or(Value::Null, |why| json!({"reason": why}))
 }

@@ -63,13 +63,13 @@ fn quality(q: &GoodnessOfFit, fit: &Fit) -> Value {
 
 /// A fit of polynomials, and what follows from it and its records.
 pub struct PolynomialAnswer<'a> {
-    /// What it is worth.
+    /// The verdict on it.
     pub verdict: &'a Verdict,
     /// Names of the records.
     pub files: &'a [String],
     /// The records as they were fitted.
     pub records: &'a [Record],
-    /// What was done to them.
+    /// Processing applied to them.
     pub accounts: &'a [Account],
     /// The settings that were used.
     pub settings: &'a [Setting],
@@ -83,7 +83,7 @@ pub struct PolynomialAnswer<'a> {
     pub quality: GoodnessOfFit,
     /// Its parameters as an operator with a gain and a lead.
     pub operator: Result<OperatorEstimate, NotConvertible>,
-    /// Of polynomials of other orders: the operator of the family that they stand for.
+    /// For polynomials of other orders: the operator of the family that they represent.
     pub family: Option<Result<FamilyConversion, NotConvertible>>,
     /// Its noise model as a remnant filter.
     pub remnant: Option<Result<RemnantEstimate, NotConvertible>>,
@@ -93,7 +93,7 @@ pub struct PolynomialAnswer<'a> {
     pub validations: Vec<Validation>,
     /// Horizon, VAF and NRMSE of the prediction that far ahead.
     pub ahead: Option<(usize, f64, f64)>,
-    /// How well it tells another file.
+    /// How well it predicts another file.
     pub validation: Option<(&'a str, GoodnessOfFit)>,
 }
 
@@ -101,13 +101,13 @@ impl<'a> PolynomialAnswer<'a> {
     /// A model that was identified, with what follows from it.
     ///
     /// # Errors
-    /// Those of a prediction of the records.
+    /// The errors of a prediction of the records.
     pub fn of<F>(found: &'a Identified<F>, fit: &'a Fit) -> Result<Self, AnalysisError> {
         let (data, with_input) = (&found.data, fit.model().structure().has_input());
         let validations = data.records.iter().map(|record| fit.validate(record));
         let validations = validations.collect::<Result<Vec<_>, _>>()?;
         let operator = fit.operator();
-        // Three poles or one are no gain with a lead, but may be another form.
+        // Three poles or one are not a gain with a lead, but may be another form.
         let family = match &operator {
             Err(NotConvertible::OtherOrders { poles: 1..=3, .. }) if with_input => Some(fit.family_operator(None)),
             _ => None,
@@ -178,7 +178,7 @@ impl<'a> PolynomialAnswer<'a> {
         }
         let ts = fit.model().sample_time().s();
         set("roots", fit.roots().iter().map(|r| root(r, ts)).collect());
-        // Residuals that are rounding say nothing.
+        // Residuals that are rounding carry no information.
         let tested = if fit.covariance().is_some() {
             self.validations.as_slice()
         } else {
@@ -235,8 +235,8 @@ impl BatchAnswer for GreyBoxFit {
     }
 }
 
-/// Crossover and margins in the range of manual control, below half the sampling frequency: the sampled model
-/// says nothing above it.
+/// Crossover and margins in the range of manual control, below half the sampling frequency: the sampled model carries
+/// no information above it.
 fn loop_margins(fit: &Fit, element: &ContinuousTransferFunction) -> MarginEstimates {
     let (low, high) = MANUAL_CONTROL_RANGE_RAD_S;
     let high = high.min(fit.model().sample_time().nyquist_rad_s());
@@ -289,8 +289,8 @@ fn remnant(found: &Result<RemnantEstimate, NotConvertible>) -> Value {
     }
 }
 
-/// The operator of the family that polynomials stand for: form, parameters by name, what the real poles are,
-/// how well it is met.
+/// The operator of the family that polynomials represent: form, parameters by name, what the real poles are, how well
+/// it is met.
 pub fn of_family(found: &Result<FamilyConversion, NotConvertible>) -> Value {
     let found = match found {
         Ok(found) => found,

@@ -1,7 +1,7 @@
 //! A result to its JSON and back.
 
 use hoid_ident::{GreyBoxFit, SigmoidFit};
-use hoid_io::{Place, QualityIssue, QualityIssueKind};
+use hoid_io::{QualityIssue, QualityIssueKind, RowSpan};
 use hoid_model::{ContinuousTransferFunction, Decimation, Detrend, Fault, Verdict, uncertainty::Estimate};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value, json};
@@ -17,9 +17,9 @@ use crate::{
     settings::Setting,
 };
 
-/// Kind of what is an operator.
+/// Kind of an operator.
 pub(super) const OPERATOR: &str = "operator";
-/// Kind of what is a polynomial model.
+/// Kind of a polynomial model.
 pub(super) const POLYNOMIAL: &str = "polynomial";
 
 /// A fit that writes itself.
@@ -30,13 +30,13 @@ pub trait BatchAnswer: Answers + Serialize + DeserializeOwned {
     /// The object of the contract, without the state.
     ///
     /// # Errors
-    /// Those of a prediction of its records.
+    /// The errors of a prediction of its records.
     fn object(found: &Identified<Self>) -> Result<Map<String, Value>, AnalysisError>;
 }
 
 /// Any result of a batch fit.
 #[derive(Debug, Clone)]
-pub enum Answer {
+pub enum BatchResult {
     /// The operator of a person, its form by evidence.
     Operator(Identified),
     /// A gain with a lead, and its remnant of order m.
@@ -47,11 +47,12 @@ pub enum Answer {
     Polynomials(Identified<PolynomialFit>),
 }
 
-impl Answer {
+impl BatchResult {
     /// Reads a result that [`Identified::to_json`] wrote.
     ///
     /// # Errors
-    /// [`AnalysisError::NotAResult`] for a text that is none, is damaged, or is of another version.
+    /// [`AnalysisError::NotAResult`] for a text that is invalid, is damaged, or is of another
+    /// version.
     pub fn from_json(text: &str) -> Result<Self, AnalysisError> {
         let object = parsed(text)?;
         let estimator = object.get("estimator").and_then(Value::as_str).unwrap_or_default();
@@ -65,7 +66,7 @@ impl Answer {
     }
 }
 
-/// What is kept of the account of a record.
+/// Stored data of the account of a record.
 #[derive(Serialize, Deserialize)]
 struct FoundIn {
     faults: Vec<Fault>,
@@ -87,11 +88,11 @@ struct IssueFields {
     share: f64,
     size: f64,
     unit: String,
-    places: Vec<Place>,
+    places: Vec<RowSpan>,
     text: String,
 }
 
-/// What is written of a result, and read.
+/// Serialised form of a result.
 #[derive(Serialize)]
 struct Written<'a, F> {
     fit: &'a F,
@@ -108,7 +109,7 @@ struct Written<'a, F> {
 }
 
 #[derive(Deserialize)]
-struct Read<F> {
+struct SavedResult<F> {
     fit: F,
     verdict: Verdict,
     names: Vec<String>,
@@ -145,7 +146,7 @@ impl<F: BatchAnswer> Identified<F> {
     /// The result as an object: the contract with other programs, and its state.
     ///
     /// # Errors
-    /// Those of a prediction of its records.
+    /// The errors of a prediction of its records.
     pub fn json(&self) -> Result<Map<String, Value>, AnalysisError> {
         if let Some(written) = &self.written {
             return Ok(written.clone());
@@ -186,11 +187,11 @@ impl<F: BatchAnswer> Identified<F> {
         Ok(format!("{:#}", Value::Object(self.json()?)))
     }
 
-    /// Reads what [`Self::to_json`] wrote: everything but the samples of its recordings. The model predicts,
+    /// Reads the output of [`Self::to_json`]: everything but the samples of its recordings. The model predicts,
     /// simulates and validates as before, on records that are given to it.
     ///
     /// # Errors
-    /// [`AnalysisError::NotAResult`] for a text that is none, is damaged, is of another version or estimator.
+    /// [`AnalysisError::NotAResult`] for a text that is invalid, is damaged, is of another version or estimator.
     pub fn from_json(text: &str) -> Result<Self, AnalysisError> {
         restored(parsed(text)?)
     }
@@ -210,8 +211,8 @@ fn not_a_result(found: String) -> AnalysisError {
 fn parsed(text: &str) -> Result<Map<String, Value>, AnalysisError> {
     match serde_json::from_str(text) {
         Ok(Value::Object(object)) => Ok(object),
-        Ok(_) => Err(not_a_result("it is no object".to_owned())),
-        Err(error) => Err(not_a_result(format!("it is no JSON: {error}"))),
+        Ok(_) => Err(not_a_result("it is not an object".to_owned())),
+        Err(error) => Err(not_a_result(format!("it is not JSON: {error}"))),
     }
 }
 
@@ -225,7 +226,7 @@ fn restored<F: BatchAnswer>(object: Map<String, Value>) -> Result<Identified<F>,
     }
     let text = object.get("state").and_then(Value::as_str);
     let text = text.ok_or_else(|| not_a_result("it has no state".to_owned()))?;
-    let read: Read<F> = state::read(text).map_err(not_a_result)?;
+    let read: SavedResult<F> = state::read(text).map_err(not_a_result)?;
     Ok(Identified {
         fit: read.fit,
         verdict: read.verdict,

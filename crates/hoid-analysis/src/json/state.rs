@@ -1,10 +1,10 @@
-//! What a result is, as text: so that it comes back as it was and predicts again.
+//! Definition of a result, as text: so that it comes back as it was and predicts again.
 //!
-//! The numbers of the contract are for people and other programs; a model has more (covariances of what is not
-//! printed, states, what was held). All of it is written as TOML, which has what JSON lacks, infinite numbers and
-//! NaN, and stands in JSON as one text; floats are written with as many digits as give back every bit. The first
-//! eight bytes of its SHA-256 stand before it: a file that was cut or changed by hand is refused. They guard
-//! against damage, not against somebody who means to deceive.
+//! The numbers of the contract are for people and other programs; a model has more (covariances of what is not printed,
+//! states, fixed parameters). All of it is written as TOML, which has what JSON lacks, infinite numbers and NaN, and is
+//! in JSON as one text; floats are written with as many digits as give back every bit. The first eight bytes of its
+//! SHA-256 are before it: a file that was cut or changed by hand is refused. They guard against damage, not against a
+//! person who means to deceive.
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use sha2::{Digest, Sha256};
@@ -18,7 +18,7 @@ struct Table<T> {
     value: T,
 }
 
-/// A value as text; none where it cannot be written.
+/// A value as text; none if it cannot be written.
 pub fn written<T: Serialize>(value: &T) -> Option<String> {
     let text = toml::to_string(&Table { value }).ok()?;
     Some(format!("{}{text}", sum(&text)))

@@ -1,4 +1,4 @@
-//! A trace as JSON, and what a tracker says at a moment.
+//! A trace as JSON, and what a tracker reports at a moment.
 
 use hoid_ident::Fit;
 use hoid_model::{
@@ -24,7 +24,7 @@ impl Tracked {
     /// The object of the contract.
     ///
     /// # Errors
-    /// Those of the quality of the start fit.
+    /// The errors of the quality of the start fit.
     pub fn json(&self) -> Result<Map<String, Value>, AnalysisError> {
         let trace = &self.trace;
         let counts = trace.counts();
@@ -173,7 +173,7 @@ pub fn open_loop(found: &Result<OpenLoop, NoCrossover>) -> Value {
     }
 }
 
-/// The operator of a recursion, which says of each parameter whether the data determine it.
+/// The operator of a recursion, which reports about each parameter whether the data determine it.
 pub fn tracked_operator(
     found: &Result<OperatorEstimate, NotConvertible>,
     determined: impl Fn(&OperatorEstimate) -> Vec<Determined>,

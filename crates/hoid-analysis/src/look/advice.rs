@@ -1,6 +1,6 @@
-//! How a file is to be read, and the command to type: in words, since nothing is chosen silently.
+//! How a file is to be read, and the command to type: as text, since nothing is chosen silently.
 
-use hoid_ident::frequency::USUAL_EXCITATIONS;
+use hoid_ident::frequency::COMMON_EXCITATIONS;
 use hoid_io::{TimeChoice, TrialChoice};
 
 use super::{columns::Role, file::Look};
@@ -18,7 +18,7 @@ pub struct Advice {
     pub trial: Option<TrialChoice>,
     /// Sampling frequency, Hz.
     pub sampling_hz: Option<f64>,
-    /// Begin of the span of whole periods, s.
+    /// Start of the span of whole periods, s.
     pub from_s: Option<f64>,
     /// Its end, s.
     pub to_s: Option<f64>,
@@ -31,16 +31,16 @@ pub struct Advice {
 }
 
 impl Look {
-    /// How the file is to be read; `None` where it is not certain which columns are error and control. Of
-    /// one that makes no record yet the columns are known alone.
+    /// How the file is to be read; `None` if it is not certain which columns are error and control. For one that makes
+    /// no record yet the columns are known alone.
     pub fn advice(&self) -> Option<Advice> {
         if !self.roles.are_certain() {
             return None;
         }
-        // Both where one is not the usual: a command is easier to read with both.
+        // Both where one is not the default: a command is easier to read with both.
         let (input, output) = (&self.roles.input, &self.roles.output);
-        let usual = input.column == "e" && output.column == "u";
-        let named = |role: &Role| (!usual).then(|| role.column.clone());
+        let default = input.column == "e" && output.column == "u";
+        let named = |role: &Role| (!default).then(|| role.column.clone());
         let seen = self.seen.as_ref().ok();
         let ends = seen.map(|seen| (seen.record.time_s(0), seen.record.time_s(seen.record.len())));
         let periods = seen.and_then(|seen| seen.periods.as_ref().ok());
@@ -66,7 +66,7 @@ impl Look {
             late_samples: late.filter(|samples| *samples != 0.0),
             excitation: periods
                 .map(|found| found.channel.clone())
-                .filter(|channel| !USUAL_EXCITATIONS.contains(&channel.as_str())),
+                .filter(|channel| !COMMON_EXCITATIONS.contains(&channel.as_str())),
             controlled_element: self.known.controlled_element.as_ref().map(|(text, _)| text.clone()),
         })
     }

@@ -2,9 +2,9 @@
 
 use hoid_io::{control_among, error_among};
 
-/// Names of what is followed.
+/// Names of the tracked signals.
 const TARGETS: [&str; 7] = ["r", "ref", "reference", "target", "track", "setpoint", "f_t"];
-/// Names of what is steered.
+/// Names of the steered quantities.
 const OUTPUTS: [&str; 7] = ["y", "output", "position", "state", "cursor", "response", "x"];
 
 /// A column in its role, and why.
@@ -38,8 +38,8 @@ impl Role {
 }
 
 impl Roles {
-    /// Input and output among columns; what was asked for is taken as it is. Where nothing is known the
-    /// usual names are kept, to be replaced by hand.
+    /// Input and output among columns; the request is taken as it is. Where nothing is known the common names are kept,
+    /// to be replaced by hand.
     pub fn of(columns: &[&str], input: Option<&str>, output: Option<&str>) -> Self {
         let known = |names: &[&str]| -> Vec<&str> {
             let all = names.iter();
@@ -52,7 +52,7 @@ impl Roles {
             .collect()
         };
         let (targets, outputs) = (known(&TARGETS), known(&OUTPUTS));
-        let asked = |name: &str| Role::new(name, "as asked for", true);
+        let asked = |name: &str| Role::new(name, "as requested", true);
         let input = match (input, error_among(columns), targets.first().zip(outputs.first())) {
             (Some(name), ..) => asked(name),
             (_, Some(name), _) => Role::new(name, "the tracking error, by its name", true),

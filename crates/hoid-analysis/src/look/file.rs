@@ -1,4 +1,4 @@
-//! What a file holds, and what it looks like.
+//! Contents of a file, and what it looks like.
 
 use std::path::Path;
 
@@ -7,32 +7,32 @@ use hoid_model::Record;
 
 use super::{
     columns::Roles,
-    known::Known,
     lag::{self, Lag},
+    options::LookOptions,
     periods::{self, Periods},
 };
 
-/// What a look at a file has found.
+/// Result of a look at a file.
 #[derive(Debug)]
 pub struct Look {
     /// Its columns, sampling and trouble.
     pub survey: FileSurvey,
     /// Error and control.
     pub roles: Roles,
-    /// What these columns hold; why they make no record where they make none.
-    pub seen: Result<Seen, IoError>,
-    pub(super) known: Known,
+    /// Contents of these columns; why they make no record where they make none.
+    pub seen: Result<RecordSummary, IoError>,
+    pub(super) known: LookOptions,
 }
 
-/// What is found in the record of a file.
+/// Summary of the record of a file.
 #[derive(Debug)]
-pub struct Seen {
+pub struct RecordSummary {
     /// The record, as it was recorded.
     pub record: Record,
     /// The excitation and its span of whole periods, or why there is none.
     pub periods: Result<Periods, String>,
-    /// By how much the control was recorded late, or why that is not known; `None` where no controlled
-    /// element is known, or the lag is.
+    /// Amount by which the control was recorded late, or why that is not known; `None` if no controlled element is
+    /// known, or the lag is.
     pub lag: Option<Result<Lag, String>>,
 }
 
@@ -40,8 +40,8 @@ impl Look {
     /// Looks at a file.
     ///
     /// # Errors
-    /// Those of [`survey`], where the file cannot be read at all.
-    pub fn at(path: &Path, known: &Known) -> Result<Self, IoError> {
+    /// The errors of [`survey`], where the file cannot be read at all.
+    pub fn at(path: &Path, known: &LookOptions) -> Result<Self, IoError> {
         let found = survey(path)?;
         let roles = Roles::of(&names(&found), known.input.as_deref(), known.output.as_deref());
         Ok(Self {
@@ -52,7 +52,7 @@ impl Look {
         })
     }
 
-    /// The columns that say their unit, and it: beside the name, or in it as in `Stick [V]`.
+    /// The columns that report their unit, and it: next to the name, or in it as in `Stick [V]`.
     pub fn units(&self) -> Vec<(&str, &str)> {
         let all = self.survey.columns.iter();
         all.filter_map(|column| Some((column.path.as_str(), unit_of(column)?)))
@@ -65,7 +65,7 @@ pub(super) fn names(found: &FileSurvey) -> Vec<&str> {
     found.columns.iter().map(|column| column.path.as_str()).collect()
 }
 
-/// The unit of a column, beside its name or at its end in brackets.
+/// The unit of a column, next to its name or at its end in brackets.
 fn unit_of(column: &ColumnSurvey) -> Option<&str> {
     let beside = Some(column.unit.as_str()).filter(|unit| !unit.is_empty());
     beside.or_else(|| {
@@ -77,7 +77,7 @@ fn unit_of(column: &ColumnSurvey) -> Option<&str> {
     })
 }
 
-fn seen(path: &Path, roles: &Roles, known: &Known) -> Result<Seen, IoError> {
+fn seen(path: &Path, roles: &Roles, known: &LookOptions) -> Result<RecordSummary, IoError> {
     let options = ReadOptions {
         input: Some(roles.input.column.parse()?),
         output: roles.output.column.parse()?,
@@ -86,7 +86,7 @@ fn seen(path: &Path, roles: &Roles, known: &Known) -> Result<Seen, IoError> {
         sampling_hz: known.sampling_hz,
         ..ReadOptions::default()
     };
-    // Of several trials the first is looked at.
+    // For several trials the first is examined.
     let record = match read_record(path, &options) {
         Err(IoError::SeveralTrials { by, trials, .. }) => {
             let first = trials.first().map_or("", String::as_str);
@@ -101,5 +101,5 @@ fn seen(path: &Path, roles: &Roles, known: &Known) -> Result<Seen, IoError> {
         (None, Err(_), Some(_)) => Some(Err("no excitation was found by whose lines it could be seen".to_owned())),
         _ => None,
     };
-    Ok(Seen { record, periods, lag })
+    Ok(RecordSummary { record, periods, lag })
 }

@@ -1,15 +1,15 @@
-//! By how many samples the control was recorded later than the output of the controlled element.
+//! Number of samples by which the control was recorded later than the output of the controlled element.
 //!
-//! At the lines of the excitation the output is `Y = H (U + D)` where the disturbance enters with the
-//! control, or `Y = H U + D` where it is added to the output. A staircase control reaches the output
-//! half a sample late, and one that was recorded N samples late is moved back by them:
+//! At the lines of the excitation the output is `Y = H (U + D)` if the disturbance enters with the control, or
+//! `Y = H U + D` if it is added to the output. A staircase control reaches the output half a sample late, and one that
+//! was recorded N samples late is moved back by them:
 //!
 //! ```text
 //! Y - b D = g H exp(-j omega Ts/2) (U exp(j omega N Ts) + a D)
 //! ```
 //!
-//! The whole N and the case (a, b) that leave the smallest part of the power of the output
-//! unexplained by a real gain g decide; nothing is said where none explains it.
+//! The whole N and the case (a, b) that leave the smallest part of the power of the output unexplained by a real gain g
+//! decide; nothing is reported where none explains it.
 
 use std::f64::consts::TAU;
 
@@ -24,7 +24,7 @@ const UNEXPLAINED: f64 = 0.02;
 /// Samples that a recorder may be late: a person takes longer.
 const SAMPLES: [i32; 8] = [-2, -1, 0, 1, 2, 3, 4, 5];
 
-/// By how much the control was recorded late.
+/// Amount by which the control was recorded late.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lag {
     /// In samples.

@@ -1,32 +1,31 @@
 //! One look at a file: what its columns are, what excites the loop and in which span of whole periods, and
 //! by how much the control was recorded late.
 //!
-//! Command line, groups and Python look at a file by this alone, and nothing is chosen silently: what is
-//! found is shown, with the evidence, as [`Advice`] on how to read the file. What was asked for is not looked
-//! for.
+//! Command line, groups and Python look at a file by this alone, and nothing is chosen silently: what is found is
+//! shown, with the evidence, as [`Advice`] on how to read the file. What was requested is not searched for.
 //!
-//! | file | what it finds |
+//! | file | contents |
 //! |---|---|
-//! | `known` | what is known already |
+//! | `options` | what is known already |
 //! | `columns` | error and control by the names that people give them |
 //! | `periods` | the excitation, its period and lines, and the longest span of whole periods |
 //! | `lag` | by how many samples the control was recorded later than the output of the controlled element |
 //! | `file` | all of this of a file: [`Look`] |
-//! | `other_columns` | what a reader is told of a file without the columns that were asked for |
+//! | `other_columns` | error message for a file without the columns that were requested |
 //! | `advice` | how the file is to be read, and the command to type |
 
 mod advice;
 mod columns;
 mod file;
-mod known;
 mod lag;
+mod options;
 mod other_columns;
 mod periods;
 
 pub use advice::{Advice, typed};
 pub use columns::{Role, Roles};
-pub use file::{Look, Seen};
-pub use known::Known;
+pub use file::{Look, RecordSummary};
 pub use lag::Lag;
+pub use options::LookOptions;
 pub use other_columns::{OtherColumns, other_columns};
 pub use periods::Periods;

@@ -1,5 +1,5 @@
-//! A file without the columns that were asked for, in which error and control are found all the same: nothing
-//! is chosen silently, the reader is told what to ask for.
+//! A file without the columns that were requested, in which error and control are found all the same: nothing is chosen
+//! silently, the reader is shown what to ask for.
 
 use std::path::Path;
 
@@ -8,24 +8,24 @@ use thiserror::Error;
 
 use super::{advice::typed, columns::Roles, file::names};
 
-/// A file without the columns that were asked for, in which error and control are found all the same.
+/// A file without the columns that were requested, in which error and control are found all the same.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error("{}: {}", self.found(), self.as_keys())]
 pub struct OtherColumns {
     /// The file.
     pub file: String,
-    /// What was asked for and is not there.
+    /// The missing request.
     pub missing: String,
     /// The columns that there are.
     pub available: String,
-    /// The error; `None` where none is wanted.
+    /// The error; `None` if none is wanted.
     pub input: Option<String>,
     /// The control.
     pub output: String,
 }
 
 impl OtherColumns {
-    /// What was asked for, what there is, and what it looks like.
+    /// The request, what there is, and what it looks like.
     pub fn found(&self) -> String {
         let Self {
             file,
@@ -69,8 +69,7 @@ impl OtherColumns {
     }
 }
 
-/// The columns that a file has in place of e and u; `None` where the error is another one, or that is not
-/// certain.
+/// The columns that a file has in place of e and u; `None` if the error is another one, or that is not certain.
 pub fn other_columns(error: &IoError, path: &Path, options: &ReadOptions) -> Option<OtherColumns> {
     let IoError::NoSuchColumn {
         file,
@@ -83,10 +82,10 @@ pub fn other_columns(error: &IoError, path: &Path, options: &ReadOptions) -> Opt
     };
     let found = survey(path).ok()?;
     let names = names(&found);
-    // Only the usual names stand for what is not known; another name was meant as it was typed.
-    let of = |column: &ColumnExpression, usual: &str| {
+    // Only the common names represent unknown quantities; another name was meant as it was typed.
+    let of = |column: &ColumnExpression, default: &str| {
         let found = column.is_among(&names).then(|| column.to_string());
-        (found.is_some() || column.to_string() == usual).then_some(found)
+        (found.is_some() || column.to_string() == default).then_some(found)
     };
     let input = match &options.input {
         Some(column) => Some(of(column, "e")?),

@@ -1,25 +1,25 @@
-//! The excitation of a run: the channel whose power stands in single lines over a span of whole
-//! periods, and the longest such span.
+//! The excitation of a run: the channel whose power is in single lines over a span of whole periods,
+//! and the longest such span.
 //!
 //! Over a whole number of periods `T` a periodic signal has its power in the bins `n / T` of its
 //! Fourier transform, and in no other; over any other span it leaks into all bins. The spans between
-//! whole seconds are tried, from the longest down, until nearly all the power stands in single bins
+//! whole seconds are tried, from the longest down, until nearly all the power is in single bins
 //! ([`Excitation::found_in`]).
 
-use hoid_ident::frequency::{Excitation, LineSearch, USUAL_EXCITATIONS};
+use hoid_ident::frequency::{COMMON_EXCITATIONS, Excitation, LineSearch};
 use hoid_model::Record;
 use hoid_numerics::statistics::variance;
 
-use super::known::Known;
+use super::options::LookOptions;
 
 /// Longest part of a record at either end that a span may leave out, s, and its share of the record.
 const MOST_CUT_S: f64 = 20.0;
 const MOST_CUT_SHARE: f64 = 0.4;
 /// Fewest lines that excite a person: of a sine a person knows what comes.
 const FEWEST_LINES: usize = 3;
-/// Shares of the power beside the lines that are no more than so many times another are alike.
+/// Shares of the power next to the lines that are no more than so many times another are alike.
 const LEAKS_ALIKE: f64 = 3.0;
-/// Share of the power that rounding to five digits or so may leave beside the lines.
+/// Share of the power that rounding to five digits or so may leave next to the lines.
 const ROUNDING: f64 = 1e-9;
 
 /// The excitation of a run.
@@ -33,25 +33,25 @@ pub struct Periods {
     pub span_s: (f64, f64),
     /// Its lines.
     pub excitation: Excitation,
-    /// All of this in words.
+    /// All of this as text.
     pub words: String,
 }
 
-/// The excitation in the channel that was named, else in the first of the usual ones that has lines,
-/// else in any other.
-pub(super) fn search(record: &Record, known: &Known) -> Result<Periods, String> {
+/// The excitation in the channel that was named, else in the first of the common ones that has
+/// lines, else in any other.
+pub(super) fn search(record: &Record, known: &LookOptions) -> Result<Periods, String> {
     let channels: Vec<&str> = record.channels().map(|channel| channel.name.as_str()).collect();
     let candidates: Vec<&str> = match known.excitation.as_deref() {
-        Some("none") => return Err("as asked for".to_owned()),
+        Some("none") => return Err("as requested".to_owned()),
         Some(name) => vec![name],
         None => {
             // Error, control and output follow the excitation: they have its lines, and more.
             let answers = channels.iter().take(2).copied().chain(["y", "x", "n", "e", "u"]);
             let answers: Vec<&str> = answers.collect();
-            let usual = USUAL_EXCITATIONS.into_iter().filter(|name| channels.contains(name));
+            let default = COMMON_EXCITATIONS.into_iter().filter(|name| channels.contains(name));
             let others = channels.iter().copied();
-            let others = others.filter(|name| !answers.contains(name) && !USUAL_EXCITATIONS.contains(name));
-            usual.chain(others).collect()
+            let others = others.filter(|name| !answers.contains(name) && !COMMON_EXCITATIONS.contains(name));
+            default.chain(others).collect()
         }
     };
     if let Some(missing) = candidates.iter().find(|name| record.channel(name).is_none()) {
@@ -63,7 +63,7 @@ pub(super) fn search(record: &Record, known: &Known) -> Result<Periods, String> 
     let found = candidates.iter().find_map(|channel| in_channel(record, channel, known));
     found.ok_or_else(|| {
         if candidates.is_empty() {
-            return "there is no column besides error and control".to_owned();
+            return "there is no column other than error and control".to_owned();
         }
         format!(
             "no column among {} has its power in lines over whole periods; name one by --excitation and its span by --from and --to",
@@ -74,7 +74,7 @@ pub(super) fn search(record: &Record, known: &Known) -> Result<Periods, String> 
 
 /// The longest span of whole periods of a channel. A span that is some samples too long leaks little, and
 /// would pass: of those that are shorter by less than a second the one counts that leaks least.
-fn in_channel(record: &Record, channel: &str, known: &Known) -> Option<Periods> {
+fn in_channel(record: &Record, channel: &str, known: &LookOptions) -> Option<Periods> {
     let all = spans(record, known);
     let longest = all.iter().position(|span| lines_in(record, channel, *span).is_some())?;
     let least_s = all[longest].1 - all[longest].0 - 1.0;
@@ -84,7 +84,7 @@ fn in_channel(record: &Record, channel: &str, known: &Known) -> Option<Periods> 
         .filter_map(|span| lines_in(record, channel, *span).map(|(excitation, leak)| (*span, excitation, leak)))
         .collect();
     let least = near.iter().map(|(.., leak)| *leak).fold(f64::INFINITY, f64::min);
-    // Of those that leak alike the first, which is the longest.
+    // For those that leak alike the first, which is the longest.
     let limit = LEAKS_ALIKE * least.max(ROUNDING);
     let ((from_s, to_s), excitation, _) = near.into_iter().find(|(.., leak)| *leak <= limit)?;
     let (omega, period_s) = (excitation.omega_rad_s(), excitation.period_s());
@@ -104,7 +104,7 @@ fn in_channel(record: &Record, channel: &str, known: &Known) -> Option<Periods> 
 }
 
 /// The lines of a channel over a span, where they hold nearly all of its power, and the share of the
-/// power beside them.
+/// power next to them.
 fn lines_in(record: &Record, channel: &str, (from_s, to_s): (f64, f64)) -> Option<(Excitation, f64)> {
     let span = record.span(from_s, to_s).ok()?;
     let excitation = Excitation::found_in(&span, channel, &LineSearch::default()).ok()?;
@@ -128,7 +128,7 @@ fn lines_in(record: &Record, channel: &str, (from_s, to_s): (f64, f64)) -> Optio
 }
 
 /// The spans that are tried, the longest first, of equal ones the latest: a person settles in.
-fn spans(record: &Record, known: &Known) -> Vec<(f64, f64)> {
+fn spans(record: &Record, known: &LookOptions) -> Vec<(f64, f64)> {
     let (begin, end) = (record.time_s(0), record.time_s(record.len()));
     let most = MOST_CUT_S.min(MOST_CUT_SHARE * (end - begin));
     let whole = |from: f64, to: f64| (from.ceil() as i64..=to.floor() as i64).map(|t| t as f64);
@@ -158,7 +158,7 @@ mod tests {
 
     use super::*;
 
-    /// Noise-like error and control, and a disturbance of period 10 s that begins at 3 s.
+    /// Noise-like error and control, and a disturbance of period 10 s that starts at 3 s.
     fn record(lines: &[f64]) -> Record {
         let ts = SampleTime::new(0.02).unwrap();
         let n = 1300;
@@ -181,22 +181,24 @@ mod tests {
 
     #[test]
     fn the_longest_span_of_whole_periods_is_found() {
-        let found = search(&record(&[1.0, 3.0, 7.0, 12.0]), &Known::default()).ok().unwrap();
+        let found = search(&record(&[1.0, 3.0, 7.0, 12.0]), &LookOptions::default())
+            .ok()
+            .unwrap();
         assert_eq!((found.channel.as_str(), found.span_s), ("d", (6.0, 26.0)));
         assert!((found.period_s - 10.0).abs() < 1e-9, "{}", found.period_s);
         assert_eq!(found.excitation.harmonics(), [1, 3, 7, 12]);
     }
 
-    /// Samples behind the last period, as of a recorder that is stopped late: the span that ends with the
-    /// record leaks little, and is no whole period.
+    /// Samples after the last period, as of a recorder that is stopped late: the span that ends with the record leaks
+    /// little, and is not a whole period.
     #[test]
     fn a_period_is_not_drawn_out_by_samples_at_the_end() {
         let whole = record(&[1.0, 2.0, 3.0]);
         let longer = whole.span(0.0, 23.0).unwrap();
-        let exact = search(&longer, &Known::default()).ok().unwrap();
+        let exact = search(&longer, &LookOptions::default()).ok().unwrap();
         for late in 1..=3 {
             let late = whole.span(0.0, 23.0 + 0.02 * f64::from(late)).unwrap();
-            let found = search(&late, &Known::default()).ok().unwrap();
+            let found = search(&late, &LookOptions::default()).ok().unwrap();
             assert_eq!((found.span_s, found.period_s), (exact.span_s, exact.period_s));
         }
         assert_eq!(exact.span_s, (3.0, 23.0));
@@ -204,11 +206,11 @@ mod tests {
 
     #[test]
     fn what_is_no_excitation_is_said() {
-        let sine = search(&record(&[2.0]), &Known::default()).err().unwrap();
+        let sine = search(&record(&[2.0]), &LookOptions::default()).err().unwrap();
         assert!(sine.contains("no column among d"), "{sine}");
-        let known = |excitation: &str| Known {
+        let known = |excitation: &str| LookOptions {
             excitation: Some(excitation.to_owned()),
-            ..Known::default()
+            ..LookOptions::default()
         };
         assert!(
             search(&record(&[1.0, 3.0, 7.0]), &known("q"))

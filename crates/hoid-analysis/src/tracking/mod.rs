@@ -1,12 +1,12 @@
-//! From a recording to a trace and what it is worth: what is done, in its order.
+//! From a recording to a trace and its reliability: what is done, in its order.
 //!
 //! ```text
 //! file -- Reading --> Recordings -- Tracking { options }.run --> Tracked { trace, verdict, data, settings }
 //! ```
 //!
 //! A high rate is lowered; orders that are open are searched on the start span; the recursion goes over the record,
-//! with a second run that chooses its covariance where one is given; the verdict is that of the trace behind what the
-//! recording says. Faults are the guard's, sample by sample: a recording is not mended before.
+//! with a second run that chooses its covariance where one is given; the verdict is that of the trace after what the
+//! recording shows. Faults are the guard's, sample by sample: a recording is not repaired before.
 
 mod errors;
 mod run;

@@ -1,10 +1,10 @@
-//! The run: from a recording to a trace and what it is worth.
+//! The run: from a recording to a trace and its reliability.
 
 use hoid_ident::IdentError;
 use hoid_model::{Decimation, Record, SampleTime};
 use hoid_track::{
-    CovarianceUpdates, RequestedStart, StartAt, Trace, TrackOptions, TrackPlan, TrackRequest, choose_covariance, track,
-    track_validated, usual_start_span,
+    CovarianceUpdates, RequestedStart, StartAt, Trace, TrackOptions, TrackPlan, TrackRequest, choose_covariance,
+    default_start_span, track, track_validated,
 };
 
 use super::{
@@ -17,7 +17,7 @@ use crate::{
     recordings::Recordings,
 };
 
-/// A recursion over a recording, as it is asked for.
+/// A recursion over a recording, as it is requested.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tracking {
     /// The recursion.
@@ -26,9 +26,9 @@ pub struct Tracking {
     pub start_span_s: Option<(f64, f64)>,
     /// Time from which the estimate moves, s.
     pub update_from_s: Option<f64>,
-    /// The trace is the mean over so many seconds.
+    /// The trace is the mean over a given number of seconds.
     pub moving_average_s: Option<f64>,
-    /// Every so many samples of the recording give a row.
+    /// Every n samples of the recording give a row.
     pub every: usize,
     /// The rate at which it is tracked.
     pub rate: Decimation,
@@ -59,7 +59,7 @@ impl Tracking {
     /// The plan for a recording, at the rate at which it is tracked.
     ///
     /// # Errors
-    /// [`AnalysisError::Options`] for what contradicts itself.
+    /// [`AnalysisError::Options`] for contradictory options.
     pub fn plan(&self, recordings: &Recordings) -> Result<TrackPlan, AnalysisError> {
         let read = recordings
             .records
@@ -102,7 +102,7 @@ impl Tracking {
         .max(1);
         let plan = plan_of(&self.recursion, record.sample_time())?;
         self.check(&plan, record)?;
-        let span_s = self.start_span_s.unwrap_or_else(|| usual_start_span(record));
+        let span_s = self.start_span_s.unwrap_or_else(|| default_start_span(record));
         let span = record.span(span_s.0, span_s.1);
         let (planned, choice) = if plan.is_settled() {
             (plan.options().clone(), None)
@@ -138,13 +138,13 @@ impl Tracking {
         let rows = self.averaged_rows(every, record)?;
         let trace: Trace = trace.moving_average(rows);
         let verdict = trace.verdict(record, choice.as_ref())?;
-        let verdict = verdict.behind(findings_of_quality(account, record, Of::Person));
+        let verdict = verdict.prepend(findings_of_quality(account, record, Of::Person));
         let mut settings = settings_of_recursion(&self.recursion, &plan, &used, choice.as_ref());
         let own = OwnSettings {
             trace: &trace,
             options: &used,
             covariance: covariance.as_ref(),
-            start_given: self.start_span_s.is_some() || self.recursion.start != RequestedStart::Usual,
+            start_given: self.start_span_s.is_some() || self.recursion.start != RequestedStart::Default,
             update_given: self.update_from_s.is_some(),
             rows,
             every: (every, self.every != 1),
@@ -163,7 +163,7 @@ impl Tracking {
         })
     }
 
-    /// What contradicts itself or the record.
+    /// Checks for contradictions in the plan and with the record.
     fn check(&self, plan: &TrackPlan, record: &Record) -> Result<(), AnalysisError> {
         let method = &plan.options().method;
         if self.start_span_s.is_some() && matches!(self.recursion.start, RequestedStart::Coefficients(_)) {
@@ -200,7 +200,7 @@ impl Tracking {
     }
 }
 
-/// The plan of a recursion; what is wrong with it is wrong with its options.
+/// The plan of a recursion; its errors are reported as errors of its options.
 ///
 /// # Errors
 /// [`AnalysisError::Options`].

@@ -35,9 +35,9 @@ pub fn settings_of_recursion(
     if let Some(delay @ DelayRange::Seconds(..)) = &asked.delay {
         list.push(Setting::new("delay", delay.to_string()).given(true));
     }
-    list.push(Setting::new("memory", options.memory_in_words(plan.sample_time())).given(memory_given));
+    list.push(Setting::new("memory", options.memory_as_text(plan.sample_time())).given(memory_given));
     for one in &listed {
-        // The memory stands above with the defaults of all parameters.
+        // The memory is above with the defaults of all parameters.
         if let Some(text) = value(one.name) {
             let given = text != one.default;
             list.push(Setting::new(one.name.replace('_', " "), text).given(given));
@@ -61,7 +61,7 @@ pub fn settings_of_recursion(
     list
 }
 
-/// What is not of the recursion: the second run, the start, the rows.
+/// Settings other than those of the recursion: the second run, the start, the rows.
 pub(super) struct OwnSettings<'a> {
     pub trace: &'a Trace,
     pub options: &'a TrackOptions,
@@ -104,7 +104,7 @@ impl OwnSettings<'_> {
             None => {}
         }
         let words = match &options.start {
-            _ if options.method.starts_itself() => options.start_in_words(),
+            _ if options.method.starts_itself() => options.start_as_text(),
             StartAt::Span(Some((from, to))) => format!("batch fit of {from:.2} to {to:.2} s"),
             StartAt::Span(None) => "batch fit of the first third".to_owned(),
             StartAt::Theta(_) => "given".to_owned(),

@@ -1,4 +1,4 @@
-//! What a recursion over a record found, and the trace as a table.
+//! Result of a recursion over a record, and the trace as a table.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use crate::{
     settings::Setting,
 };
 
-/// What a second run said of the covariance, and the name of that run.
+/// Covariance from a second run, and the name of that run.
 #[derive(Debug, Clone)]
 pub enum Covariance {
     /// The one at the start.
@@ -22,14 +22,14 @@ pub enum Covariance {
     Updated(String),
 }
 
-/// Everything that was found.
+/// All results.
 #[derive(Debug, Clone)]
 pub struct Tracked {
     /// The estimate over the record.
     pub trace: Trace,
-    /// What it is worth, of all that is known.
+    /// The verdict on it, of all that is known.
     pub verdict: Verdict,
-    /// The one recording as it was tracked, and what was done to it.
+    /// The one recording as it was tracked, and the processing of it.
     pub data: Recordings,
     /// The span of the start fit, where there was one.
     pub span: Option<Record>,
@@ -37,7 +37,7 @@ pub struct Tracked {
     pub operators: Vec<Result<OperatorEstimate, NotConvertible>>,
     /// The search for the orders, where there was one.
     pub choice: Option<Choice>,
-    /// What a second run said.
+    /// Result of a second run.
     pub covariance: Option<Covariance>,
     /// The settings that were used.
     pub settings: Vec<Setting>,
@@ -58,7 +58,7 @@ impl Tracked {
         &self.data.records[0]
     }
 
-    /// What was done to it.
+    /// Processing applied to it.
     pub fn account(&self) -> &Account {
         &self.data.accounts[0]
     }
@@ -128,7 +128,7 @@ impl Tracked {
         OutputTable { comments, columns }
     }
 
-    /// True where the coefficients stand for an operator at all.
+    /// True if the coefficients represent an operator at all.
     pub fn has_operator(&self) -> bool {
         self.operators.iter().any(|o| {
             !matches!(

@@ -17,10 +17,10 @@ use super::{
     study::{ReproduceArgs, StudyCommand},
 };
 
-/// Human-operator identification: finds out how a person controls a machine.
+/// Human-operator identification: estimates how a person controls a machine.
 ///
 /// From the tracking error e and the control output u: gain, lead, delay, neuromuscular dynamics and
-/// remnant, with standard errors and a verdict on what they are worth.
+/// remnant, with standard errors and a verdict on their reliability.
 #[derive(Debug, Parser)]
 #[command(name = "hoid", version, max_term_width = 110)]
 pub struct Cli {
@@ -30,83 +30,83 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// The whole path on a simulated run, with a report
+    /// Run the whole analysis on a simulated run, with a report
     ///
-    /// Simulates a run in which the controlled element changes, identifies, tracks, and writes reports.
+    /// Simulates a run in which the controlled element changes, identifies the operator, tracks it, and writes reports.
     Demo(DemoArgs),
     /// Simulate one closed-loop run into a file
     Simulate(SimulateArgs),
-    /// Gain, lead, delay ... of the person, from whole records
+    /// Estimate the operator's parameters from recordings
     ///
-    /// Fits a model to one or several records, and says what the result is worth.
+    /// Fits a model to one or several records and gives a verdict on the result.
     Identify(Box<IdentifyArgs>),
-    /// Gain and phase at the lines of the excitation, without a model
+    /// Estimate gain and phase at the excited frequencies, without a model
     ///
-    /// How a person responds at the lines of a periodic excitation: describing function, crossover,
-    /// margins, remnant.
+    /// Computes the response of a person at the frequencies of a periodic excitation: describing function,
+    /// crossover, margins and remnant.
     Describe(Box<DescribeArgs>),
-    /// The person over a record, sample by sample
+    /// Track the operator over a record, sample by sample
     ///
-    /// Tracks a model and the operator's parameters over a record, and finds changes.
+    /// Tracks a model and the operator's parameters over a record and detects changes.
     Track(Box<TrackArgs>),
-    /// The same live: samples in, one JSON line a sample out
+    /// Track live: samples in, one JSON line per sample out
     ///
-    /// Reads samples as lines on standard input and writes one JSON line a sample on standard output.
+    /// Reads samples as lines from standard input and writes one JSON line per sample to standard output.
     Stream(Box<StreamArgs>),
-    /// A unit for simulators (FMI 2.0, 3.0)
+    /// Write a unit for simulators (FMI 2.0, 3.0)
     ///
     /// Writes a functional mock-up unit: the tracker, or with --operator a simulated person. It takes the
     /// shared library that `cargo xtask ffi` builds.
     Fmu(FmuArgs),
-    /// What is inside of a file, and what is wrong with it
+    /// Show channels, sampling and data-quality problems
     ///
-    /// Shows columns, sampling, ranges, what is suspicious, and a sketch of each column.
+    /// Shows columns, sampling, ranges, suspicious values, and a sketch of each column.
     Info(InfoArgs),
-    /// Coefficients to operator parameters and back
+    /// Convert coefficients to operator parameters and back
     ///
-    /// Takes discrete coefficients to operator parameters or back, or discretises a transfer function.
+    /// Converts discrete coefficients to operator parameters or back, or discretises a transfer function.
     Convert(ConvertArgs),
-    /// Crossover and margins of a scenario
+    /// Compute crossover and margins of a scenario
     ///
-    /// Crossover frequency, phase and gain margin of a scenario, and its remnant gains.
+    /// Computes crossover frequency, phase margin, gain margin and remnant gains of a scenario.
     Margins(MarginsArgs),
-    /// A tracking experiment in the browser
+    /// Run a tracking experiment in the browser
     ///
-    /// Serves a page on this computer in which a person tracks, identifies them while they do, and
-    /// checks every run to the last bit. Prints the address of the page. Part of release binaries;
-    /// others are built with --features lab.
+    /// Serves a page on this computer in which a person tracks, identifies the operator during the run, and
+    /// verifies every run to the last bit. Prints the address of the page. Release binaries contain it; other
+    /// builds need --features lab.
     Lab(LabArgs),
-    /// Many recorded runs by subject and condition
+    /// Analyse many recorded runs by subject and condition
     ///
-    /// `hoid group init DIR` looks at the files and writes a manifest; `hoid group DIR --out OUT` fits
+    /// `hoid group init DIR` inspects the files and writes a manifest; `hoid group DIR --out OUT` fits
     /// each run, and each person in each condition, and writes tables and pages.
     Group(GroupArgs),
-    /// Whether conditions differ, and people
+    /// Test differences between conditions or people
     ///
-    /// Differences between the conditions or people of a group, with intervals, tests, effect sizes and a sentence each: what
-    /// `hoid group` found of each person, over people.
+    /// Estimates the differences between the conditions or people of a group, with intervals, tests, effect sizes and a
+    /// sentence each. It combines the results of `hoid group` over people.
     Compare(CompareArgs),
-    /// The forcing function that tells most of a person
+    /// Design the forcing function that is most informative about a person
     ///
-    /// Lines, amplitudes and phases of a forcing function, and the standard errors to be expected of so many runs, for a person
-    /// and a controlled element that are about known.
+    /// Computes frequencies, amplitudes and phases of a forcing function, and the expected standard errors for a number of
+    /// runs, from approximate values of the person and the controlled element.
     Design(DesignArgs),
-    /// A virtual experiment for `hoid group`
+    /// Simulate a virtual experiment for `hoid group`
     ///
-    /// Simulates subjects, conditions and runs, with the truth beside them.
+    /// Simulates subjects, conditions and runs, and writes the true values next to them.
     SimulateGroup(SimulateGroupArgs),
-    /// Monte Carlo studies: run a plan, join shards, list plans
+    /// Run Monte Carlo studies: run a plan, join shards, list plans
     #[command(subcommand)]
     Study(StudyCommand),
-    /// The reference text: tables, figures, claims
+    /// Reproduce the thesis (Ortiz Moya 2023)
     ///
-    /// The tables, figures and claims of the reference text, each from a named study.
+    /// Computes the tables, figures and claims of the thesis, each from a named study.
     Reproduce(ReproduceArgs),
-    /// Completions for bash, zsh, fish, PowerShell, Elvish
+    /// Write completions for bash, zsh, fish, PowerShell, Elvish
     ///
     /// Writes the completions of a shell to standard output.
     Completions(CompletionsArgs),
-    /// Manual pages
+    /// Write manual pages
     ///
     /// Writes a manual page for the program and one for each command.
     Man(ManArgs),

@@ -12,8 +12,9 @@ pub struct CompareArgs {
     /// Directory that `hoid group DIR --out` wrote, or what `hoid group --json` printed
     #[arg(value_name = "DIR|RESULTS.json")]
     pub results: PathBuf,
-    /// What conditions or people differ in, as NAME:LEVEL=A,B;LEVEL=C with conditions or people of the group; repeat it
-    /// for several factors and their interactions [default: each condition is a level of the factor condition]
+    /// Differences between conditions or people, as NAME:LEVEL=A,B;LEVEL=C with conditions or people of the group;
+    /// repeat it for several factors and their interactions [default: each condition is a level of the factor
+    /// condition]
     #[arg(long, value_name = "FACTOR")]
     pub factor: Vec<Factor>,
     /// The factor varies within people: each is in all of its levels [default: found from the group]
@@ -22,14 +23,14 @@ pub struct CompareArgs {
     /// The factor varies between people: each is in one of its levels
     #[arg(long)]
     pub between: bool,
-    /// What is compared, separated by commas: crossover, phase_margin, tau_e, gain_db@W and phase_deg@W at W rad/s, rms_e,
-    /// rms_u, or parameters of one form such as K, T_L [default: crossover,phase_margin,tau_e]
+    /// Quantities compared, separated by commas: crossover, phase_margin, tau_e, gain_db@W and phase_deg@W at W rad/s,
+    /// rms_e, rms_u, or parameters of one form such as K, T_L [default: crossover,phase_margin,tau_e]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub of: Vec<Quantity>,
-    /// What is taken out of the estimates, with its slope told: run
+    /// Trend removed from the estimates, with its slope told: run
     #[arg(long, value_name = "NAME", value_parser = choice_of(&Covariate::ALL))]
     pub covariate: Option<Covariate>,
-    /// What is done about many tests: holm or none
+    /// Treatment of many tests: holm or none
     #[arg(long, value_name = "METHOD", default_value = "holm", value_parser = choice_of(&Adjustment::ALL))]
     pub adjust: Adjustment,
     /// How people are weighted: by a variance between them that is kept away from zero (penalised), or that of

@@ -47,8 +47,8 @@ pub struct ConvertArgs {
     /// Delay of b0 in samples
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub nk: usize,
-    /// Operator parameters: K_e=.09,T_L=.4,omega_nm=11.25,zeta_nm=.35,tau_e=.28 (K_e_dot may stand
-    /// for T_L)
+    /// Operator parameters: K_e=.09,T_L=.4,omega_nm=11.25,zeta_nm=.35,tau_e=.28 (K_e_dot may
+    /// represent T_L)
     #[arg(long, value_name = "LIST", value_parser = parse_numbers, allow_hyphen_values = true)]
     pub operator: Option<std::vec::Vec<(String, f64)>>,
     /// Transfer function to discretise, as (s+2)/(s^2+3s+4), or NUM/DEN by descending powers of s, as
@@ -69,7 +69,7 @@ pub struct ConvertArgs {
     pub json: bool,
 }
 
-/// A discretisation; prewarping needs its frequency besides.
+/// A discretisation; prewarping needs its frequency in addition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum MethodName {
     Zoh,

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use hoid::ident::frequency::USUAL_EXCITATIONS;
+use hoid::ident::frequency::COMMON_EXCITATIONS;
 use hoid::io::readable_endings;
 use hoid::model::ContinuousTransferFunction;
 
@@ -29,7 +29,7 @@ pub struct DescribeArgs {
     #[arg(long, value_name = "COLUMN", help = format!(
         "Column of the recorded disturbance or target. Its lines are found in it; the span must be whole periods \
          [default: the first of {} that there is with lines]",
-        USUAL_EXCITATIONS.join(", ")
+        COMMON_EXCITATIONS.join(", ")
     ))]
     pub excitation: Option<String>,
     /// Lines of the excitation in rad/s, as 0.63,1.57,2.2; they need --period [default: those found]

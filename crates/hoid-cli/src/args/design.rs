@@ -13,11 +13,11 @@ pub struct DesignArgs {
     /// The person: a scenario of the family (.toml), or a fit that `hoid identify --json` printed
     #[arg(long, value_name = "PERSON.toml|FIT.json")]
     pub people: PathBuf,
-    /// What they control, as 90/(s(s+6)) or 90/1,6,0 [default: that of the scenario]
+    /// The controlled element, as 90/(s(s+6)) or 90/1,6,0 [default: that of the scenario]
     #[arg(long, value_name = "TF")]
     pub controlled_element: Option<ContinuousTransferFunction>,
-    /// What is wanted, with the standard error that is accepted: crossover=3%,tau_e=5%,phase_margin=2 (deg) [default: all
-    /// parameters alike]
+    /// The quantities requested, with the standard error that is accepted: crossover=3%,tau_e=5%,phase_margin=2 (deg)
+    /// [default: all parameters alike]
     #[arg(long = "for", value_name = "LIST", value_delimiter = ',', value_parser = parse_wanted)]
     pub wanted: Vec<Wanted>,
     /// The forcing function is a disturbance at the input of the controlled element, not a target
@@ -32,7 +32,7 @@ pub struct DesignArgs {
     /// Length of a run in s: the period of the forcing function
     #[arg(long, value_name = "S", default_value_t = 81.92)]
     pub length: f64,
-    /// Number of runs [default: what is wanted needs, else 1]
+    /// Number of runs [default: the number for the target, else 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub runs: Option<u32>,
     /// Lines of the forcing function
@@ -51,7 +51,8 @@ pub struct DesignArgs {
     /// Greatest rms of the control
     #[arg(long, value_name = "RMS")]
     pub max_u: Option<f64>,
-    /// A forcing function to be judged beside it: a scenario with a target or disturbance, or reference (the ten sines of the text)
+    /// A forcing function to be judged next to it: a scenario with a target or disturbance, or reference (the ten sines
+    /// of the text)
     #[arg(long, value_name = "SCENARIO.toml|reference")]
     pub against: Option<PathBuf>,
     /// Directory for the design: design.json, scenario.toml, forcing.csv
@@ -71,7 +72,7 @@ fn parse_wanted(text: &str) -> Result<Wanted, String> {
     let number: f64 = number
         .trim()
         .parse()
-        .map_err(|_| format!("{error:?} is no error; write NAME=5%"))?;
+        .map_err(|_| format!("{error:?} is not an error; write NAME=5%"))?;
     let name = match name.trim() {
         "margin" => "phase_margin",
         "delay" => "tau_e",

@@ -15,12 +15,12 @@ pub struct FmuArgs {
     /// File of the unit
     #[arg(long, value_name = "FILE.fmu")]
     pub out: PathBuf,
-    /// A unit that controls in place of a person: the operator of a condition of the reference text,
-    /// C1 to C6, or of a scenario file (TOML)
+    /// A unit that controls in place of a person: the operator of a condition of the thesis, C1 to
+    /// C6, or of a scenario file (TOML)
     #[arg(long, value_name = "SCENARIO", value_parser = parse_operator)]
     pub operator: Option<OperatorChoice>,
     /// Shared library that `cargo xtask ffi` has built; may be repeated, one for each platform
-    /// [default: libhoid beside this program]
+    /// [default: libhoid next to this program]
     #[arg(long = "library", value_name = "FILE")]
     pub libraries: Vec<PathBuf>,
     /// Version of the Functional Mock-up Interface
@@ -33,11 +33,11 @@ pub struct FmuArgs {
     #[arg(long, value_name = "NAME", default_value_t = Method::default().name().to_owned(),
           value_parser = method_names(), conflicts_with = "operator")]
     pub method: String,
-    /// What is known of the person: population, none, NAME=CENTRE:SPREAD..., or the file of a fit that
-    /// hoid identify --json has printed, which goes into the unit [default: population]
+    /// Known properties of the person: population, none, NAME=CENTRE:SPREAD..., or the file of a fit that hoid identify
+    /// --json has printed, which goes into the unit [default: population]
     #[arg(long, value_name = "PRIOR", conflicts_with = "operator")]
     pub prior: Option<String>,
-    /// Controlled element in s, as 90/(s(s+6)): crossover and phase margin are told
+    /// Controlled element in s, as 90/(s(s+6)): crossover and phase margin are reported
     #[arg(
         long,
         value_name = "ELEMENT",

@@ -29,16 +29,16 @@ pub struct GroupRunArgs {
     /// Manifest in TOML, or a directory with group.toml
     #[arg(value_name = "DIR|MANIFEST", required = true)]
     pub manifest: Option<PathBuf>,
-    /// Directory for tables, report and parts; it is made if it is not there
+    /// Directory for tables, report and parts; it is made if it is missing
     #[arg(long, value_name = "DIR", required = true)]
     pub out: Option<PathBuf>,
     /// Threads. Default: one a core
     #[arg(long, value_name = "J", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
-    /// Go on with a group that was stopped
+    /// Continue with a group that was stopped
     #[arg(long)]
     pub resume: bool,
-    /// Write CSV beside Parquet
+    /// Write CSV next to Parquet
     #[arg(long)]
     pub csv: bool,
     /// Estimate each person from all of them too: pooled.csv, and population.json (of several conditions
@@ -56,7 +56,7 @@ pub struct GroupInitArgs {
     /// Directory with one file a run
     #[arg(value_name = "DIR")]
     pub directory: PathBuf,
-    /// Names of the files: {subject}, {condition} and {run} stand for what is taken from them, *
+    /// Names of the files: {subject}, {condition} and {run} represent what is taken from them, *
     /// for anything
     #[arg(long, value_name = "PATTERN", default_value = "{subject}_{condition}_{run}.csv")]
     pub pattern: String,
@@ -79,8 +79,8 @@ pub struct SimulateGroupArgs {
     /// Subjects
     #[arg(long, value_name = "N", default_value_t = 3)]
     pub subjects: u64,
-    /// People like people in place of subjects near the reference text: drawn over the family of
-    /// operators, on the elements of --plants, columns t, e, u, d, y
+    /// People like people in place of subjects near the thesis: drawn over the family of operators,
+    /// on the elements of --plants, columns t, e, u, d, y
     #[arg(long, conflicts_with_all = ["conditions", "between_subjects", "remnant_order", "noise_level"])]
     pub people: bool,
     #[command(flatten)]
@@ -111,13 +111,13 @@ pub struct SimulateGroupArgs {
     /// Seed of the random streams
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// What is wrong with the sampling: jitter, missing, repeated, slow-clock, saturated,
-    /// quantised, stalled
+    /// Problems with the sampling: jitter, missing, repeated, slow-clock, saturated, quantised,
+    /// stalled
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_trouble)]
     pub trouble: Vec<SamplingDefect>,
 }
 
-/// What --people takes besides.
+/// Additional options of --people.
 #[derive(Debug, Args)]
 pub struct PeopleOptions {
     /// With --people: controlled elements 1/s, 1/(s(s+1)), 1/s^2 by name, separated by commas
@@ -157,5 +157,5 @@ fn parse_trouble(text: &str) -> Result<SamplingDefect, String> {
     SamplingDefect::ALL
         .into_iter()
         .find(|trouble| trouble.name() == text.trim())
-        .ok_or_else(|| format!("{text:?} is no trouble, expected some of {}", names()))
+        .ok_or_else(|| format!("{text:?} is not a trouble, expected some of {}", names()))
 }

@@ -1,14 +1,14 @@
-//! What help shows: `hoid -h` lists the commands by what they are for; `hoid COMMAND -h` shows the
+//! Help pages: `hoid -h` lists the commands by what they are for; `hoid COMMAND -h` shows the
 //! options that most people need, under headings, and two examples; `--help` shows everything.
 //!
-//! The tables here hold names of commands and options alone: what an option does is said where it is
-//! defined. A test holds them to the definitions, and parses every example.
+//! The tables here hold names of commands and options alone: what an option does is reported where
+//! it is defined. A test holds them to the definitions, and parses every example.
 
 use clap::{Arg, Command, CommandFactory};
 
 use super::Cli;
 
-/// What help says of a command besides its options.
+/// Report of help on a command other than its options.
 struct Help {
     command: &'static str,
     examples: &'static [&'static str],
@@ -16,7 +16,7 @@ struct Help {
     shown: &'static [&'static str],
 }
 
-/// The commands by what they are for, in the order of the first page.
+/// The commands by purpose, in the order of the first page.
 const GROUPS: [(&str, &[&str]); 4] = [
     (
         "Recordings",
@@ -270,7 +270,7 @@ const HELP: [Help; 19] = [
     },
 ];
 
-/// The headings of options that several commands share; what is left stands under the model.
+/// The headings of options that several commands share; what is left is under the model.
 const HEADINGS: [(&str, &[&str]); 2] = [
     (
         "Data",
@@ -323,7 +323,7 @@ const HEADINGS: [(&str, &[&str]); 2] = [
     ),
 ];
 
-/// The commands whose options stand under headings.
+/// The commands whose options are under headings.
 const WITH_HEADINGS: [&str; 4] = ["identify", "describe", "track", "stream"];
 
 /// The program as it is parsed and as it explains itself.
@@ -350,7 +350,7 @@ fn in_any_case(arg: Arg) -> Arg {
     arg.ignore_case(takes_value)
 }
 
-/// What most people do not need is shown by `--help` alone.
+/// Rarely needed options are shown by `--help` alone.
 fn argument(arg: Arg, help: &Help) -> Arg {
     let id = arg.get_id().as_str().to_owned();
     let hidden = !arg.is_positional() && !help.shown.is_empty() && !help.shown.contains(&id.as_str());
@@ -362,7 +362,7 @@ fn argument(arg: Arg, help: &Help) -> Arg {
     arg.help_heading(heading.map_or("Model", |(heading, _)| heading))
 }
 
-/// The list of commands by what they are for.
+/// The list of commands by purpose.
 fn first_page(program: &mut Command) -> String {
     let about = |name: &str| {
         let command = program.get_subcommands().find(|c| c.get_name() == name);
@@ -386,7 +386,7 @@ mod tests {
 
     use super::*;
 
-    /// The words of an example behind the program's name, as a shell would hand them over.
+    /// The words of an example after the program's name, as a shell would hand them over.
     fn words(example: &str) -> Vec<String> {
         let (_, typed) = example.split_once("hoid ").unwrap();
         let typed = typed.split([' ']).take_while(|word| !["<", ">", "|"].contains(word));

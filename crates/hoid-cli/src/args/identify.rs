@@ -1,4 +1,4 @@
-//! Options of `hoid identify`: what is read and written. Those of the estimators are in the registry of the library.
+//! Options of `hoid identify`: input and output. Options of the estimators are in the registry of the library.
 
 use std::path::PathBuf;
 
@@ -33,8 +33,8 @@ pub struct IdentifyArgs {
     pub mask: MaskArgs,
     #[command(flatten)]
     pub faults: FaultArgs,
-    /// What is fitted: operator (the operator of a person), or a polynomial structure [default: operator;
-    /// that of --method; bj with options that polynomials alone have, as --nk]
+    /// The fitted model: operator (the operator of a person), or a polynomial structure [default: operator; that of
+    /// --method; bj with options that polynomials alone have, as --nk]
     #[arg(long, value_name = "NAME", value_parser = structures(), ignore_case = true)]
     pub structure: Option<String>,
     /// How polynomials are fitted: pem the prediction error method; iv4 (for arx), sriv (for oe), rivbj (for
@@ -66,7 +66,7 @@ pub struct IdentifyArgs {
     pub show: ShowArgs,
 }
 
-/// The structures; names of before are read, and not shown.
+/// The structures; earlier names are read, and not shown.
 fn structures() -> PossibleValuesParser {
     let polynomials = Structure::ALL.map(|structure| PossibleValue::new(structure.name()));
     let before = ["grey-box", "family", "time-varying"].map(|name| PossibleValue::new(name).hide(true));

@@ -6,8 +6,8 @@ use clap::Args;
 
 #[derive(Debug, Args)]
 pub struct LabArgs {
-    /// Folder of the experiment: one folder a session, and the manifest of `hoid group`. Sessions that
-    /// were not finished go on
+    /// Folder of the experiment: one folder a session, and the manifest of `hoid group`. Sessions that were not
+    /// finished continue
     #[arg(long, value_name = "DIR", default_value = "hoid-lab")]
     pub out: PathBuf,
     /// The experiment: conditions, order, consent, limits, in TOML

@@ -1,13 +1,13 @@
-//! What is known of a file before it is looked at, as `hoid info` and `hoid group init` take it.
+//! Prior knowledge of a file before it is examined, as `hoid info` and `hoid group init` take it.
 
 use clap::Args;
-use hoid::analysis::Known;
+use hoid::analysis::LookOptions;
 use hoid::io::{TimeChoice, TrialChoice};
 use hoid::model::ContinuousTransferFunction;
 
 use super::reading::{parse_time, parse_trial};
 
-/// What is known already, and therefore not looked for.
+/// Options given by the user, which are therefore not searched for.
 #[derive(Debug, Args)]
 pub struct LookArgs {
     /// Column of the input (tracking error), or a difference such as r-y [default: by its name]
@@ -16,15 +16,15 @@ pub struct LookArgs {
     /// Column of the output (control) [default: by its name]
     #[arg(long, value_name = "COLUMN", allow_hyphen_values = true)]
     pub output: Option<String>,
-    /// Column of the excitation, or none [default: the one whose power stands in lines]
+    /// Column of the excitation, or none [default: the one whose power is in lines]
     #[arg(long, value_name = "COLUMN|none")]
     pub excitation: Option<String>,
     /// Controlled element in s, as 90/(s(s+6)) or 90/1,6,0; with it, and a column y, it is found by how
     /// many samples the control was recorded late
     #[arg(long, value_name = "ELEMENT", value_parser = parse_element, allow_hyphen_values = true)]
     pub controlled_element: Option<(String, ContinuousTransferFunction)>,
-    /// Column of the time, and its unit behind a colon: s, ms, us, ns, min, h, iso, sec+nanosec
-    /// [default: t, or a usual name of a time]
+    /// Column of the time, and its unit after a colon: s, ms, us, ns, min, h, iso, sec+nanosec
+    /// [default: t, or a default name of a time]
     #[arg(long, value_name = "COLUMN[:UNIT]", value_parser = parse_time)]
     pub time: Option<TimeChoice>,
     /// Column that counts the trials of a file, each a record of its own (t: where the time starts again),
@@ -34,7 +34,7 @@ pub struct LookArgs {
     /// Sampling frequency in Hz; replaces the column t
     #[arg(long, value_name = "HZ")]
     pub fs: Option<f64>,
-    /// Begin of the span that counts, s [default: whole periods of the excitation]
+    /// Start of the span that counts, s [default: whole periods of the excitation]
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub from: Option<f64>,
     /// End of the span that counts, s
@@ -43,9 +43,9 @@ pub struct LookArgs {
 }
 
 impl LookArgs {
-    /// What was typed.
-    pub fn known(&self) -> Known {
-        Known {
+    /// The text as typed.
+    pub fn known(&self) -> LookOptions {
+        LookOptions {
             input: self.input.clone(),
             output: self.output.clone(),
             excitation: self.excitation.clone(),

@@ -1,4 +1,4 @@
-//! What can be typed. The texts here are the help pages; each option states its default and unit.
+//! Accepted input. The texts here are the help pages; each option states its default and unit.
 //!
 //! | module | options of |
 //! |---|---|
@@ -57,7 +57,7 @@ pub use reading::{MaskArgs, ReadArgs};
 pub use recursion::{RecursionArgs, StreamArgs, TrackArgs};
 #[cfg(test)]
 pub use settings::with_settings;
-pub use settings::{flag, in_words, methods_with};
+pub use settings::{as_text, flag, methods_with};
 pub use shell::{CompletionsArgs, ManArgs};
 pub use show::ShowArgs;
 pub use simulate::{DemoArgs, MarginsArgs, ScenarioChoice, SimulateArgs, StateName};

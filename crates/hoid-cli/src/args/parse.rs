@@ -8,7 +8,9 @@ pub fn parse_span(text: &str) -> Result<(f64, f64), String> {
         .and_then(|(low, high)| Some((number(low)?, number(high)?)));
     match ends {
         Some((low, high)) if low <= high => Ok((low, high)),
-        _ => Err(format!("{text:?} is no span; write LO..HI with LO <= HI, as 0.05..0.6")),
+        _ => Err(format!(
+            "{text:?} is not a span; write LO..HI with LO <= HI, as 0.05..0.6"
+        )),
     }
 }
 
@@ -20,7 +22,7 @@ pub fn parse_width(text: &str) -> Result<f64, String> {
         .into_iter()
         .find_map(of)
         .filter(|mm| (10.0..=2000.0).contains(mm))
-        .ok_or_else(|| format!("{text:?} is no width; write one from 10mm to 2000mm, as 85mm, 17cm or 3.3in"))
+        .ok_or_else(|| format!("{text:?} is not a width; write one from 10mm to 2000mm, as 85mm, 17cm or 3.3in"))
 }
 
 /// Most samples ahead of a prediction that is judged.
@@ -29,7 +31,7 @@ const MOST_AHEAD: usize = 1_000_000;
 /// A number of samples ahead.
 pub fn parse_horizon(text: &str) -> Result<usize, String> {
     let samples = text.trim().parse().ok().filter(|k| (1..=MOST_AHEAD).contains(k));
-    samples.ok_or_else(|| format!("{text:?} is no number of samples ahead; write 1 to {MOST_AHEAD}"))
+    samples.ok_or_else(|| format!("{text:?} is not a number of samples ahead; write 1 to {MOST_AHEAD}"))
 }
 
 #[cfg(test)]

@@ -21,8 +21,8 @@ pub struct ReadArgs {
     /// Column of the output (control): a name, -name, or a difference
     #[arg(long, value_name = "COLUMN", default_value = "u", allow_hyphen_values = true)]
     pub output: String,
-    /// Column of the time, and its unit behind a colon where it is not found by itself: s, ms, us, ns,
-    /// min, h, iso (dates and times), sec+nanosec [default: t, or a usual name of a time]
+    /// Column of the time, and its unit after a colon where it is not found automatically: s, ms, us, ns, min, h, iso
+    /// (dates and times), sec+nanosec [default: t, or a default name of a time]
     #[arg(long, value_name = "COLUMN[:UNIT]", value_parser = parse_time)]
     pub time: Option<TimeChoice>,
     /// Column that counts the trials of a file, each a record of its own (t: where the time starts again),
@@ -51,14 +51,14 @@ pub struct ReadArgs {
     pub detrend: Detrend,
 }
 
-/// What is done to a record before it is used, in this order.
+/// Treatment of a record before it is used, in this order.
 #[derive(Debug, Clone, Args)]
 pub struct PrepareArgs {
-    /// Units that the file does not say, as e=deg,u=deg: units are printed only where they are
+    /// Units that the file does not report, as e=deg,u=deg: units are printed only where they are
     /// declared
     #[arg(long, value_name = "CHANNEL=UNIT", value_parser = parse_unit, value_delimiter = ',')]
     pub unit: Vec<(String, String)>,
-    /// Drop rows that are there twice, time included
+    /// Drop rows that are duplicated, time included
     #[arg(long)]
     pub drop_repeated: bool,
     /// Multiply a channel: by a factor (u=12.5), into a unit (u=12.5:deg), or from unit to unit
@@ -71,11 +71,11 @@ pub struct PrepareArgs {
     pub offset: Vec<(String, Offset)>,
     #[command(flatten)]
     pub rate: DecimateArgs,
-    /// Bring evenly sampled data to another sampling frequency in Hz, behind a low-pass filter on
+    /// Bring evenly sampled data to another sampling frequency in Hz, after a low-pass filter on
     /// all channels alike
     #[arg(long, value_name = "HZ", conflicts_with = "decimate")]
     pub new_fs: Option<f64>,
-    /// Drop the first seconds of what is read
+    /// Drop the first seconds of the data read
     #[arg(long, value_name = "S")]
     pub run_in: Option<f64>,
 }
@@ -83,15 +83,15 @@ pub struct PrepareArgs {
 /// Whether the sampling rate is lowered.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct DecimateArgs {
-    /// Keep every M-th sample behind a linear-phase low-pass filter on all channels alike; auto: above
-    /// 200 Hz by the M that comes nearest to 100 Hz, where an operator is fitted or tracked. A
-    /// polynomial structure, and a delay in samples, take the samples as they are unless M is named
+    /// Keep every M-th sample after a linear-phase low-pass filter on all channels alike; auto: above 200 Hz by the M
+    /// that comes nearest to 100 Hz, where an operator is fitted or tracked. A polynomial structure, and a delay in
+    /// samples, take the samples as they are unless M is named
     #[arg(long, value_name = "auto|off|M", default_value_t = Decimation::Auto)]
     pub decimate: Decimation,
 }
 
 impl DecimateArgs {
-    /// What is done for an estimator; what counts samples is not decimated by itself.
+    /// Processing for an estimator; what counts samples is not decimated automatically.
     pub fn of(self, counts_samples: bool) -> Decimation {
         if counts_samples {
             self.decimate.when_named()
@@ -101,11 +101,11 @@ impl DecimateArgs {
     }
 }
 
-/// What is left out of a record.
+/// Parts that are left out of a record.
 #[derive(Debug, Args)]
 pub struct MaskArgs {
-    /// Leave out what is wrong with the sampling (see `hoid info`): the record is cut there, and
-    /// each segment has initial states of its own
+    /// Leave out the problems of the sampling (see `hoid info`): the record is cut there, and each
+    /// segment has initial states of its own
     #[arg(long, value_name = "KINDS", value_delimiter = ',', value_parser = choice_of(&QualityIssueKind::MASKABLE))]
     pub mask: Vec<QualityIssueKind>,
     /// Shortest segment between masked samples that is used, s
@@ -113,12 +113,11 @@ pub struct MaskArgs {
     pub shortest: f64,
 }
 
-/// What is done about faults of a recording.
+/// Treatment of faults of a recording.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct FaultArgs {
-    /// Faults of the recording (spikes, dropouts, frozen and idle stretches, wraps, steps): bridge what
-    /// lasts up to 0.1 s and cut the record at what is longer, cut all, report and leave the data as
-    /// they are, or keep: look for none
+    /// Faults of the recording (spikes, dropouts, frozen and idle stretches, wraps, steps): bridge faults of up to 0.1
+    /// s and cut the record at longer ones, cut all, report and leave the data as they are, or keep: look for none
     #[arg(long, value_name = "WHAT", default_value = "bridge", value_parser = choice_of(&FaultHandling::ALL))]
     pub faults: FaultHandling,
 }

@@ -20,7 +20,7 @@ use super::{
     show::ShowArgs, udp::UdpPlaces,
 };
 
-/// What is tracked, and how.
+/// The tracked signal, and how.
 #[derive(Debug, Args)]
 pub struct RecursionArgs {
     /// The recursion
@@ -35,14 +35,14 @@ pub struct RecursionArgs {
     #[arg(long, value_name = "LIST")]
     pub orders: Option<String>,
     /// Delay of b0 in samples (29), or dead time in s (0.28s); a number or a range (20..40,
-    /// 0.1s..0.4s) to search on the start span [default: 0.05 to 0.6 s; adaptive begins at 0.2 s and
+    /// 0.1s..0.4s) to search on the start span [default: 0.05 to 0.6 s; adaptive starts at 0.2 s and
     /// follows the delay]
     #[arg(long, value_name = "N|Ss|LO..HI")]
     pub nk: Option<DelayRange>,
     /// Dead time tau_e in s in place of --nk: .28, or a range (0.1..0.4) to search on the start span
     #[arg(long, value_name = "S|LO..HI", conflicts_with = "nk")]
     pub delay: Option<OneOrSpan>,
-    /// What decides between candidates when something is searched
+    /// Criterion that decides between candidates when something is searched
     #[arg(long, value_name = "NAME", default_value = "bic", value_parser = choice_of(&Criterion::ALL))]
     pub criterion: Criterion,
     /// Where the recursion starts: all coefficients as f1=-1.9,f2=.92,b0=.04,... or `nothing`
@@ -54,7 +54,7 @@ pub struct RecursionArgs {
     /// Magnitude of e or u beyond which a sample is taken for a fault and skipped
     #[arg(long, value_name = "X", default_value = "1e6")]
     pub largest: f64,
-    /// Frequencies in rad/s at which gain and phase are told, with errors, as 0.5,1,2.5
+    /// Frequencies in rad/s at which gain and phase are reported, with errors, as 0.5,1,2.5
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub at: Vec<f64>,
     /// Controlled element in s, as 90/(s(s+6)), or NUM/DEN by descending powers of s, as 90/1,6,0:
@@ -174,7 +174,7 @@ pub(super) fn method_names() -> impl TypedValueParser<Value = String> {
 fn parse_count(text: &str) -> Result<usize, String> {
     match text.trim().parse::<usize>() {
         Ok(n) if n > 0 => Ok(n),
-        _ => Err(format!("{text:?} is no number of samples; write 1 or more")),
+        _ => Err(format!("{text:?} is not a number of samples; write 1 or more")),
     }
 }
 
@@ -182,7 +182,7 @@ fn parse_frequency(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(hz) if hz > 0.0 && hz.is_finite() => Ok(hz),
         _ => Err(format!(
-            "{text:?} is no frequency; write a positive number in Hz, as 100"
+            "{text:?} is not a frequency; write a positive number in Hz, as 100"
         )),
     }
 }

@@ -23,7 +23,7 @@ pub struct Batch;
 
 /// Who has options.
 pub trait Registry {
-    /// What there is, in the order of help.
+    /// The available items, in the order of help.
     fn specs() -> Vec<MethodSpec>;
 }
 
@@ -39,7 +39,7 @@ impl Registry for Batch {
     }
 }
 
-/// What was typed: name and text, in the order of the registry.
+/// The text as typed: name and text, in the order of the registry.
 #[derive(Debug, Clone, Default)]
 pub struct SettingArgs<R = Recursive> {
     given: Vec<(&'static str, String)>,
@@ -58,7 +58,7 @@ impl<R> SettingArgs<R> {
     }
 }
 
-/// The flag of an option: its name, but for one that no language lets its keywords have.
+/// The flag of an option: its name, except for one that no language lets its keywords have.
 pub fn flag(name: &str) -> String {
     match name {
         "answers" => "for".to_owned(),
@@ -67,7 +67,7 @@ pub fn flag(name: &str) -> String {
 }
 
 /// Estimators and methods as help names them, groups by one word.
-pub fn in_words(names: &[&str]) -> String {
+pub fn as_text(names: &[&str]) -> String {
     let operators = [OPERATOR, REMNANT, CHANGE];
     let polynomials: Vec<&str> = [PEM].into_iter().chain(IvMethod::ALL.map(IvMethod::name)).collect();
     let mut words: Vec<String> = Vec::new();
@@ -107,7 +107,7 @@ fn argument(setting: &Setting, methods: &[MethodSpec]) -> Arg {
     let arg = Arg::new(setting.name)
         .long(flag(setting.name))
         .help(help(setting, methods))
-        .allow_hyphen_values(!matches!(setting.kind, Kind::Flag | Kind::NumberOrUsual(_)));
+        .allow_hyphen_values(!matches!(setting.kind, Kind::Flag | Kind::NumberOrDefault(_)));
     match setting.kind {
         Kind::Flag => arg.action(ArgAction::SetTrue),
         Kind::Choice(words) => {
@@ -116,7 +116,7 @@ fn argument(setting: &Setting, methods: &[MethodSpec]) -> Arg {
         }
         Kind::Count => arg.value_name("N"),
         Kind::Counts => arg.value_name("N|LO..HI"),
-        Kind::NumberOrUsual(_) => arg.value_name("X").num_args(0..=1).default_missing_value("true"),
+        Kind::NumberOrDefault(_) => arg.value_name("X").num_args(0..=1).default_missing_value("true"),
         Kind::NumberOrSpan => arg.value_name("X|LO..HI"),
         Kind::Delay => arg.value_name("N|Ss|LO..HI"),
         Kind::Names => arg.value_name("NAMES"),
@@ -141,7 +141,7 @@ fn help(setting: &Setting, methods: &[MethodSpec]) -> String {
     }
     let of = methods_with(setting.name, methods);
     if of.len() < methods.len() {
-        text.push_str(&format!(" [for {}]", in_words(&of)));
+        text.push_str(&format!(" [for {}]", as_text(&of)));
     }
     let mut defaults: Vec<(&str, Vec<&str>)> = Vec::new();
     for spec in methods {
@@ -159,7 +159,7 @@ fn help(setting: &Setting, methods: &[MethodSpec]) -> String {
             let each = several
                 .iter()
                 .filter(|(default, _)| !default.is_empty())
-                .map(|(default, names)| format!("{default} for {}", in_words(names)));
+                .map(|(default, names)| format!("{default} for {}", as_text(names)));
             each.collect::<Vec<_>>().join("; ")
         }
     };

@@ -14,7 +14,7 @@ pub struct CompletionsArgs {
 
 #[derive(Debug, Args)]
 pub struct ManArgs {
-    /// Directory for the pages, one a command; it is made if it is not there
+    /// Directory for the pages, one a command; it is made if it is missing
     #[arg(value_name = "DIR")]
     pub directory: PathBuf,
 }

@@ -6,8 +6,7 @@ use clap::Args;
 
 #[derive(Debug, Clone, Args)]
 pub struct ShowArgs {
-    /// Print what is behind the answer as well: other methods, candidates, roots, tests of residuals,
-    /// and every setting
+    /// Print what is after the answer as well: other methods, candidates, roots, tests of residuals, and every setting
     #[arg(short, long)]
     pub verbose: bool,
     /// Print one JSON object instead of tables

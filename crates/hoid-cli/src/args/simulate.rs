@@ -12,7 +12,7 @@ use super::choices::choice_of;
 
 #[derive(Debug, Args)]
 pub struct DemoArgs {
-    /// Directory for the record, the results and the report; it is made if it is not there
+    /// Directory for the record, the results and the report; it is made if it is missing
     #[arg(long, value_name = "DIR", default_value = "hoid-demo")]
     pub out: PathBuf,
     /// Seed of the simulated run
@@ -20,11 +20,11 @@ pub struct DemoArgs {
     pub seed: u64,
 }
 
-/// A condition of the reference text or a scenario file.
+/// A condition of the thesis or a scenario file.
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
 pub struct ScenarioChoice {
-    /// Condition of the reference text: C1 to C6
+    /// Condition of the thesis: C1 to C6
     #[arg(long, value_name = "C1..C6")]
     pub condition: Option<Condition>,
     /// Scenario file (TOML)
@@ -43,8 +43,8 @@ pub struct SimulateArgs {
     /// Noise level P_n; 0 is a run without remnant [default: 0.1, or the scenario's]
     #[arg(long, value_name = "P_N")]
     pub noise_level: Option<f64>,
-    /// What the noise level is a share of: var(u_n)/var(u) or var(n)/var(u)
-    /// [default: response, or the scenario's]
+    /// Reference of the noise level: var(u_n)/var(u) or var(n)/var(u) [default: response, or the
+    /// scenario's]
     #[arg(long, value_name = "WHICH", value_parser = choice_of(&NoiseDefinition::ALL))]
     pub noise_definition: Option<NoiseDefinition>,
     /// Remnant time constant T_n in s [default: 0.06, or the scenario's]
@@ -53,8 +53,8 @@ pub struct SimulateArgs {
     /// Sample time Ts in s [default: 0.01, or the scenario's]
     #[arg(long, value_name = "S")]
     pub sample_time: Option<f64>,
-    /// Where K_c stands when it changes: in the input matrix (x stays continuous) or in the output
-    /// matrix (as in the reference text) [default: input, or the scenario's]
+    /// Position of K_c when it changes: in the input matrix (x stays continuous) or in the output
+    /// matrix (as in the thesis) [default: input, or the scenario's]
     #[arg(long, value_name = "WHERE", value_parser = choice_of(&Realisation::ALL))]
     pub realisation: Option<Realisation>,
     /// Seed of the random streams
@@ -86,7 +86,7 @@ pub struct MarginsArgs {
     /// Noise levels P_n for the remnant gains
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = [0.01, 0.1, 0.2, 0.3])]
     pub noise_levels: Vec<f64>,
-    /// What the noise level is a share of: var(u_n)/var(u) or var(n)/var(u)
+    /// Reference of the noise level: var(u_n)/var(u) or var(n)/var(u)
     #[arg(long, value_name = "WHICH", default_value = "response", value_parser = choice_of(&NoiseDefinition::ALL))]
     pub noise_definition: NoiseDefinition,
     /// Print one JSON object instead of tables

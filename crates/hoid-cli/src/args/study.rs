@@ -11,7 +11,7 @@ pub enum StudyCommand {
     Run(StudyRunArgs),
     /// Join the shards of a study that were run apart
     Merge(StudyMergeArgs),
-    /// Check a plan and say what it would do, without running anything
+    /// Check a plan and report what it would do, without running anything
     Check(StudyCheckArgs),
     /// List the plans that come with the program, or write one of them to standard output
     Plans(StudyPlansArgs),
@@ -24,7 +24,7 @@ pub struct StudyRunArgs {
     /// Plan in TOML, or the name of a plan that comes with the program
     #[arg(value_name = "PLAN")]
     pub plan: PathBuf,
-    /// Directory for the results; it is made if it is not there
+    /// Directory for the results; it is made if it is missing
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// Replications of each cell instead of those of the plan
@@ -36,7 +36,7 @@ pub struct StudyRunArgs {
     /// Threads. Default: one a core
     #[arg(long, value_name = "J", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
-    /// Go on with a study that was stopped
+    /// Continue with a study that was stopped
     #[arg(long)]
     pub resume: bool,
     /// Write CSV instead of Parquet
@@ -86,8 +86,8 @@ pub struct ReproduceArgs {
     /// Replications of each cell; 10 for a quick look
     #[arg(long, value_name = "M", default_value_t = 100)]
     pub replications: u64,
-    /// Directory for tables, figures, their data and the index page; studies that are there already
-    /// are not run again
+    /// Directory for tables, figures, their data and the index page; studies that are already
+    /// present are not run again
     #[arg(long, value_name = "DIR", default_value = "hoid-reproduction")]
     pub out: PathBuf,
     /// Threads. Default: one a core

@@ -19,7 +19,7 @@ impl FromStr for UdpPlaces {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let wrong = || {
             format!(
-                "{text:?} is no pair of ports; write 5005:5006 for ports of this computer, or \
+                "{text:?} is not a pair of ports; write 5005:5006 for ports of this computer, or \
                  0.0.0.0:5005:192.168.1.7:5006 with addresses (IPv4)"
             )
         };
@@ -43,10 +43,10 @@ impl FromStr for UdpPlaces {
         };
         if output.port() == 0 {
             return Err(format!(
-                "{text:?}: nobody listens on port 0; name the port of the answers"
+                "{text:?}: no one listens on port 0; name the port of the answers"
             ));
         }
-        // Whoever listens on 0.0.0.0 listens on every address of this computer, and 0.0.0.0 leads there too.
+        // Code that listens on 0.0.0.0 listens on every address of this computer, and 0.0.0.0 leads there too.
         let is_here = |ip: IpAddr| ip.is_loopback() || ip.is_unspecified();
         let heard = input.ip() == output.ip()
             || (input.ip().is_unspecified() || output.ip().is_unspecified())

@@ -6,7 +6,7 @@ use hoid::design::compare::{Comparing, Comparison, Difference, GroupEstimates, V
 use hoid::model::numbers::{self, with_uncertainty};
 use hoid::report::{PaperTable, comparison_figure};
 
-use super::{figure, paper_table, places};
+use super::{figure, output_paths, paper_table};
 use crate::{args::CompareArgs, error::CliError, json, output, table::Rows, text};
 
 /// The files of `--out`: tables, the figure, the sentences.
@@ -21,7 +21,7 @@ pub fn run(args: &CompareArgs) -> Result<(), CliError> {
     }
     paper_table::check(&args.show)?;
     let files = [args.picture.figure.as_deref(), args.show.table.as_deref()];
-    places::check(&[&args.results], &files, &[])?;
+    output_paths::check(&[&args.results], &files, &[])?;
     if let Some(out) = &args.out {
         hoid::io::check_output_directory(out, &[&args.results])?;
     }
@@ -109,7 +109,7 @@ fn differences(found: &Comparison) -> Rows {
         .iter()
         .filter_map(|d| Some(d.effect_size.as_ref()?.name.as_str()))
         .collect();
-    // One size for all stands in the head.
+    // One size for all is in the head.
     let size = sizes.first().filter(|name| sizes.iter().all(|other| other == *name));
     let mut header = vec!["quantity"];
     header.extend(several.then_some("factor"));

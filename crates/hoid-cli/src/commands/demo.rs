@@ -15,9 +15,9 @@ use hoid::report::{BatchLine, ModelSection, Report, TraceSection, TrackReport, k
 use hoid::sim::{RunSeed, Simulator};
 use hoid::track::{Method, OPERATOR_COLUMNS, StartAt, Trace, TrackOptions, track};
 
-use crate::{args::DemoArgs, commands::places, error::CliError, output, text};
+use crate::{args::DemoArgs, commands::output_paths, error::CliError, output, text};
 
-/// The spans of the reference text (V.B) that lie wholly before and wholly after the change, s.
+/// The spans of the thesis (V.B) that lie wholly before and wholly after the change, s.
 const SPANS: [(&str, f64, f64); 2] = [("before", 0.0, 30.72), ("after", 51.2, 81.92)];
 
 struct Stage {
@@ -28,7 +28,7 @@ struct Stage {
 }
 
 pub fn run(args: &DemoArgs) -> Result<(), CliError> {
-    places::check(&[], &[], &[Some(&args.out)])?;
+    output_paths::check(&[], &[], &[Some(&args.out)])?;
     let scenario = Scenario::condition(Condition::C4);
     let run_seed = RunSeed {
         seed: args.seed,
@@ -63,17 +63,17 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Traces of the whole run: the default, which is told nothing, and the two methods of the text, from the batch
-/// fit before the change on.
+/// Traces of the whole run: the default, which gets no information, and the two methods of the text, from the batch fit
+/// before the change on.
 fn tracked(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, CliError> {
     let (_, from, to) = SPANS[0];
     let nk = stages[0].choice.fit.orders().nk;
     [Method::adaptive(), Method::rls(), Method::rpem()]
         .into_iter()
         .map(|method| {
-            let structure = method.usual_structure();
+            let structure = method.default_structure();
             let (options, told) = if method.starts_itself() {
-                let options = TrackOptions::told_nothing(method.clone(), record.sample_time());
+                let options = TrackOptions::without_prior(method.clone(), record.sample_time());
                 (options, "told nothing".to_owned())
             } else {
                 let options = TrackOptions {

@@ -1,4 +1,5 @@
-//! `hoid design`: the forcing function that tells most of a person, and the errors to be expected.
+//! `hoid design`: the forcing function that is most informative about a person, and the errors to
+//! be expected.
 
 use std::path::Path;
 
@@ -12,13 +13,13 @@ use hoid::model::{
 };
 use serde_json::{Map, Value, json};
 
-use super::{paper_table, places};
+use super::{output_paths, paper_table};
 use crate::{args::DesignArgs, error::CliError, json, output, text};
 
 /// `--against` of the ten sines of the text.
 const REFERENCE: &str = "reference";
 
-/// A forcing function that is judged beside the design, over the same time.
+/// A forcing function that is judged next to the design, over the same time.
 struct Other {
     name: String,
     expected: Expected,
@@ -26,7 +27,7 @@ struct Other {
 
 pub fn run(args: &DesignArgs) -> Result<(), CliError> {
     paper_table::check(&args.show)?;
-    places::check(&[&args.people], &[args.show.table.as_deref()], &[])?;
+    output_paths::check(&[&args.people], &[args.show.table.as_deref()], &[])?;
     if let Some(out) = &args.out {
         hoid::io::check_output_directory(out, &[&args.people])?;
     }
@@ -75,7 +76,9 @@ pub fn run(args: &DesignArgs) -> Result<(), CliError> {
 fn person(args: &DesignArgs) -> Result<FamilyState, CliError> {
     let element = || -> Result<ContinuousTransferFunction, CliError> {
         let missing = || {
-            CliError::Usage("a fit does not say what was controlled: add --controlled-element '90/(s(s+6))'".to_owned())
+            CliError::Usage(
+                "a fit does not report the controlled element: add --controlled-element '90/(s(s+6))'".to_owned(),
+            )
         };
         args.controlled_element.clone().ok_or_else(missing)
     };
@@ -97,7 +100,7 @@ fn family(path: &Path) -> Result<hoid::model::FamilyScenario, CliError> {
     match read_any_scenario(path)? {
         AnyScenario::Family(scenario) => Ok(*scenario),
         AnyScenario::Reference(_) => Err(CliError::Usage(format!(
-            "{} is a scenario of the reference text; write one with the key form, as form = \"lead\"",
+            "{} is a scenario of the thesis; write one with the key form, as form = \"lead\"",
             path.display()
         ))),
     }

@@ -7,7 +7,8 @@ use hoid::report::figures::{FigureFormat, with_width_mm};
 
 use crate::{error::CliError, output};
 
-/// Whether a figure can be written in the format that its name says: known before anything is read.
+/// Whether a figure can be written in the format that its name states: known before anything is
+/// read.
 ///
 /// # Errors
 /// [`CliError::Usage`].
@@ -31,7 +32,7 @@ fn format_of(path: &Path) -> Result<FigureFormat, CliError> {
 /// Writes a figure, with a width on paper where one was given.
 ///
 /// # Errors
-/// Those of the format and of writing.
+/// The errors of the format and of writing.
 pub fn write(path: &Path, svg: &str, width_mm: Option<f64>) -> Result<(), CliError> {
     let sized = width_mm.map(|mm| with_width_mm(svg, mm));
     let bytes = format_of(path)?.bytes(sized.as_deref().unwrap_or(svg))?;

@@ -13,7 +13,7 @@ use hoid::io::{
 use hoid::model::SampleTime;
 use hoid::sim::{FamilyOperatorRun, FamilySimulator, RunSeed, Simulator};
 
-use super::places;
+use super::output_paths;
 use crate::{
     args::{FmuArgs, OperatorChoice},
     error::CliError,
@@ -31,7 +31,7 @@ pub fn run(args: &FmuArgs) -> Result<(), CliError> {
         None => of_tracker(args)?,
     };
     let inputs: Vec<&Path> = libraries.iter().chain(&read).map(PathBuf::as_path).collect();
-    places::check(&inputs, &[Some(&args.out)], &[])?;
+    output_paths::check(&inputs, &[Some(&args.out)], &[])?;
     let loaded: Vec<Library> = (libraries.iter())
         .map(|path| Library::read(path))
         .collect::<Result<_, IoError>>()?;
@@ -66,7 +66,7 @@ fn of_tracker(args: &FmuArgs) -> Result<Unit, CliError> {
         None => {}
         Some(file) if is_fit_file(file) => {
             let text = read_settings(Path::new(file))?;
-            // What could not begin with it is said here, not in a simulator.
+            // What could not start with it is reported here, not in a simulator.
             let fit = parse_fit(&text, file)?.operator()?;
             method.start_from(fit).map_err(|error| wrong(file, &error))?;
             settings = (settings.with_fit(text)).with("prior", FmuStart::Text("fit".to_owned()));
@@ -92,7 +92,7 @@ fn of_operator(operator: &OperatorChoice, seed: i32) -> Result<Unit, CliError> {
         ),
         OperatorChoice::File(file) => (read_settings(file)?, file.display().to_string(), vec![file.clone()]),
     };
-    // What could not begin is said here, not in a simulator.
+    // What could not start is reported here, not in a simulator.
     let step_s = match parse_any_scenario(&text, &source, &source)? {
         AnyScenario::Reference(scenario) => {
             Simulator::new(&scenario)?;
@@ -109,7 +109,7 @@ fn of_operator(operator: &OperatorChoice, seed: i32) -> Result<Unit, CliError> {
     Ok((settings, read, step_s))
 }
 
-/// The library beside this program, as installed or as built.
+/// The library next to this program, as installed or as built.
 fn beside_this_program() -> Result<PathBuf, CliError> {
     let program = env::current_exe().unwrap_or_default();
     let folder = program.parent().unwrap_or(Path::new("."));

@@ -1,9 +1,9 @@
-//! `hoid info`: what is inside of a file, before anything is identified.
+//! `hoid info`: contents of a file, before any identification.
 
 use std::collections::BTreeMap;
 
 use hoid::analysis::{Look, Role};
-use hoid::ident::faults::mend;
+use hoid::ident::faults::repair;
 use hoid::io::{ColumnSurvey, FileSurvey, SamplingSurvey, ValueSurvey};
 use hoid::model::{Fault, FaultHandling};
 use hoid::report::numbers;
@@ -37,11 +37,11 @@ pub fn run(args: &InfoArgs) -> Result<(), CliError> {
 /// The faults of error and control, where the file has them and they make a record.
 fn faults_of(look: &Look) -> Vec<Fault> {
     let seen = look.seen.as_ref().ok();
-    let mended = seen.and_then(|seen| mend(&seen.record, FaultHandling::Report).ok());
-    mended.map_or_else(Vec::new, |mended| mended.faults)
+    let repaired = seen.and_then(|seen| repair(&seen.record, FaultHandling::Report).ok());
+    repaired.map_or_else(Vec::new, |repaired| repaired.faults)
 }
 
-/// What the file looks like, and the command to type next.
+/// Layout of the file, and the next command.
 fn looks_like(look: &Look, file: &str) -> String {
     let role = |role: &Role| format!("{} ({})", role.column, role.why);
     let mut rows = vec![("input", role(&look.roles.input)), ("output", role(&look.roles.output))];
@@ -74,12 +74,12 @@ fn looks_like(look: &Look, file: &str) -> String {
     }
     text.push_str(&match look.advice() {
         Some(advice) => {
-            let mended = if look.seen.is_ok() {
+            let repaired = if look.seen.is_ok() {
                 ""
             } else {
                 ", with the remedy above"
             };
-            format!("Next{mended}: {}\n", advice.command("identify", file))
+            format!("Next{repaired}: {}\n", advice.command("identify", file))
         }
         None => {
             "Next: hoid identify with the columns of error and control: --input COLUMN --output COLUMN\n".to_owned()
@@ -125,7 +125,7 @@ fn words(file: &str, found: &FileSurvey) -> String {
     for sampling in &found.samplings {
         text.push_str(&sampled(sampling));
     }
-    // Most files say no units, and an empty column makes a table too wide for a screen.
+    // Most files state no units, and an empty column makes a table too wide for a screen.
     let has_units = found.columns.iter().any(|column| !column.unit.is_empty());
     let mut headings = vec!["column", "unit", "type", "rows", "min", "max", "mean", "deviation"];
     headings.retain(|heading| has_units || *heading != "unit");
@@ -200,7 +200,7 @@ fn sampled(s: &SamplingSurvey) -> String {
     line
 }
 
-/// What is suspicious in a column.
+/// Suspicious values in a column.
 fn remarks(v: &ValueSurvey) -> String {
     let mut remarks = Vec::new();
     if v.missing > 0 {

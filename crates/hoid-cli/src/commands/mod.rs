@@ -1,4 +1,4 @@
-//! One command a file. A command resolves what was typed once, calls the library, and prints.
+//! One command a file. A command resolves the text as typed once, calls the library, and prints.
 
 pub mod compare;
 pub mod convert;
@@ -12,8 +12,8 @@ pub mod identify;
 pub mod info;
 pub mod lab;
 pub mod margins;
+mod output_paths;
 mod paper_table;
-mod places;
 pub mod reading;
 pub mod reproduce;
 mod scenario;

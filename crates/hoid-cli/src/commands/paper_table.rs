@@ -9,7 +9,7 @@ use crate::{args::ShowArgs, error::CliError, output};
 /// Whether it can be written: known before anything is read.
 ///
 /// # Errors
-/// [`CliError::Usage`] for a name that stands for no format.
+/// [`CliError::Usage`] for a name that does not correspond to any format.
 pub fn check(show: &ShowArgs) -> Result<(), CliError> {
     let Some(path) = &show.table else { return Ok(()) };
     PaperTable::check(path).map_err(|_| {
@@ -21,10 +21,10 @@ pub fn check(show: &ShowArgs) -> Result<(), CliError> {
     })
 }
 
-/// Writes it where it is asked for, from the object of the result.
+/// Writes it where it is requested, from the object of the result.
 ///
 /// # Errors
-/// Those of the object and of writing.
+/// The errors of the object and of writing.
 pub fn write(show: &ShowArgs, object: impl FnOnce() -> Result<Map<String, Value>, CliError>) -> Result<(), CliError> {
     let Some(path) = &show.table else { return Ok(()) };
     match PaperTable::of(&object()?) {

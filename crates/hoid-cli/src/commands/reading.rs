@@ -13,16 +13,16 @@ use crate::{
 
 /// How files are read, as was typed.
 pub fn of(args: &ReadArgs, mask: Option<&MaskArgs>, with_input: bool) -> Result<Reading, CliError> {
-    let usual = Reading::default();
+    let default = Reading::default();
     Ok(Reading {
         options: options(args, with_input)?,
         preparation: preparation(args)?,
         mask: mask.map_or_else(Vec::new, |args| args.mask.clone()),
-        shortest_s: mask.map_or(usual.shortest_s, |args| args.shortest),
+        shortest_s: mask.map_or(default.shortest_s, |args| args.shortest),
     })
 }
 
-/// Tells what was left out of a file and what is wrong with it.
+/// Reports what was left out of a file and the problems of it.
 pub fn told(path: &Path, read: &ReadRecord) {
     let file = path.display().to_string();
     for note in &read.notes {
@@ -33,7 +33,7 @@ pub fn told(path: &Path, read: &ReadRecord) {
     }
 }
 
-/// Tells that a high rate was kept, where it was.
+/// Reports that a high rate was kept, where it was.
 pub fn say_kept(words: Option<String>) {
     if let Some(words) = words {
         output::notice("", words);
@@ -70,7 +70,7 @@ fn preparation(args: &ReadArgs) -> Result<Preparation, CliError> {
         units: by_channel("--unit", &prepare.unit)?,
         scale: by_channel("--scale", &prepare.scale)?,
         offset: by_channel("--offset", &prepare.offset)?,
-        // Decimation comes behind the search for faults, which a filter would hide.
+        // Decimation comes after the search for faults, which a filter would hide.
         rate: prepare.new_fs.map_or(NewRate::Kept, NewRate::Hz),
         run_in_s: prepare.run_in.unwrap_or(0.0),
         detrend: args.detrend,
@@ -78,7 +78,7 @@ fn preparation(args: &ReadArgs) -> Result<Preparation, CliError> {
     })
 }
 
-/// What was typed for each channel; one that is named twice contradicts itself.
+/// The text typed for each channel; one that is named twice contradicts itself.
 pub fn by_channel<T: Clone>(option: &str, typed: &[(String, T)]) -> Result<BTreeMap<String, T>, CliError> {
     let mut all = BTreeMap::new();
     for (name, value) in typed {

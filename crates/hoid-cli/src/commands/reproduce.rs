@@ -1,4 +1,4 @@
-//! `hoid reproduce`: the tables, figures and claims of the reference text.
+//! `hoid reproduce`: the tables, figures and claims of the thesis.
 
 use std::sync::atomic::Ordering;
 
@@ -7,7 +7,7 @@ use hoid::thesis::{
     reproduction::{CLAIMS, Reproduction, ReproductionEvent, items, reproduce},
 };
 
-use super::{places, study::stop_at_interrupt};
+use super::{output_paths, study::stop_at_interrupt};
 use crate::{args::ReproduceArgs, error::CliError, output};
 
 pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
@@ -15,7 +15,7 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
         let items = items().into_iter().map(|item| (item.name, item.title));
         let claims = (
             CLAIMS.to_owned(),
-            "Statements of the text, and what the data say of them".to_owned(),
+            "Statements of the text, and the evidence of the data on them".to_owned(),
         );
         let lines = items
             .chain([claims])
@@ -23,7 +23,7 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
         output::print(&lines.collect::<String>())?;
         return Ok(());
     }
-    places::check(&[], &[], &[Some(&args.out)])?;
+    output_paths::check(&[], &[], &[Some(&args.out)])?;
     let wanted = Reproduction {
         only: args.only.clone(),
         replications: args.replications,
@@ -53,7 +53,7 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
     })?;
     let Some(found) = found else {
         return Err(CliError::Stopped(format!(
-            "the reproduction was stopped; what is done is in {}, the same command goes on with it",
+            "the reproduction was stopped; completed parts are in {}, the same command continues with it",
             args.out.display()
         )));
     };

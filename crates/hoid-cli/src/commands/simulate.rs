@@ -8,12 +8,12 @@ use hoid::numerics::statistics::root_mean_square;
 use hoid::report::numbers;
 use hoid::sim::{FamilySimulator, RunSeed, Simulator};
 
-use super::{places, scenario::chosen_scenario};
+use super::{output_paths, scenario::chosen_scenario};
 use crate::{args::SimulateArgs, error::CliError, output};
 
 pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
     let inputs: Vec<&Path> = args.base.scenario.as_deref().into_iter().collect();
-    places::check(&inputs, &[Some(&args.out)], &[])?;
+    output_paths::check(&inputs, &[Some(&args.out)], &[])?;
     let run_seed = RunSeed {
         seed: args.seed,
         cell: args.cell,
@@ -90,7 +90,7 @@ fn with_changes(mut scenario: Scenario, args: &SimulateArgs) -> Result<Scenario,
     Ok(scenario)
 }
 
-/// The remnant of an operator of the family is what its file says.
+/// The remnant of an operator of the family is what its file states.
 fn of_family(mut scenario: FamilyScenario, args: &SimulateArgs) -> Result<FamilyScenario, CliError> {
     let remnant = [
         ("--remnant-order", args.remnant_order.is_some()),
@@ -100,7 +100,7 @@ fn of_family(mut scenario: FamilyScenario, args: &SimulateArgs) -> Result<Family
     ];
     if let Some((option, _)) = remnant.iter().find(|(_, given)| *given) {
         return Err(CliError::Usage(format!(
-            "{option} is of the reference text's remnant: in a scenario with a form the tables [[remnant]] say it"
+            "{option} is of the thesis's remnant: in a scenario with a form the tables [[remnant]] specify it"
         )));
     }
     if let Some(ts) = args.sample_time {

@@ -81,8 +81,8 @@ fn run_plan(args: &StudyRunArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Runs a plan or a group, by its name, into a directory with a progress bar of so many units; an
-/// interrupt stops it so that it can be resumed.
+/// Runs a plan or a group, by its name, into a directory with a progress bar of a given number of
+/// units; an interrupt stops it so that it can be resumed.
 pub fn with_progress(
     name: &str,
     directory: &Path,
@@ -105,13 +105,13 @@ pub fn with_progress(
         Ok(outcome)
     } else {
         Err(CliError::Stopped(format!(
-            "{name} was stopped; what is done is in {}, go on with --resume",
+            "{name} was stopped; completed parts are in {}, continue with --resume",
             directory.display()
         )))
     }
 }
 
-/// What the user should know of a directory, as warnings.
+/// Warnings about a directory, as warnings.
 fn say(directory: &Path, notes: &[String]) {
     for note in notes {
         output::warning(&directory.display().to_string(), note);

@@ -1,4 +1,4 @@
-//! What a study says of the operator's parameters: their relative bias, as a table of one screen.
+//! Report of a study on the operator's parameters: their relative bias, as a table of one screen.
 //!
 //! A row is an estimator in a cell: how many of its estimates are an operator, and for each parameter the
 //! median of `100 (estimate - true) / true` with its Monte Carlo error. The median, since single
@@ -29,7 +29,7 @@ const MOST_PARAMETERS: usize = 3;
 /// Rows of one screen.
 const MOST_ROWS: usize = 24;
 
-/// The answer of the tables of a study; empty where they have no bias of a parameter.
+/// The answer of the tables of a study; empty if they have no bias of a parameter.
 pub fn answer(tables: &[PathBuf]) -> Result<String, CliError> {
     let is_summary = |path: &&PathBuf| path.file_stem().is_some_and(|stem| stem == "summary");
     let Some(summary) = tables.iter().find(is_summary) else {
@@ -45,12 +45,12 @@ struct Row {
     estimator: String,
     /// All estimates.
     all: f64,
-    /// Rates of those that are no operator.
+    /// Rates of those that are not an operator.
     failed: f64,
     not_convertible: f64,
     /// Rate of those whose verdict is trustworthy, where there are verdicts.
     trustworthy: Option<f64>,
-    /// One a parameter, empty where there is none.
+    /// One a parameter, empty if there is none.
     biases: Vec<String>,
 }
 

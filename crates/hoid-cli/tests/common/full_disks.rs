@@ -1,5 +1,5 @@
-//! `study`, `group` and `track` on disks that are full before all is written: what stands there is whole, the blocks
-//! before the fault are not lost, and on another disk the command goes on to the files of a run that nothing befell.
+//! `study`, `group` and `track` on disks that are full before all is written: what is there is whole, the blocks before
+//! the fault are not lost, and on another disk the command goes on to the files of a run that nothing befell.
 //!
 //! A disk of a size drawn between a page and what a whole run takes at most is full at a write drawn alike.
 
@@ -19,19 +19,19 @@ const PAGE_KB: usize = 4;
 pub struct Outcome {
     /// Rounds whose disk was full.
     pub full: usize,
-    /// Whole blocks that stood there.
+    /// Whole blocks that was there.
     pub blocks: usize,
     pub failures: Vec<String>,
 }
 
-/// So many rounds of a work; none where no disk of its own can be mounted.
+/// A given number of rounds of a work; none if no disk of its own can be mounted.
 pub fn rounds(bench: &Bench, work: &Work, count: usize, draw: &mut Draw) -> Option<Outcome> {
     let whole = bench.place(work, "whole");
     fs::create_dir_all(&whole).unwrap();
     bench.whole(work, "whole");
     let expected = files(&whole);
     let bytes = |all: &std::collections::BTreeMap<_, Vec<u8>>| all.values().map(Vec::len).sum::<usize>();
-    // Blocks stand beside the tables that are made of them.
+    // Blocks are next to the tables that are made of them.
     let largest_kb = PAGE_KB * (expected.len() + 2) + (1 + usize::from(work.has_parts)) * bytes(&expected) / 1024;
     let at = bench.at.join("disk");
     fs::create_dir_all(&at).unwrap();
@@ -76,7 +76,7 @@ pub fn rounds(bench: &Bench, work: &Work, count: usize, draw: &mut Draw) -> Opti
         let again = bench.command(work, &place).output().unwrap();
         let said = String::from_utf8_lossy(&again.stderr).into_owned();
         if !again.status.success() || said.contains("damaged") {
-            fail(format!("goes on with {}: {said}", again.status));
+            fail(format!("continues with {}: {said}", again.status));
         }
         compare(&expected, &place, &what).into_iter().for_each(&mut fail);
         fs::remove_dir_all(&place).unwrap();

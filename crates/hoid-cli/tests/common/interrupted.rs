@@ -32,15 +32,15 @@ pub struct Work {
     pub name: &'static str,
     /// Before `--out`.
     pub arguments: &'static [&'static str],
-    /// What lets it go on.
+    /// What lets it continue.
     pub resume: &'static [&'static str],
-    /// Whether its blocks stand in `parts/` of the directory itself.
+    /// Whether its blocks are in `parts/` of the directory itself.
     pub has_parts: bool,
     /// What of its place is given to `--out`.
     pub out: &'static str,
 }
 
-/// Blocks that stand in `parts/`.
+/// Blocks that are in `parts/`.
 pub const STUDY: Work = Work {
     name: "study",
     arguments: &["study", "run", "plan.toml", "--jobs", "1"],
@@ -137,8 +137,8 @@ impl Bench {
     }
 }
 
-/// All files below a directory, by their paths. The page of a reproduction says how long its studies
-/// took, which is the one thing that differs.
+/// All files below a directory, by their paths. The page of a reproduction reports how long its
+/// studies took, which is the one thing that differs.
 pub fn files(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut open = vec![directory.to_owned()];
@@ -176,7 +176,7 @@ pub fn compare(expected: &BTreeMap<PathBuf, Vec<u8>>, directory: &Path, what: &s
     all.into_iter().filter_map(differs).collect()
 }
 
-/// The program that is built beside this example.
+/// The program that is built next to this example.
 pub fn beside_this() -> PathBuf {
     let mut path = std::env::current_exe().unwrap();
     path.pop();

@@ -28,7 +28,7 @@ pub fn run(at: &Path, command: &str, stdin: Option<&str>) -> Output {
         .unwrap()
 }
 
-/// Exit code, what was printed, and rows of the tables that were written.
+/// Exit code, the printed data, and rows of the tables that were written.
 pub fn of(at: &Path, call: &Call) -> Value {
     let out = |text: &str| text.replace("{out}", &call.name);
     let done = run(at, &out(&call.command), call.stdin.as_deref());

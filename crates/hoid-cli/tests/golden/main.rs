@@ -1,4 +1,4 @@
-//! The golden set: recorded answers of the program. They say what changed when something was moved.
+//! The golden set: recorded answers of the program. They show what changed when something was moved.
 //!
 //! `fixtures/golden/calls.toml` lists the inputs and the calls, `fixtures/golden/command-line/` holds an
 //! answer each. Inputs are simulated here, in a folder that is thrown away. `python/tests/test_golden.py`
@@ -50,7 +50,7 @@ fn answers_are_what_they_were() {
         .collect();
     assert!(
         changes.is_empty(),
-        "{} answers changed; where that is meant, say so in the commit and renew them by HOID_UPDATE_GOLDEN=1:\n{}",
+        "{} answers changed; where that is meant, report it in the commit and renew them by HOID_UPDATE_GOLDEN=1:\n{}",
         changes.len(),
         changes.join("\n")
     );

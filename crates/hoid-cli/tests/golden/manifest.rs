@@ -7,7 +7,7 @@ use serde::Deserialize;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
-    /// Relative difference of numbers that is none.
+    /// Relative difference of numbers that is invalid.
     pub tolerance: f64,
     #[serde(rename = "input")]
     pub inputs: Vec<Input>,
@@ -15,7 +15,7 @@ pub struct Manifest {
     pub calls: Vec<Call>,
 }
 
-/// A file that calls read: made by the program, of another one, or written as it stands.
+/// A file that calls read: made by the program, of another one, or written unchanged.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Input {

@@ -1,29 +1,30 @@
 //! Other operators that predict u about as well.
 //!
-//! The covariance of an estimate is that about one top of the likelihood. Poles and delay have others, and
-//! what people do below 10 rad/s says little of which is right. So the operators at which the starts elsewhere
-//! have ended count too, each with the weight `w = exp(-behind/SLOWLY) f^2`, where `behind` is by how much
-//! its evidence was less and f the share of the samples of now that there were then: the scatter about the estimate is `sum w d d'/(1 + sum w)`.
-//! The evidence is tempered, for it supposes that the model is right (P. Grunwald and T. van Ommen, *Bayesian
-//! Analysis* 12 (2017) 1069-1103); and what they left open, more samples have made narrower.
+//! The covariance of an estimate describes one mode of the likelihood. Poles and delay have several, and the response of
+//! people below 10 rad/s carries little information about the right one. The operators at which the trials from other
+//! starting points ended therefore widen the errors, each with the weight `w = exp(-deficit/TEMPERATURE_NATS) f^2`, where
+//! `deficit` is its evidence below that of the estimate, and f the share of the current samples that it was fitted to. The
+//! scatter about the estimate is `sum w d d'/(1 + sum w)`. The evidence is tempered, since it assumes that the model is
+//! right (P. Grunwald and T. van Ommen, *Bayesian Analysis* 12 (2017) 1069-1103); f removes results that later samples have
+//! overtaken.
 
 use super::sizes::{PARAMETERS, STARTS};
 
-/// Evidence by which another is worse when it counts for 1/e of the estimate, nats.
-const SLOWLY: f64 = 3.0;
+/// Deficit of evidence at which an alternative has the weight 1/e, nats.
+const TEMPERATURE_NATS: f64 = 3.0;
 
-/// Where a start has ended.
+/// The result of a trial from another starting point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Alternative {
     operator: [f64; PARAMETERS],
-    behind: f64,
+    deficit: f64,
     samples: u64,
     known: bool,
 }
 
-crate::state!([] Alternative { operator, behind, samples, known });
+crate::state!([] Alternative { operator, deficit, samples, known });
 
-/// Those of all starts.
+/// The results of all starting points.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Alternatives {
     all: [Alternative; STARTS],
@@ -35,33 +36,32 @@ impl Alternatives {
     pub const NONE: Self = Self {
         all: [Alternative {
             operator: [0.0; PARAMETERS],
-            behind: 0.0,
+            deficit: 0.0,
             samples: 0,
             known: false,
         }; STARTS],
     };
 
-    /// Where a start has ended after so many samples, and by how much its evidence is less than that of the
-    /// estimate.
-    pub fn put(&mut self, start: usize, operator: [f64; PARAMETERS], behind: f64, samples: u64) {
+    /// Stores the result of a starting point: its operator, its deficit of evidence, and the number of samples then.
+    pub fn put(&mut self, start: usize, operator: [f64; PARAMETERS], deficit: f64, samples: u64) {
         if let Some(place) = self.all.get_mut(start) {
             *place = Alternative {
                 operator,
-                behind: behind.max(0.0),
+                deficit: deficit.max(0.0),
                 samples,
                 known: true,
             };
         }
     }
 
-    /// Their scatter about an operator after so many samples, of which the last `window` are read again.
+    /// Their scatter about an operator, for a current number of samples of which the last `window` are replayed.
     pub fn scatter(&self, about: &[f64; PARAMETERS], samples: u64, window: u64) -> [[f64; PARAMETERS]; PARAMETERS] {
         let mut scatter = [[0.0; PARAMETERS]; PARAMETERS];
         let mut weights = 1.0;
         for other in self.all.iter().filter(|other| other.known) {
             let since = samples.saturating_sub(other.samples) as f64;
             let share = (1.0 - since / samples.min(window).max(1) as f64).max(0.0);
-            let weight = libm::exp(-other.behind / SLOWLY) * share * share;
+            let weight = libm::exp(-other.deficit / TEMPERATURE_NATS) * share * share;
             weights += weight;
             for i in 0..PARAMETERS {
                 for j in 0..PARAMETERS {

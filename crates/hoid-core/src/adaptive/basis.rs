@@ -1,19 +1,18 @@
-//! The responses of `s^i omega^2/((s + a)(s^2 + 2 zeta omega s + omega^2)) e^{-tau s}`, i = 0, 1, 2,
-//! with `a = 1/T_I`, and their derivatives by omega, zeta and tau, to an error that is straight
-//! between samples.
+//! The responses of `s^i omega^2/((s + a)(s^2 + 2 zeta omega s + omega^2)) e^{-tau s}`, i = 0, 1, 2, with `a = 1/T_I`,
+//! and their derivatives with respect to omega, zeta and tau, to an error that is linear between samples.
 //!
 //! With `Q = s^2 + 2 zeta omega s + omega^2` and the signals `z_i` of `s^i/((s + a) Q^2) e^{-tau s}`,
 //! i = 0 to 5,
 //!
-//! `x_i = omega^2 (z_{i+2} + 2 zeta omega z_{i+1} + omega^2 z_i)`,
-//! `dx_i/domega = 2 x_i/omega - 2 omega^2 (zeta z_{i+1} + omega z_i)`,
-//! `dx_i/dzeta = -2 omega^3 z_{i+1}`,
-//! `dx_i/dtau = -omega^2 (z_{i+3} + 2 zeta omega z_{i+2} + omega^2 z_{i+1})`.
+//! `r_i = omega^2 (z_{i+2} + 2 zeta omega z_{i+1} + omega^2 z_i)`,
+//! `dr_i/domega = 2 r_i/omega - 2 omega^2 (zeta z_{i+1} + omega z_i)`,
+//! `dr_i/dzeta = -2 omega^3 z_{i+1}`,
+//! `dr_i/dtau = -omega^2 (z_{i+3} + 2 zeta omega z_{i+2} + omega^2 z_{i+1})`.
 //!
-//! `z_0 .. z_4` are the states of one filter in controllable canonical form, `z' = A z + B e(t - tau)`,
-//! and z_5 is the derivative of the last. With `tau = l Ts + delta`, `0 <= delta < Ts`, the delayed
-//! error is over a sample straight in two pieces, up to delta and from there on. With
-//! `G(h) = int e^{A(h-s)} B ds` and `R(h) = int e^{A(h-s)} B s ds`, both columns of the exponential of
+//! `z_0 .. z_4` are the states of one filter in controllable canonical form, `z' = A z + B e(t - tau)`, and z_5 is the
+//! derivative of the last. With `tau = l Ts + delta`, `0 <= delta < Ts`, the delayed error is linear in two pieces over
+//! a sample, before and after delta. With `G(h) = int e^{A(h-s)} B ds` and `R(h) = int e^{A(h-s)} B s ds`, both columns
+//! of the exponential of
 //! `[A B 0; 0 0 1; 0 0 0] h`,
 //!
 //! `z(k+1) = Phi z(k) + T_0 e(k-l+1) + T_1 e(k-l) + T_2 e(k-l-1)`,
@@ -21,17 +20,17 @@
 //! `T_1 = Phi(h) (G(delta) (1 - delta/Ts) + R(delta)/Ts) + G(h) - R(h)/Ts`,
 //! `T_2 = Phi(h) (G(delta) delta/Ts - R(delta)/Ts)`, `h = Ts - delta`
 //!
-//! (K. J. Åström and B. Wittenmark, *Computer-Controlled Systems*, 1997, section 3.2; the triangle
-//! hold of G. F. Franklin, J. D. Powell and M. Workman, *Digital Control of Dynamic Systems*, 1998,
-//! section 6.3). Exact for a straight error and any delay. The response to a sampled sine is the
-//! operator's times that of the hold, `(sin(omega Ts/2)/(omega Ts/2))^2`, but for aliases.
+//! (K. J. Åström and B. Wittenmark, *Computer-Controlled Systems*, 1997, section 3.2; the triangle hold of G. F.
+//! Franklin, J. D. Powell and M. Workman, *Digital Control of Dynamic Systems*, 1998, section 6.3). Exact for a
+//! piecewise linear error and any delay. The response to a sampled sine is the operator's times that of the hold,
+//! `(sin(omega Ts/2)/(omega Ts/2))^2`, except for aliases.
 //!
-//! Each x_i is divided by its gain at [`REFERENCE`], so that all gains are in units of |Y| there.
+//! Each r_i is divided by its gain at [`REFERENCE`], so that all gains are in units of |Y| there.
 
 use super::{
-    pair::Pair,
-    past::{Paired, paired},
-    sizes::{GAINS, HELD, LINEAR, SIGNALS, STATES},
+    f64x2::F64x2,
+    signal_history::{Paired, paired},
+    sizes::{DYNAMICS, GAINS, LINEAR, SIGNALS, STATES},
 };
 
 /// Frequency at which each response has a gain of one, rad/s.
@@ -48,7 +47,7 @@ pub type Complex = [f64; 2];
 /// `z_0 .. z_5`.
 pub type Signals = [f64; SIGNALS];
 
-/// What is held of a person: delay in s, natural frequency in rad/s and damping of the
+/// The dynamics of a person: delay in s, natural frequency in rad/s and damping of the
 /// neuromuscular system, lag in s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
@@ -65,8 +64,8 @@ pub struct Point {
 crate::state!([] Point { tau, omega, zeta, lag });
 
 impl Point {
-    /// Moved by corrections of omega, zeta and tau.
-    pub fn moved(self, [omega, zeta, tau]: [f64; HELD]) -> Self {
+    /// The point plus corrections of omega, zeta and tau.
+    pub fn moved(self, [omega, zeta, tau]: [f64; DYNAMICS]) -> Self {
         Self {
             tau: self.tau + tau,
             omega: self.omega + omega,
@@ -79,10 +78,10 @@ impl Point {
 /// The responses of a sample, and their derivatives by omega, zeta and tau.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Regressors {
-    /// x_i.
+    /// r_i.
     pub x: [f64; GAINS],
     /// Derivatives.
-    pub by: [[f64; GAINS]; HELD],
+    pub by: [[f64; GAINS]; DYNAMICS],
 }
 
 /// The filter of a point.
@@ -90,7 +89,7 @@ pub struct Regressors {
 pub struct Basis {
     point: Point,
     sample_time: f64,
-    /// Columns of Phi, and T_0 to T_2, each with a zero behind, so that they are as long as the signals.
+    /// Columns of Phi, and T_0 to T_2, each followed by a zero, so that they are as long as the signals.
     columns: [Paired; N],
     taps: [Paired; 3],
     monic: [f64; N],
@@ -103,8 +102,8 @@ pub struct Basis {
 crate::state!([] Basis { point, columns, taps, monic, delay, part, scale, z });
 
 impl Basis {
-    /// At rest. Ts in s. `None` for numbers that are not positive (the delay: negative), or not
-    /// finite, or poles so fast that nothing is left of them.
+    /// The filter at rest. Ts in s. `None` for numbers that are not positive (the delay: negative)
+    /// or not finite, and for poles so fast that their response vanishes.
     pub fn new(point: Point, sample_time: f64) -> Option<Self> {
         let positive = |x: f64| x > 0.0 && x < 1e6;
         let Point { tau, omega, zeta, lag } = point;
@@ -114,8 +113,8 @@ impl Basis {
         let mut basis = Self {
             point,
             sample_time,
-            columns: [[Pair::ZERO; SIGNALS / 2]; N],
-            taps: [[Pair::ZERO; SIGNALS / 2]; 3],
+            columns: [[F64x2::ZERO; SIGNALS / 2]; N],
+            taps: [[F64x2::ZERO; SIGNALS / 2]; 3],
             monic: [0.0; N],
             delay: 0,
             part: 0.0,
@@ -136,7 +135,7 @@ impl Basis {
     fn discretise(&mut self) {
         let Point { tau, omega, zeta, lag } = self.point;
         let ts = self.sample_time;
-        // A delay of whole samples must not become a sample less by rounding.
+        // Rounding must not shorten a delay of whole samples by one sample.
         let whole = libm::floor(tau / ts + 1e-9);
         let delta = (tau - whole * ts).max(0.0);
         let (a, p, q) = (1.0 / lag, 2.0 * zeta * omega, omega * omega);
@@ -180,9 +179,9 @@ impl Basis {
         (self.delay, self.part) = (whole as usize, part);
     }
 
-    /// One at another point with the same lag and the same scale, whose slow mode goes on from here:
-    /// `g = 1/(s + a) e` is `Q^2 z_0` in the states of both. The fast modes begin at rest; they need
-    /// some `1/(zeta omega)` until they are what they would be. `error` is the delayed error of now.
+    /// The filter at another point with the same lag and scale, which continues the slow mode:
+    /// `g = 1/(s + a) e` is `Q^2 z_0` in the states of both. The fast modes start at rest and settle
+    /// within some `1/(zeta omega)`. `error` is the current delayed error.
     pub fn moved(&self, point: Point, error: f64) -> Option<Self> {
         let sound = point.omega > 0.0 && point.zeta > 0.0 && point.tau >= 0.0 && point.lag == self.point.lag;
         if !sound {
@@ -214,18 +213,18 @@ impl Basis {
             .then_some(other)
     }
 
-    /// What is held.
+    /// The point.
     pub fn point(&self) -> Point {
         self.point
     }
 
-    /// Whole samples of the delay: the signals of a sample need the error of so many samples ago,
-    /// and the two before it.
+    /// Whole samples of the delay: the signals of a sample need the error `delay` samples ago and
+    /// the two before it.
     pub fn delay(&self) -> usize {
         self.delay
     }
 
-    /// What each response was divided by is one over this.
+    /// Factor of each response, one over its gain at [`REFERENCE`].
     pub fn scale(&self) -> [f64; GAINS] {
         self.scale
     }
@@ -239,13 +238,13 @@ impl Basis {
     /// The signals of a sample from the errors of `delay`, `delay + 1` and `delay + 2` samples ago.
     #[inline(always)]
     pub fn step(&mut self, errors: [f64; 3]) -> Signals {
-        let mut sums = [Pair::ZERO; SIGNALS / 2];
+        let mut sums = [F64x2::ZERO; SIGNALS / 2];
         for i in 0..sums.len() {
             for j in 0..N {
-                sums[i] += self.columns[j][i] * Pair::both(self.z[j]);
+                sums[i] += self.columns[j][i] * F64x2::both(self.z[j]);
             }
             for j in 0..3 {
-                sums[i] += self.taps[j][i] * Pair::both(errors[j]);
+                sums[i] += self.taps[j][i] * F64x2::both(errors[j]);
             }
         }
         let mut signals: Signals = core::array::from_fn(|i| sums[i / 2].0[i % 2]);
@@ -258,7 +257,7 @@ impl Basis {
         signals
     }
 
-    /// The responses that the signals are, and their derivatives.
+    /// The responses and their derivatives from the signals.
     #[inline(always)]
     pub fn regressors(&self, z: &Signals) -> Regressors {
         let Point { omega, zeta, .. } = self.point;
@@ -266,7 +265,7 @@ impl Basis {
         let through: [f64; LINKS] = core::array::from_fn(|i| z[i + 2] + p * z[i + 1] + q * z[i]);
         let mut r = Regressors {
             x: [0.0; GAINS],
-            by: [[0.0; GAINS]; HELD],
+            by: [[0.0; GAINS]; DYNAMICS],
         };
         for i in 0..GAINS {
             let s = self.scale[i] * q;
@@ -278,7 +277,7 @@ impl Basis {
         r
     }
 
-    /// The weights of the signals in `sum_i theta_i (x_i + sum_j c_j dx_i/dj)`, theta and c in a state.
+    /// The weights of the signals in `sum_i theta_i (r_i + sum_j c_j dr_i/dj)`, theta and c in a state.
     pub fn weights(&self, state: &[f64; STATES]) -> Signals {
         let Point { omega, zeta, .. } = self.point;
         let (p, q) = (2.0 * zeta * omega, omega * omega);
@@ -314,12 +313,12 @@ impl Basis {
         carried
     }
 
-    /// Brings the filter to rest.
+    /// Resets the filter.
     pub fn reset(&mut self) {
         self.z = [0.0; N];
     }
 
-    /// Response of each x_i at a frequency in rad/s, were it held at this point.
+    /// Frequency response of each r_i at a frequency in rad/s, for the point `at`.
     pub fn response(&self, omega_rad_s: f64, at: Point) -> [Complex; GAINS] {
         let w = omega_rad_s;
         let square = at.omega * at.omega;
@@ -340,9 +339,8 @@ impl Basis {
         })
     }
 
-    /// K_e and K_e_dot of the gain and lead that is nearest to `N(s)/(s + a)` at some frequencies in
-    /// rad/s, by least squares in `K_e + K_e_dot j omega`: linear in the gains, and whatever poles and
-    /// delay are.
+    /// K_e and K_e_dot of the gain and lead that is nearest to `N(s)/(s + a)` at some frequencies in rad/s, by least
+    /// squares in `K_e + K_e_dot j omega`: linear in the gains and independent of poles and delay.
     pub fn gain_and_lead(&self, at_rad_s: &[f64]) -> [[f64; GAINS]; 2] {
         let (a, count) = (1.0 / self.point.lag, at_rad_s.len() as f64);
         let squares: f64 = at_rad_s.iter().map(|w| w * w).sum();
@@ -377,8 +375,8 @@ fn product(a: &Square, b: &Square) -> Square {
     core::array::from_fn(|i| core::array::from_fn(|j| (0..M).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
-/// By scaling to a norm below 1/4, the series of Taylor to the 14th power, and squaring: the rest of
-/// the series is below 1e-20.
+/// Matrix exponential by scaling to a norm below 1/4, the Taylor series to order 14, and squaring:
+/// the truncation error is below 1e-20 (C. Moler and C. Van Loan, *SIAM Review* 45 (2003) 3-49).
 fn exponential(m: &Square) -> Square {
     let norm = m
         .iter()

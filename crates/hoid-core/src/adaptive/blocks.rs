@@ -1,32 +1,31 @@
-//! Sums over blocks of half a second, and what the last of them say against those before.
+//! Normal equations over blocks of half a second, for the detector.
 //!
-//! Behind the whitening filter, with the regressors of gains and level r, those of what is held
-//! `q_j = sum_i theta_i dx_i/dj`, both where the estimate is at that sample, and the held values p of
-//! that sample, about those of the basis, to first order
+//! After the whitening filter, with the regressors r of gains and level, those of the dynamics
+//! `q_j = sum_i theta_i dr_i/dj`, both at the estimate of that sample, and the corrections p of that sample, to first order
 //!
-//! `y + q' p = r' s + q' p' + eps`.
+//! `y + q' p = r' x + q' p' + eps`.
 //!
-//! Each sample counts as one over the variance of eps, so that the sums are in its units, and is limited to some
-//! standard deviations about its prediction. What is held has a weak prior at where it is now, the same for all
-//! spans: where the data say nothing of it, two spans do not differ.
+//! Each sample is weighted by one over the variance of eps, so that the sums are in its units, and is limited to a number of
+//! standard deviations about its prediction. The dynamics have a weak prior at their current value, the same for all spans:
+//! without information about them, two spans do not differ.
 
 use hoid_numerics::{cholesky, products::dot};
 
-use super::sizes::{HELD, LINEAR, STATES};
+use super::sizes::{DYNAMICS, LINEAR, STATES};
 
-/// Products of the upper triangle.
+/// Number of products in the upper triangle.
 const PRODUCTS: usize = STATES * (STATES + 1) / 2;
-/// Share of the diagonal that is added to it.
+/// Ridge, as a share of the diagonal.
 const RIDGE: f64 = 1e-3;
 
-/// What a sample says.
+/// The row of a sample.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
-    /// Regressors of gains and level, then of what is held.
+    /// Regressors of gains and level, then of the dynamics.
     pub x: [f64; STATES],
     /// Limited output, with `q' p`.
     pub y: f64,
-    /// Innovation as it is.
+    /// Innovation, not limited.
     pub innovation: f64,
     /// Variance of eps.
     pub variance: f64,
@@ -39,7 +38,7 @@ pub(super) struct Block {
     with_output: [f64; STATES],
     square: f64,
     pub samples: f64,
-    /// Squares of the innovations as they are.
+    /// Sum of the squares of the innovations, not limited.
     power: f64,
 }
 
@@ -53,13 +52,13 @@ pub(super) const EMPTY: Block = Block {
     power: 0.0,
 };
 
-/// What solves the normal equations `A s = b`.
+/// The solution of the normal equations `A x = b`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Solution {
     pub state: [f64; STATES],
     /// `A^-1`.
     pub inverse: [[f64; STATES]; STATES],
-    /// Sum of the squares of what is left, the prior's among them.
+    /// Residual sum of squares, that of the prior included.
     pub left: f64,
 }
 
@@ -99,12 +98,13 @@ impl Block {
         })
     }
 
-    /// With a prior of what is held: this mean and these standard deviations.
-    pub fn with_prior(mut self, mean: [f64; HELD], deviations: [f64; HELD]) -> Self {
+    /// Adds a prior of the dynamics with this mean and these standard deviations.
+    pub fn with_prior(mut self, mean: [f64; DYNAMICS], deviations: [f64; DYNAMICS]) -> Self {
         let mut diagonal = 0;
         for i in 0..STATES {
             if let Some(j) = i.checked_sub(LINEAR) {
-                // The sums are in units of the variance of eps, so that the prior counts as it is.
+                // The sums are in units of the variance of eps, so that the weight of the prior is
+                // one over its variance.
                 let weight = 1.0 / (deviations[j] * deviations[j]);
                 self.products[diagonal] += weight;
                 self.with_output[i] += weight * mean[j];
@@ -115,7 +115,7 @@ impl Block {
         self
     }
 
-    /// Mean square of the innovations as they are.
+    /// Mean square of the innovations, not limited.
     pub fn innovation_variance(&self) -> f64 {
         self.power / self.samples.max(1.0)
     }
@@ -133,7 +133,7 @@ impl Block {
         matrix
     }
 
-    /// Least squares; `None` where they determine nothing, or there are too few samples.
+    /// Least squares; `None` if the equations are singular or there are too few samples.
     pub fn solved(&self) -> Option<Solution> {
         if self.samples <= STATES as f64 {
             return None;
@@ -152,7 +152,7 @@ impl Block {
         Some(Solution { state, inverse, left })
     }
 
-    /// The score of a state, `b - A s`: zero in the mean where the state is right.
+    /// The score of a state, `b - A x`: zero in the mean at the true state.
     pub fn score(&self, state: &[f64; STATES]) -> [f64; STATES] {
         let matrix = self.matrix();
         core::array::from_fn(|i| self.with_output[i] - dot(&matrix[i], state))

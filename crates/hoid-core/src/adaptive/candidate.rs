@@ -1,54 +1,54 @@
-//! One way to read the data: a basis, a noise model, and a mixture about what the gains did.
+//! One pass over the data: a basis, a noise model, and the mixture of hypotheses about the gains.
 //!
-//! A candidate reads samples one after another. Its whitening filter D and its basis stay as they are, so
-//! that it is the prediction error method for given D and a linearisation; what it learns for the next one
-//! is a better point of the basis (the corrections), a better noise model (`noise`, by the residuals) and how
-//! unevenly the innovations come (`volatility`). [`super::filter`] runs one after another over the data.
+//! A candidate processes samples in order. Its whitening filter D and its basis stay fixed, so that it is the prediction
+//! error method for given D and a given linearisation (L. Ljung, *System Identification*, 1999, section 7.2). It estimates
+//! for the next candidate a better point of the basis (the corrections), a better noise model (`noise`, from the
+//! residuals) and how unevenly the innovations are distributed (`volatility`). [`super::filter`] runs one candidate after
+//! the other over the data.
 //!
-//! `evidence` is the sum of the logarithms of the densities that it gave to blocks before it saw them (A. P.
-//! Dawid, *J. Royal Statistical Society* A 147 (1984) 278-292): by it candidates of the same data are compared.
-//! Each block was predicted from what was before it only, so that more parameters are no advantage. The
-//! density is that of Student with the variance of the last seconds and as many degrees of freedom as the block
-//! has samples, so that a change, which nobody predicts, decides nothing; and old evidence is forgotten, so
-//! that it is about what has been learnt and not about how fast.
+//! `evidence` is the sum of the logarithms of the predictive densities of the blocks (A. P. Dawid, *J. Royal Statistical
+//! Society* A 147 (1984) 278-292); candidates of the same data are compared by it. Each block is predicted from earlier
+//! blocks only, so that additional parameters give no advantage. The density is Student's with the variance of the last
+//! seconds and as many degrees of freedom as the block has samples, so that an unpredicted change does not dominate. Old
+//! evidence is forgotten, so that it measures the quality of the estimate and not the speed of its start.
 
 use super::{
     basis::{Basis, Complex, Point, Regressors},
     blocks::Row,
+    f64x2::F64x2,
     last_blocks::LastBlocks,
     mixture::{ChangePrior, Mixture, NoiseScales, Segments},
     moments::Moments,
     noise::NoiseModel,
-    pair::Pair,
-    past::{Paired, PastSignals, paired},
-    sizes::{GAINS, HELD, LARGEST_ORDER, LINEAR, PARAMETERS, SIGNALS, STATES},
+    signal_history::{Paired, SignalHistory, paired},
+    sizes::{DYNAMICS, GAINS, LARGEST_ORDER, LINEAR, PARAMETERS, SIGNALS, STATES},
     volatility::Volatility,
 };
 use crate::state::{State, visit_all};
 
-/// Magnitude beyond which the filters are brought to rest.
+/// Magnitude beyond which the filters are reset.
 pub(super) const LARGEST: f64 = 1e100;
-/// Where the basis may be: omega in rad/s, zeta, tau in s; and how far it moves at once, in shares of omega
-/// and zeta and in s.
-const RANGE: [[f64; 2]; HELD] = [[3.0, 35.0], [0.05, 1.4], [0.01, 0.85]];
-const FAR: [[f64; 2]; HELD] = [[-0.3, 0.4], [-0.4, 0.6], [-0.05, 0.05]];
+/// Range of the basis point (omega in rad/s, zeta, tau in s), and its largest step (relative for omega and zeta, in s
+/// for tau).
+const RANGE: [[f64; 2]; DYNAMICS] = [[3.0, 35.0], [0.05, 1.4], [0.01, 0.85]];
+const FAR: [[f64; 2]; DYNAMICS] = [[-0.3, 0.4], [-0.4, 0.6], [-0.05, 0.05]];
 /// Longest delay, s.
 pub(super) const LATEST_S: f64 = 0.9;
-/// Frequencies at which gain and lead are nearest, rad/s.
+/// Frequencies at which K_e and K_e_dot are fitted to the numerator, rad/s.
 pub(super) const NEAR_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
-/// Time before which blocks are no evidence, s.
+/// Time before which blocks do not count as evidence, s.
 const UNSETTLED_S: f64 = 2.0;
-/// Time of the energies of which [`Volatility`] takes one, s.
+/// Time over which [`Volatility`] sums one energy, s.
 const BURST_S: f64 = 1.28;
-/// Memory of the variance that the evidence supposes, s.
+/// Memory of the variance in the predictive density of the evidence, s.
 const LEVEL_S: f64 = 20.0;
 /// Time constant with which evidence is forgotten, s.
 const EVIDENCE_S: f64 = 20.0;
-/// Time between two solutions of the noise model where nothing is replayed, s.
+/// Time between two solutions of the noise model without replays, s.
 const RENEWED_S: f64 = 1.28;
-/// Variances beyond which the square of an innovation counts no more in the noise model.
-const CLIPPED: f64 = 100.0;
-/// Power of u that the variance never falls below, as a share.
+/// Upper limit of a squared innovation in the noise model, in innovation variances.
+const CLIP_VARIANCES: f64 = 100.0;
+/// Lower limit of the variance, as a share of the power of u.
 const LEAST: f64 = 1e-24;
 
 /// A sample after the whitening filter.
@@ -59,16 +59,16 @@ pub(super) struct Whitened {
     pub level: f64,
 }
 
-/// The state of the reader.
+/// The candidate.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Candidate {
     basis: Basis,
     now: [f64; SIGNALS],
-    past: PastSignals,
+    past: SignalHistory,
     outputs: [f64; LARGEST_ORDER],
     d: [f64; LARGEST_ORDER],
     pub noise: NoiseModel,
-    /// The block so far: samples as many as D reaches back, and those behind them.
+    /// Sums of the current block: of its first p samples (p the order of D), and of the rest.
     early: Moments,
     late: Moments,
     block: u64,
@@ -80,10 +80,10 @@ pub(super) struct Candidate {
     level: [f64; 2],
     pub evidence: f64,
     samples: u64,
-    /// Samples until no prediction is left among the past outputs.
+    /// Samples until the filter D contains no predicted output.
     predicted: u64,
     pub blocks: LastBlocks,
-    /// Sample of the record at which it started.
+    /// Sample of the record at which the candidate started.
     pub start: u64,
 }
 
@@ -117,7 +117,7 @@ impl State for Candidate {
 }
 
 impl Candidate {
-    /// At rest. `d` is the noise model to begin with, solved.
+    /// A candidate at rest. `d` is the solved initial noise model.
     pub fn new(
         basis: Basis,
         d: &NoiseModel,
@@ -133,7 +133,7 @@ impl Candidate {
         Self {
             basis,
             now: [0.0; SIGNALS],
-            past: PastSignals::ZERO,
+            past: SignalHistory::ZERO,
             outputs: [0.0; LARGEST_ORDER],
             d: padded,
             noise: empty,
@@ -154,20 +154,21 @@ impl Candidate {
         }
     }
 
-    /// Where the residuals of the noise model come from, in place of the mixture's mean.
-    pub fn guided(mut self, guide: Segments) -> Self {
+    /// Computes the residuals of the noise model with these segments in place of the mean of the
+    /// mixture.
+    pub fn with_guide(mut self, guide: Segments) -> Self {
         self.guide = guide;
         self
     }
 
-    /// Learns nothing from so many samples: the filters start at rest, but what they filter did not.
-    pub fn skipping(mut self, samples: u64) -> Self {
+    /// Skips the update for a number of samples: the filters start at rest, the signals do not.
+    pub fn with_skipped(mut self, samples: u64) -> Self {
         self.skipped = samples;
         self
     }
 
-    /// Goes on without a guide.
-    pub fn unguided(&mut self) {
+    /// Continues without a guide.
+    pub fn clear_guide(&mut self) {
         self.guide = Segments::NONE;
     }
 
@@ -179,28 +180,29 @@ impl Candidate {
         self.block
     }
 
-    /// Samples that count for one, by the innovations so far.
+    /// Number of samples that count as one independent sample, from the innovations so far.
     pub fn dispersion(&self) -> f64 {
         self.volatility.dispersion()
     }
 
-    /// The signals of a sample, from the errors of so many samples ago.
+    /// Advances the basis by a sample; `error(age)` is the error `age` samples ago.
     #[inline(always)]
     pub fn respond(&mut self, error: impl Fn(usize) -> f64) {
         let l = self.basis.delay();
         self.now = self.basis.step([error(l), error(l + 1), error(l + 2)]);
     }
 
-    /// `D u`, D times the signals, and D at zero.
+    /// Step 2: `y = D u`, D times the signals, and `D(1)`, the factor of the level.
     #[inline(always)]
     pub fn whitened(&self, u: f64) -> Whitened {
         let (mut y, mut z, mut level) = (u, paired(&self.now), 1.0);
         let order = self.noise.order().next_multiple_of(4).min(LARGEST_ORDER);
+        // The bank of hypotheses is linear in the signals, so that filtering the signals once by D serves all of them.
         for ((d, u), before) in self.d[..order].iter().zip(&self.outputs).zip(self.past.newest_first()) {
             y += d * u;
             level += d;
             for (z, before) in z.iter_mut().zip(before) {
-                *z += Pair::both(*d) * *before;
+                *z += F64x2::both(*d) * *before;
             }
         }
         Whitened {
@@ -210,7 +212,7 @@ impl Candidate {
         }
     }
 
-    /// Innovation of a whitened sample by the mean of the mixture.
+    /// Step 3: `nu = y - H x^`, the innovation of a whitened sample for the mean of the mixture.
     #[inline(always)]
     pub fn innovation(&self, white: &Whitened) -> f64 {
         let state = self.mixture.mean();
@@ -218,28 +220,30 @@ impl Candidate {
         white.y - state[GAINS] * white.level - (0..SIGNALS).map(|k| w[k] * white.signals[k]).sum::<f64>()
     }
 
-    /// Learns from a sample; false where a number has overflowed.
+    /// Adds a sample to the sums of the block, to the noise model and to the detector, and ends the
+    /// block; false if a number has overflowed.
     #[inline(always)]
-    pub fn learn(&mut self, white: &Whitened, u: f64, prior: &ChangePrior) -> bool {
+    pub fn update(&mut self, white: &Whitened, u: f64, prior: &ChangePrior) -> bool {
         let sound = |x: &f64| x.abs() < LARGEST;
         if !(sound(&white.y) && white.signals.iter().all(sound)) {
             return false;
         }
         if self.predicted > 0 {
-            // The noise of the outputs that were predicted is not known: the first samples after them have
-            // innovations as large as the noise itself.
+            // D filters p past outputs. A predicted output lacks the noise v, so that until it has left the filter the
+            // innovation has the variance of v instead of that of eps. These samples are not used.
             self.predicted -= 1;
             self.blocks.pass_over();
             return true;
         }
         self.samples += 1;
+        // The whitening filter needs p outputs before its first innovation.
         let order = self.noise.order() as u64;
         if self.samples <= order.max(self.skipped) {
             return true;
         }
         self.take_residual(u);
         let innovation = self.innovation(white);
-        let row = self.row(white, innovation, prior.look);
+        let row = self.row(white, innovation, prior.detector_limit);
         self.blocks.take(&row);
         let y = self.limited(white.y, innovation, prior.limit);
         let part = match self.early.samples < order as f64 {
@@ -253,7 +257,8 @@ impl Candidate {
         true
     }
 
-    /// The output with its innovation at most so many standard deviations.
+    /// The output with its innovation limited to a number of standard deviations (P. J. Huber,
+    /// *Robust Statistics*, 1981).
     #[inline(always)]
     fn limited(&self, y: f64, innovation: f64, limit: f64) -> f64 {
         let most = limit * libm::sqrt(self.level[0]);
@@ -263,20 +268,22 @@ impl Candidate {
         y - innovation + innovation.max(-most).min(most)
     }
 
-    /// What the sample says to the detector.
+    /// The row of the sample in the normal equations of the detector.
     #[inline(always)]
     fn row(&self, white: &Whitened, innovation: f64, limit: f64) -> Row {
         let Regressors { x, by } = self.basis.regressors(&white.signals);
         let state = self.mixture.mean();
         let (mut row, mut shift) = ([0.0; STATES], 0.0);
+        // Linearised about the current state: dy/dtheta_i = r_i + sum_j c_j dr_i/dj, dy/dc_j = sum_i theta_i dr_i/dj.
         for i in 0..GAINS {
             row[i] = x[i];
-            for j in 0..HELD {
+            for j in 0..DYNAMICS {
                 row[i] += state[LINEAR + j] * by[j][i];
                 row[LINEAR + j] += state[i] * by[j][i];
             }
         }
         row[GAINS] = white.level;
+        // The products theta_i c_j appear in both derivatives; adding H_c c once makes y = H x exact at the state.
         for j in LINEAR..STATES {
             shift += row[j] * state[j];
         }
@@ -288,7 +295,8 @@ impl Candidate {
         }
     }
 
-    /// v with all its lags by the gains of the guide, or of now.
+    /// Step 10: updates the noise model with `v = u - level - w' z` and its lags, for the gains of
+    /// the guide or the current ones.
     #[inline(always)]
     fn take_residual(&mut self, u: f64) {
         let order = self.noise.order();
@@ -307,9 +315,10 @@ impl Candidate {
         for ((v, u), z) in v[1..=order].iter_mut().zip(&self.outputs).zip(self.past.newest_first()) {
             *v = left(*u, z);
         }
-        // What is not the noise's, as the seconds after a change, counts no more than it would if it were.
+        // After a change, v contains the unmodelled part of the response. The weight `min(1, c sigma^2/eps^2)` limits
+        // its share in the sums of D to that of a large innovation.
         let eps = v[0] + self.d.iter().zip(&v[1..]).map(|(d, v)| d * v).sum::<f64>();
-        let excess = eps * eps / (CLIPPED * self.level[0]);
+        let excess = eps * eps / (CLIP_VARIANCES * self.level[0]);
         self.noise.update(&v, eps, 1.0 / excess.max(1.0));
     }
 
@@ -322,18 +331,20 @@ impl Candidate {
         let settled = self.samples as f64 * ts > UNSETTLED_S;
         let [level, rests_on] = &mut self.level;
         if settled {
+            // Student's density with n degrees of freedom (constants cancel in differences between candidates).
             let density = -0.5 * n * (libm::log(*level) + 2.0 * libm::log1p(energy / (n * *level)));
             self.evidence = density + libm::exp(-n * ts / EVIDENCE_S) * self.evidence;
         }
         *rests_on = (*rests_on + n).min(LEVEL_S / ts).max(n);
         *level = (*level + n / *rests_on * (energy / n - *level)).max(least);
+        // The variance of the level follows the block energies with a growing memory, at most LEVEL_S.
         let left = self.mixture.update([&early, &late], &self.basis, prior, &self.scales);
         if settled {
             self.volatility.take(left, n);
         }
     }
 
-    /// Takes over what it has learnt of the noise: where nothing is replayed, in place of the next candidate.
+    /// Uses its own noise model from here on: without replays there is no next candidate that would use it.
     pub fn renew(&mut self) {
         let every = (libm::round(RENEWED_S / self.scales.sample_time).max(1.0)) as u64;
         if self.samples.is_multiple_of(every) {
@@ -352,19 +363,19 @@ impl Candidate {
         self.past.push(&self.now);
     }
 
-    /// Ends a sample whose output is a prediction, or was moved to where it must be.
+    /// Ends a sample whose output is a prediction or a limit of the stick.
     pub fn remember_prediction(&mut self, u: f64) {
-        // As many as were predicted one after another, no more than D reaches back.
+        // The number of consecutive predictions, at most the order of D.
         self.predicted = (self.predicted + 1).min(self.noise.order() as u64);
         self.remember(u);
     }
 
-    /// The noise model that whitens.
+    /// Coefficients of the whitening filter D after the 1.
     pub fn d(&self) -> &[f64] {
         &self.d[..self.noise.order()]
     }
 
-    /// Where what is held is by a state: never outside of where the basis may be.
+    /// The basis point plus the corrections of a state, limited to the range of the basis.
     pub fn corrected(&self, state: &[f64; STATES]) -> Point {
         let at = self.basis.point();
         let of = [at.omega, at.zeta, 1.0];
@@ -377,7 +388,7 @@ impl Candidate {
         Point { omega, zeta, tau, ..at }
     }
 
-    /// Where the corrections point.
+    /// The basis point plus the current corrections.
     pub fn point(&self) -> Point {
         self.corrected(self.mixture.mean())
     }
@@ -390,7 +401,7 @@ impl Candidate {
         [gain(0), gain(1), omega, zeta, tau]
     }
 
-    /// The response of each gain at a frequency in rad/s, for what is held now.
+    /// The response of each gain at a frequency in rad/s, at the current point.
     pub fn responses(&self, omega_rad_s: f64) -> [Complex; GAINS] {
         self.basis.response(omega_rad_s, self.point())
     }
@@ -416,7 +427,7 @@ impl Candidate {
         for (j, size) in [point.omega, point.zeta, 0.1].into_iter().enumerate() {
             let step = 1e-5 * size;
             let at = |sign: f64| {
-                let mut by = [0.0; HELD];
+                let mut by = [0.0; DYNAMICS];
                 by[j] = sign * step;
                 of(&self.basis.response(omega_rad_s, point.moved(by)))
             };
@@ -428,7 +439,7 @@ impl Candidate {
         (of(&h), by)
     }
 
-    /// A state in the coordinates of another basis; without corrections where its point is not near.
+    /// A state in the coordinates of another basis; without corrections if its point is not near.
     pub fn carried(&self, to: &Basis, state: &[f64; STATES]) -> [f64; STATES] {
         let mut carried = self.basis.carried(to, state);
         let [omega, _, tau] = [carried[LINEAR], carried[LINEAR + 1], carried[LINEAR + 2]];

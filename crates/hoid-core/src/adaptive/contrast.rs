@@ -1,23 +1,21 @@
-//! Now against before: the difference of two solutions, with the covariance that their scores show.
+//! The difference between two spans: two least-squares solutions with a covariance from their scores.
 //!
-//! The noise model whitens, but what it says of the band in which a person controls rests on few data:
-//! a noise model of 16 lags at 100 Hz sees .16 s, and a person turns within seconds. Where it is wrong by some factor
-//! there, `sigma^2 A^-1` is too. So the variance of the score `g = b - A s` is taken from the data as well: with
-//! the scores `g_k` of stretches of one second, which hardly depend on each other,
+//! The noise model whitens, but its spectrum in the band of control rests on few data: 16 lags at 100 Hz cover 0.16 s, and
+//! people act within seconds. Where that spectrum is wrong by a factor, `sigma^2 A^-1` is wrong by the same factor. The
+//! covariance of the score `g = b - A x` is therefore estimated as well (the sandwich of P. J. Huber, *Proc. Fifth Berkeley
+//! Symposium* 1 (1967) 221-233; H. White, *Econometrica* 48 (1980) 817-838). With the scores `g_k` of stretches of one
+//! second, which are nearly independent (W. K. Newey and K. D. West, *Econometrica* 55 (1987) 703-708),
 //!
-//! `S = sum_k g_k g_k' / (1 - (N + 3) / K)`, `W_i = w n_i/n S + (1 - w) sigma^2 A_i`,
+//! `S = sum_k g_k g_k' / (1 - (N + 3)/K)`, `W_i = w n_i/n S + (1 - w) sigma^2 A_i`,
 //!
-//! for K stretches of both spans together, N unknowns and `n_i` of the n samples in a span: the two solutions take 2
-//! of the K, and the inverse of a Wishart matrix is `K / (K - N - 1)` times too large in the mean. S knows what the
-//! model does not; with few stretches it is uncertain, and the model's part keeps it from zero: w is `SHOWN`. Then
+//! for K stretches of both spans, N unknowns, and `n_i` of the n samples in span i. The divisor corrects the two degrees of
+//! freedom of the solutions and the mean `K/(K - N - 1)` of an inverse Wishart matrix. With few stretches S is uncertain,
+//! and the part of the model keeps it positive definite; w is `EMPIRICAL_SHARE`. Then
 //!
-//! `d = s_1 - s_0`, `C = A_0^-1 W_0 A_0^-1 + A_1^-1 W_1 A_1^-1`.
+//! `d = x_1 - x_0`, `C = A_0^-1 W_0 A_0^-1 + A_1^-1 W_1 A_1^-1`.
 //!
-//! sigma^2 and S are those of both spans: with a variance for each, a calm second is a change, and a louder remnant
-//! too.
-//!
-//! Sources: P. J. Huber, *Proc. Fifth Berkeley Symposium* 1 (1967) 221-233; H. White, *Econometrica* 48 (1980)
-//! 817-838; W. K. Newey and K. D. West, *Econometrica* 55 (1987) 703-708.
+//! sigma^2 and S are common to both spans: with a variance for each span, a calm second or a louder remnant would count as
+//! a change of the operator.
 
 use hoid_numerics::{cholesky, products::dot};
 
@@ -25,36 +23,37 @@ use super::{blocks::Block, sizes::STATES};
 
 type Matrix = [[f64; STATES]; STATES];
 
-/// Blocks of a stretch.
-const STRETCH: usize = 2;
-/// Share of what the scores show in the variance of the score, and where the noise model is believed.
-pub(super) const SHOWN: f64 = 2.0 / 3.0;
-pub(super) const BY_MODEL: f64 = 0.0;
-/// Least share of the degrees of freedom that is left.
+/// Blocks per score.
+const BLOCKS_PER_SCORE: usize = 2;
+/// Share w of the empirical covariance of the scores, and its value for the covariance of the noise
+/// model alone.
+pub(super) const EMPIRICAL_SHARE: f64 = 2.0 / 3.0;
+pub(super) const MODEL_ONLY: f64 = 0.0;
+/// Lower limit of the share of the remaining degrees of freedom.
 const LEAST_FREE: f64 = 0.3;
 
-/// A difference of now from before: gains, level, natural frequency, damping, delay.
+/// A difference of the present from the past: gains, level, natural frequency, damping, delay.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Contrast {
-    /// Now less before.
+    /// Present minus past.
     pub difference: [f64; STATES],
     /// Its covariance.
     pub covariance: Matrix,
-    /// What was before, about the basis.
+    /// The past state, relative to the basis.
     pub before: [f64; STATES],
     /// Its covariance.
     pub covariance_before: Matrix,
-    /// Sum of the squares of what is left on both sides.
+    /// Residual sum of squares of both spans.
     pub left: f64,
-    /// Samples before and now.
+    /// Number of samples of past and present.
     pub samples: [f64; 2],
 }
 
 crate::state!([] Contrast { difference, covariance, before, covariance_before, left, samples });
 
 impl Contrast {
-    /// Between blocks before and now, to each of which `with_prior` adds what is known besides; `shown` is w.
-    /// `None` where one side determines nothing.
+    /// The difference between two spans of blocks. `with_prior` adds a prior to the sums of each; `shown` is w. `None`
+    /// if a span determines nothing.
     pub(super) fn between(sides: [&[Block]; 2], shown: f64, with_prior: impl Fn(Block) -> Block) -> Option<Self> {
         let sums = sides.map(|blocks| with_prior(Block::of(blocks)));
         let [Some(before), Some(now)] = sums.each_ref().map(Block::solved) else {
@@ -63,7 +62,7 @@ impl Contrast {
         let solutions = [before, now];
         let (mut squares, mut stretches) = ([[0.0; STATES]; STATES], 0.0);
         for (blocks, solution) in sides.iter().zip(&solutions) {
-            for stretch in blocks.rchunks_exact(STRETCH) {
+            for stretch in blocks.rchunks_exact(BLOCKS_PER_SCORE) {
                 let score = Block::of(stretch).score(&solution.state);
                 for (row, a) in squares.iter_mut().zip(score) {
                     row.iter_mut().zip(score).for_each(|(s, b)| *s += a * b);
@@ -93,8 +92,7 @@ impl Contrast {
         })
     }
 
-    /// How many times larger the covariance is than another, in the mean: `tr(C_other^-1 C) / N`. `None` where the
-    /// other is not positive.
+    /// Mean ratio of the covariance to another, `tr(C_other^-1 C)/N`. `None` if the other is not positive definite.
     pub(super) fn dispersion(&self, other: &Self) -> Option<f64> {
         let mut factor = other.covariance;
         if !cholesky::factor(&mut factor, STATES) {
@@ -109,7 +107,7 @@ impl Contrast {
         Some(trace / STATES as f64)
     }
 
-    /// The same with covariances so many times larger.
+    /// The same with both covariances times a factor.
     pub(super) fn times(&self, factor: f64) -> Self {
         Self {
             covariance: self.covariance.map(|row| row.map(|c| factor * c)),
@@ -118,8 +116,9 @@ impl Contrast {
         }
     }
 
-    /// `d' C^-1 d` of those at these places; `None` where C is not positive.
-    pub(super) fn distance<const N: usize>(&self, places: [usize; N]) -> Option<f64> {
+    /// The Wald statistic `d' C^-1 d` of some components; `None` if their C is not positive
+    /// definite.
+    pub(super) fn wald_statistic<const N: usize>(&self, places: [usize; N]) -> Option<f64> {
         let d = places.map(|i| self.difference[i]);
         let mut factor = places.map(|i| places.map(|j| self.covariance[i][j]));
         let mut solved = d;
@@ -146,7 +145,7 @@ mod tests {
     use super::*;
     use crate::adaptive::blocks::{EMPTY, Row};
 
-    /// A number of the standard normal distribution, but for its tails.
+    /// A number of the standard normal distribution, except for its tails.
     fn normal(state: &mut u64) -> f64 {
         let uniform = |state: &mut u64| {
             *state = state
@@ -187,19 +186,20 @@ mod tests {
         all
     }
 
-    /// Mean and its standard error of T over so many pairs of 60 blocks before and 10 now, and by the model alone.
+    /// Mean and its standard error of T over a given number of pairs of 60 blocks before and 10 now, and by the model
+    /// alone.
     fn mean_distance(noise_pole: f64, runs: usize, seed: u64) -> [f64; 3] {
         let mut random = seed;
         let (mut sum, mut square, mut by_model) = (0.0, 0.0, 0.0);
         for _ in 0..runs {
             let all = blocks(70, &STATE, noise_pole, &mut random);
             let sides = [&all[..60], &all[60..]];
-            let contrast = Contrast::between(sides, SHOWN, |sum| sum).unwrap();
-            let t = contrast.distance(PLACES).unwrap();
+            let contrast = Contrast::between(sides, EMPIRICAL_SHARE, |sum| sum).unwrap();
+            let t = contrast.wald_statistic(PLACES).unwrap();
             sum += t;
             square += t * t;
-            let model = Contrast::between(sides, BY_MODEL, |sum| sum).unwrap();
-            by_model += model.distance(PLACES).unwrap();
+            let model = Contrast::between(sides, MODEL_ONLY, |sum| sum).unwrap();
+            by_model += model.wald_statistic(PLACES).unwrap();
         }
         let n = runs as f64;
         let mean = sum / n;
@@ -227,7 +227,7 @@ mod tests {
         for (pole, [low, high]) in [(0.0, [0.9, 1.6]), (0.9, [3.0, 12.0])] {
             let mut random = 5;
             let all = blocks(70, &STATE, pole, &mut random);
-            let [shown, model] = [1.0, BY_MODEL].map(|w| {
+            let [shown, model] = [1.0, MODEL_ONLY].map(|w| {
                 let sides = [&all[..60], &all[60..]];
                 Contrast::between(sides, w, |sum| sum).unwrap()
             });
@@ -243,8 +243,8 @@ mod tests {
         let mut all = blocks(60, &STATE, 0.0, &mut random);
         let changed = core::array::from_fn(|i| STATE[i] + if i == 1 { 1.0 } else { 0.0 });
         all.extend(blocks(10, &changed, 0.0, &mut random));
-        let contrast = Contrast::between([&all[..60], &all[60..]], SHOWN, |sum| sum).unwrap();
-        assert!(contrast.distance(PLACES).unwrap() > 100.0);
+        let contrast = Contrast::between([&all[..60], &all[60..]], EMPIRICAL_SHARE, |sum| sum).unwrap();
+        assert!(contrast.wald_statistic(PLACES).unwrap() > 100.0);
         for i in 0..STATES {
             let expected = if i == 1 { 1.0 } else { 0.0 };
             let error = libm::sqrt(contrast.covariance[i][i]);
@@ -258,10 +258,10 @@ mod tests {
     fn blocks_that_say_nothing_have_no_contrast() {
         let mut random = 4;
         let all = blocks(20, &STATE, 0.0, &mut random);
-        assert!(Contrast::between([&[], &all], SHOWN, |sum| sum).is_none());
-        assert!(Contrast::between([&all, &[EMPTY; 4]], SHOWN, |sum| sum).is_none());
+        assert!(Contrast::between([&[], &all], EMPIRICAL_SHARE, |sum| sum).is_none());
+        assert!(Contrast::between([&all, &[EMPTY; 4]], EMPIRICAL_SHARE, |sum| sum).is_none());
         let nothing = |sum: Block| sum;
-        assert!(Contrast::between([&[EMPTY; 10], &[EMPTY; 4]], SHOWN, nothing).is_none());
-        assert!(Contrast::default().distance(PLACES).is_none());
+        assert!(Contrast::between([&[EMPTY; 10], &[EMPTY; 4]], EMPIRICAL_SHARE, nothing).is_none());
+        assert!(Contrast::default().wald_statistic(PLACES).is_none());
     }
 }

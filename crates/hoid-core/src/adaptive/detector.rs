@@ -1,116 +1,115 @@
-//! Has the person changed? Now against before, over blocks of half a second (`blocks`).
+//! Has the operator changed? A Wald test of the last seconds against the time before, over blocks of half a second
+//! (`blocks`).
 //!
-//! Least squares over the last blocks and over those before, with gains, natural frequency, damping, delay and
-//! level free in both, give a difference d with the covariance C that the scores of the blocks show
-//! (`contrast`). Of gains, natural frequency, damping and delay, the level not,
+//! Least squares over the last blocks and over those before, with gains, natural frequency, damping, delay and level free
+//! in both, give a difference d with the covariance C of the scores (`contrast`). For gains, natural frequency, damping
+//! and delay, but not for the level,
 //!
 //! `T = d' C^-1 d`
 //!
-//! is a chi-square with `nu = 6` degrees of freedom where nothing changes. It is looked at over a short and over a
-//! long present: small changes need more data than large ones. A second between present and past is left out:
-//! nobody changes at the end of a block.
+//! is chi-square with `nu = 6` degrees of freedom without a change (G. C. Chow, *Econometrica* 28 (1960) 591-605). It is
+//! computed for a short and for a long present: small changes need more data than large ones. One second between past and
+//! present is left out, since a change need not be at the border of a block.
 //!
-//! Some people vary more than others, so T is divided by the root of the level c at which it has been so far, from
-//! the mean of log T, whose expectation for a chi-square is `ln 2 + psi(nu/2)`; c is at least one, and what is
-//! supposed of it counts for half a minute. T is then told as what it has against chance, in nats: with
-//! `x = T/2 sqrt c`
+//! **Normalisation.** Operators vary to different degrees. T is therefore divided by the root of its level c without a
+//! change, from the mean of `ln T`, whose expectation for a chi-square is `ln 2 + psi(nu/2)`; c is at least one, and its
+//! prior counts as half a minute of blocks. The statistic is reported as its log significance in nats, with `x = T/2 sqrt c`
 //!
-//! `-ln P(chi^2 > 2x) = x - ln (1 + x + .. + x^(nu/2-1)/(nu/2-1)!)`.
+//! `-ln P(chi^2 > 2x) = x - ln (1 + x + .. + x^(nu/2-1)/(nu/2-1)!)`
 //!
-//! A change is declared where one of them is above the threshold. When it was, and what changed, is told by the
-//! block that leaves least where all is free before it and behind it (R. E. Quandt, *J. American Statistical
-//! Association* 53 (1958) 873-880).
+//! (M. Abramowitz and I. A. Stegun, 1964, eq. 6.3.3, 6.3.4, 26.4.5).
 //!
-//! The blocks are those of the candidate of now (`last_blocks`), all behind its noise model and in its
-//! basis: when another takes over, so do its blocks. From three seconds behind a gap on, what is behind it is held
-//! against what was before.
+//! **Declaration.** A change is declared if one of the statistics exceeds the threshold. Its time is the border of blocks
+//! with the least residual sum of squares when all parameters are free before and after it (R. E. Quandt, *J. American
+//! Statistical Association* 53 (1958) 873-880).
 //!
-//! Sources: G. C. Chow, *Econometrica* 28 (1960) 591-605; the mean of the logarithm and the tail: M. Abramowitz and I. A.
-//! Stegun, 1964, eq. 6.3.3, 6.3.4, 26.4.5.
+//! The blocks belong to the live candidate (`last_blocks`), with its noise model and basis. From three seconds
+//! after a gap on, the time after it is compared with the time before it.
 
 use super::{
     blocks::Block,
-    contrast::{BY_MODEL, Contrast, SHOWN},
+    contrast::{Contrast, EMPIRICAL_SHARE, MODEL_ONLY},
     difference::Difference,
     last_blocks::{BLOCK_S, BLOCKS, LastBlocks},
-    sizes::{GAINS, HELD, LINEAR},
+    sizes::{DYNAMICS, GAINS, LINEAR},
 };
 
 /// Expectation of the logarithm of a chi-square with one pair of degrees of freedom, `ln 2 - gamma`.
 const MEAN_LOG: f64 = 0.115_931_515_658_412_45;
-/// Gains and what is held.
-const OPERATOR: usize = GAINS + HELD;
-/// Where they are among the states: all but the level.
-const PLACES: [usize; OPERATOR] = [0, 1, 2, LINEAR, LINEAR + 1, LINEAR + 2];
+/// Number of parameters that are tested: gains and dynamics.
+const OPERATOR: usize = GAINS + DYNAMICS;
+/// Their indices in the state: all except the level.
+const OPERATOR_STATES: [usize; OPERATOR] = [0, 1, 2, LINEAR, LINEAR + 1, LINEAR + 2];
 /// Pairs of degrees of freedom.
 const PAIRS: u32 = OPERATOR as u32 / 2;
-/// Blocks between before and now.
-const APART: usize = 2;
-/// Blocks behind a gap from which they are held against those before it.
-const FEWEST: usize = 4;
-/// Blocks that the supposed level of T, that of a chi-square, counts for.
-const SUPPOSED: f64 = 60.0;
-/// Blocks that the level is a mean of at most.
-const LONGEST: f64 = 240.0;
-/// By so much a logarithm raises the level at most: a change is no usual variation.
-const MOST: f64 = 3.0;
+/// Blocks between past and present.
+const GUARD_BLOCKS: usize = 2;
+/// Least number of blocks of a present after a gap.
+const LEAST_AFTER_GAP: usize = 4;
+/// Number of blocks that the prior of the level, that of a chi-square, counts as.
+const PRIOR_BLOCKS: f64 = 60.0;
+/// Largest number of blocks in the mean of the level.
+const LEVEL_MEMORY: f64 = 240.0;
+/// Largest contribution of one logarithm to the level: a change must not count as variation.
+const LARGEST_LOG_STEP: f64 = 3.0;
 
-/// What the detector looks at.
+/// Settings of the detector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Detection {
-    /// Blocks of the present: of a short and of a long one.
+    /// Number of blocks of the short and of the long present.
     pub recent: [usize; 2],
-    /// Least number of blocks before.
+    /// Least number of blocks of the past.
     pub least: usize,
-    /// Largest number of blocks before.
+    /// Largest number of blocks of the past.
     pub most: usize,
-    /// What a difference must have against chance, nats.
+    /// Log significance at which a change is declared, nats.
     pub threshold: f64,
-    /// Standard deviations that are supposed of what is held, in its units.
-    pub held: [f64; HELD],
-    /// Blocks after a change in which none is declared.
+    /// Prior standard deviations of the dynamics, in their units.
+    pub dynamics: [f64; DYNAMICS],
+    /// Number of blocks after a declared change in which no other is declared.
     pub refractory: u64,
 }
 
-/// A statistic in units of what it has been.
+/// A statistic and its level without a change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Statistic {
     level: f64,
     levels: f64,
-    against_chance: f64,
+    log_significance: f64,
 }
 
-crate::state!([] Statistic { level, levels, against_chance });
+crate::state!([] Statistic { level, levels, log_significance });
 
 impl Statistic {
     fn new() -> Self {
         Self {
             level: mean_log(PAIRS),
-            levels: SUPPOSED,
-            against_chance: 0.0,
+            levels: PRIOR_BLOCKS,
+            log_significance: 0.0,
         }
     }
 
-    /// How many times larger than a chi-square it has been.
-    fn usual(&self) -> f64 {
+    /// Ratio of the statistic to a chi-square so far, at least one.
+    fn scale(&self) -> f64 {
         libm::exp(self.level - mean_log(PAIRS)).max(1.0)
     }
 
     fn take(&mut self, t: f64) {
-        self.against_chance = against_chance(t / libm::sqrt(self.usual()), PAIRS);
-        self.levels = (self.levels + 1.0).min(SUPPOSED + LONGEST);
-        let log = libm::log(t.max(0.05)).min(self.level + MOST);
+        // The test uses the level before this block, so that a change does not reduce its own significance.
+        self.log_significance = log_significance(t / libm::sqrt(self.scale()), PAIRS);
+        self.levels = (self.levels + 1.0).min(PRIOR_BLOCKS + LEVEL_MEMORY);
+        let log = libm::log(t.max(0.05)).min(self.level + LARGEST_LOG_STEP);
         self.level += (log - self.level) / self.levels;
     }
 }
 
-/// Expectation of the logarithm of a chi-square with so many pairs of degrees of freedom.
+/// Expectation of the logarithm of a chi-square with a given number of pairs of degrees of freedom.
 fn mean_log(pairs: u32) -> f64 {
     MEAN_LOG + (1..pairs).map(|k| 1.0 / f64::from(k)).sum::<f64>()
 }
 
-/// `-ln P(chi^2 > x)` for a chi-square with so many pairs of degrees of freedom.
-fn against_chance(x: f64, pairs: u32) -> f64 {
+/// `-ln P(chi^2 > x)` for a chi-square with a given number of pairs of degrees of freedom.
+fn log_significance(x: f64, pairs: u32) -> f64 {
     let half = 0.5 * x;
     let (mut term, mut sum) = (1.0, 1.0);
     for k in 1..pairs {
@@ -120,92 +119,93 @@ fn against_chance(x: f64, pairs: u32) -> f64 {
     half - libm::log(sum)
 }
 
-/// What the blocks say.
+/// The detector.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detector {
-    what: Detection,
-    /// Over the short and over the long present.
+    settings: Detection,
+    /// For the short and for the long present.
     statistics: [Statistic; 2],
     /// Blocks since the last change was declared.
     since: u64,
     declared: bool,
-    told: Contrast,
+    declared_contrast: Contrast,
     innovation_variances: [f64; 2],
     difference: Difference,
     ago: usize,
 }
 
-crate::state!([] Detector { statistics, since, declared, told, innovation_variances, difference, ago });
+crate::state!([] Detector { statistics, since, declared, declared_contrast, innovation_variances, difference, ago });
 
 impl Detector {
-    /// Before the first block. `None` where there is no room for the blocks.
-    pub fn new(what: Detection) -> Option<Self> {
-        let [short, long] = what.recent;
+    /// The detector before the first block. `None` if there is no room for the blocks.
+    pub fn new(settings: Detection) -> Option<Self> {
+        let [short, long] = settings.recent;
         let present = short > 0 && short <= long;
-        let room = present && what.least > 0 && what.least <= what.most && long + what.most <= BLOCKS;
-        let sound = what.held.iter().all(|d| *d > 0.0 && d.is_finite());
+        let room = present && settings.least > 0 && settings.least <= settings.most && long + settings.most <= BLOCKS;
+        let sound = settings.dynamics.iter().all(|d| *d > 0.0 && d.is_finite());
         (room && sound).then_some(Self {
-            what,
+            settings,
             statistics: [Statistic::new(); 2],
             since: u64::MAX >> 12,
             declared: false,
-            told: Contrast::default(),
+            declared_contrast: Contrast::default(),
             innovation_variances: [0.0; 2],
             difference: Difference::default(),
             ago: 0,
         })
     }
 
-    /// Looks at blocks of which the last is new. `held` is where what is held is now, about the basis of the
+    /// Tests blocks of which the last is new. `dynamics` are the current corrections, relative to the basis of the
     /// blocks.
-    pub(super) fn look(&mut self, last: &LastBlocks, held: [f64; HELD]) {
+    pub(super) fn test(&mut self, last: &LastBlocks, dynamics: [f64; DYNAMICS]) {
         self.declared = false;
         self.since += 1;
-        // What was before the last change is no measure of what comes.
+        // Blocks before the last declared change belong to another operator and are not used.
         let known = last
             .all()
             .len()
             .min(usize::try_from(self.since).unwrap_or(BLOCKS) + self.ago);
         let blocks = &last.all()[last.all().len() - known..];
         for present in 0..self.statistics.len() {
-            match self.distance(blocks, last.fresh(), held, present) {
+            match self.wald_statistic(blocks, last.fresh(), dynamics, present) {
                 Some(t) => self.statistics[present].take(t),
-                None => self.statistics[present].against_chance = 0.0,
+                None => self.statistics[present].log_significance = 0.0,
             }
         }
-        if self.against_chance() > self.what.threshold && self.since > self.what.refractory {
+        if self.log_significance() > self.settings.threshold && self.since > self.settings.refractory {
             self.declared = true;
             self.since = 0;
-            let [_, long] = self.what.recent;
-            self.split(blocks, held, long.min(last.fresh()));
+            let [_, long] = self.settings.recent;
+            self.locate_change(blocks, dynamics, long.min(last.fresh()));
         }
     }
 
-    /// T of a present; `None` where there is too little to compare.
-    fn distance(&self, blocks: &[Block], fresh: usize, held: [f64; HELD], present: usize) -> Option<f64> {
+    /// T for a present; `None` if there are too few blocks.
+    fn wald_statistic(&self, blocks: &[Block], fresh: usize, dynamics: [f64; DYNAMICS], present: usize) -> Option<f64> {
         let Detection {
             recent, least, most, ..
-        } = self.what;
+        } = self.settings;
         let recent_blocks = recent[present].min(fresh);
         let now = blocks.len().saturating_sub(recent_blocks);
-        let before = now.saturating_sub(APART);
-        if before < least || recent_blocks < FEWEST.min(recent[0]) {
+        let before = now.saturating_sub(GUARD_BLOCKS);
+        if before < least || recent_blocks < LEAST_AFTER_GAP.min(recent[0]) {
             return None;
         }
         let sides = [&blocks[before.saturating_sub(most)..before], &blocks[now..]];
-        self.contrast(sides, SHOWN, held)?.distance(PLACES)
+        self.compare(sides, EMPIRICAL_SHARE, dynamics)?
+            .wald_statistic(OPERATOR_STATES)
     }
 
-    /// The change is supposed to be at the block that leaves least where all is free before it and behind it.
-    /// What changed is told in the metric of the noise model, whose covariance is raised by how much more the
-    /// scores show in the mean between the halves of what was before: that of the scores alone is too uncertain to
-    /// tell gains from a delay, and those behind the change have the change in them.
-    fn split(&mut self, blocks: &[Block], held: [f64; HELD], recent: usize) {
+    /// Locates the change at the border of blocks with the least residual sum of squares. The difference is reported
+    /// with the covariance of the noise model times a dispersion: the mean ratio of the covariance of the scores to
+    /// that of the model between the halves of the past. The covariance of the scores alone is too uncertain to
+    /// distinguish gains from a delay, and scores of the present contain the change.
+    fn locate_change(&mut self, blocks: &[Block], dynamics: [f64; DYNAMICS], recent: usize) {
         let mut best: Option<Contrast> = None;
         self.ago = recent.min(blocks.len().saturating_sub(1));
         for after in 1..=self.ago {
             let (past, present) = blocks.split_at(blocks.len() - after);
-            let Some(contrast) = self.contrast([past, present], BY_MODEL, held) else {
+            let Some(contrast) = self.compare([past, present], MODEL_ONLY, dynamics) else {
                 continue;
             };
             if best.is_none_or(|best| contrast.left < best.left) {
@@ -214,51 +214,50 @@ impl Detector {
         }
         let (past, present) = blocks.split_at(blocks.len() - self.ago);
         let halves = past.split_at(past.len() / 2);
-        let [by_model, shown] = [BY_MODEL, SHOWN].map(|w| self.contrast([halves.0, halves.1], w, held));
+        let [by_model, shown] = [MODEL_ONLY, EMPIRICAL_SHARE].map(|w| self.compare([halves.0, halves.1], w, dynamics));
         let dispersion = shown.zip(by_model).and_then(|(shown, model)| shown.dispersion(&model));
-        self.told = best.unwrap_or_default().times(dispersion.unwrap_or(1.0).max(1.0));
+        self.declared_contrast = best.unwrap_or_default().times(dispersion.unwrap_or(1.0).max(1.0));
         self.innovation_variances = [past, present].map(|side| Block::of(side).innovation_variance());
-        self.difference = Difference::of(&self.told).unwrap_or_default();
+        self.difference = Difference::of(&self.declared_contrast).unwrap_or_default();
     }
 
-    /// Gains, level and what is held, now against before.
-    fn contrast(&self, sides: [&[Block]; 2], shown: f64, held: [f64; HELD]) -> Option<Contrast> {
-        let deviations = self.what.held;
-        Contrast::between(sides, shown, |sum| sum.with_prior(held, deviations))
+    /// The difference of all states between two spans.
+    fn compare(&self, sides: [&[Block]; 2], shown: f64, dynamics: [f64; DYNAMICS]) -> Option<Contrast> {
+        let deviations = self.settings.dynamics;
+        Contrast::between(sides, shown, |sum| sum.with_prior(dynamics, deviations))
     }
 
-    /// How long ago the change that was declared last had been, when it was declared, s.
+    /// Time from the last declared change to its declaration, s.
     pub fn ago_s(&self) -> f64 {
         self.ago as f64 * BLOCK_S
     }
 
-    /// What the last block has against chance, nats: the most that one of them has; zero while there is too
-    /// little to compare.
-    pub fn against_chance(&self) -> f64 {
-        self.statistics.iter().fold(0.0, |most, s| s.against_chance.max(most))
+    /// Log significance at the last block, nats: the larger of both statistics; zero while there are too few blocks.
+    pub fn log_significance(&self) -> f64 {
+        self.statistics.iter().fold(0.0, |most, s| s.log_significance.max(most))
     }
 
-    /// How many times larger than a chi-square T has been without a change: the most of all.
-    pub fn usual_level(&self) -> f64 {
-        self.statistics.iter().fold(1.0, |most, s| s.usual().max(most))
+    /// Ratio of T to a chi-square without a change: the larger of both statistics.
+    pub fn typical_level(&self) -> f64 {
+        self.statistics.iter().fold(1.0, |most, s| s.scale().max(most))
     }
 
-    /// Before and behind the change that was declared last.
-    pub fn told(&self) -> &Contrast {
-        &self.told
+    /// The difference at the last declared change.
+    pub fn contrast(&self) -> &Contrast {
+        &self.declared_contrast
     }
 
-    /// Mean square of the innovations before and behind it.
+    /// Mean square of the innovations before and after the last declared change.
     pub fn innovation_variances(&self) -> [f64; 2] {
         self.innovation_variances
     }
 
-    /// True where a change was declared at the last sample.
+    /// True if a change was declared at the last sample.
     pub fn declared(&self) -> bool {
         self.declared
     }
 
-    /// What changed at the change that was declared last.
+    /// Parameters that changed at the last declared change.
     pub fn difference(&self) -> &Difference {
         &self.difference
     }
@@ -282,9 +281,9 @@ mod tests {
             (3, [12.5916, 22.4577]),
         ] {
             for (x, q) in [(five, 0.05_f64), (one, 0.001)] {
-                assert!((against_chance(x, pairs) + libm::log(q)).abs() < 1e-4, "{pairs} {q}");
+                assert!((log_significance(x, pairs) + libm::log(q)).abs() < 1e-4, "{pairs} {q}");
             }
         }
-        assert_eq!(against_chance(0.0, 3), 0.0);
+        assert_eq!(log_significance(0.0, 3), 0.0);
     }
 }

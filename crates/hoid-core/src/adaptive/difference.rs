@@ -1,16 +1,15 @@
-//! What changed: the difference of now from before, with its full covariance.
+//! Which parameters changed: the difference of the present from the past, by groups of parameters.
 //!
-//! Gains, level and what is held differ by d with the covariance C (`contrast`). Of that difference, `W = C^-1`,
-//! nobody asks for all at once: a delay that grows looks
-//! like gains that turn, and seconds hardly tell them apart. So each group (the gains; natural frequency
-//! and damping; the delay) is supposed to have changed or not, the level always; what is in the set S is
-//! then
+//! Gains, level and dynamics differ by d with the covariance C (`contrast`), `W = C^-1`. Not all components can be
+//! distinguished: a longer delay resembles a turned gain vector, and seconds of data hardly separate them. Each group (the
+//! gains; natural frequency and damping; the delay) therefore either changed or did not; the level always did. For the set
+//! S of the components that changed,
 //!
 //! `d_S = (W_SS)^-1 (W d)_S`, with the covariance `(W_SS)^-1`,
 //!
-//! and `chi_S^2 = d' W d - d_S' (W d)_S` is what the others would have to have changed by chance. The set with
-//! the least `chi_S^2 + 4 |S|` is told: between the 2 of Akaike and the logarithm of the number of samples
-//! of Schwarz (G. Schwarz, *Annals of Statistics* 6 (1978) 461-464).
+//! and `chi_S^2 = d' W d - d_S' (W d)_S` is the statistic of the hypothesis that the others did not change. The set with
+//! the least `chi_S^2 + 4 |S|` is reported. The penalty lies between the 2 of Akaike and the logarithm of the number of
+//! samples of Schwarz (*Annals of Statistics* 6 (1978) 461-464).
 
 use hoid_numerics::{cholesky, products::dot};
 
@@ -19,18 +18,18 @@ use super::{
     sizes::{GAINS, LINEAR, STATES},
 };
 
-/// What another parameter has to be worth.
+/// Penalty per parameter.
 const PRICE: f64 = 4.0;
-/// Groups that change together, by the bits of a set: gains, neuromuscular system, delay.
+/// Number of sets of the groups (gains, neuromuscular system, delay), each a bit.
 const SETS: usize = 8;
 const GAINS_BIT: usize = 1;
 const SYSTEM_BIT: usize = 2;
 const DELAY_BIT: usize = 4;
 
-/// What changed, by how much.
+/// The parameters that changed, and by how much.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Difference {
-    /// Gains, level, natural frequency, damping, delay: zero for what did not change.
+    /// Gains, level, natural frequency, damping, delay: zero for parameters that did not change.
     pub value: [f64; STATES],
     /// Its covariance.
     pub covariance: [[f64; STATES]; STATES],
@@ -41,7 +40,7 @@ pub struct Difference {
 crate::state!([] Difference { value, covariance, changed });
 
 impl Difference {
-    /// `None` where the contrast does not determine it.
+    /// `None` if the contrast does not determine it.
     pub(super) fn of(contrast: &Contrast) -> Option<Self> {
         let (d, mut factor) = (contrast.difference, contrast.covariance);
         if !cholesky::factor(&mut factor, STATES) {
@@ -50,7 +49,7 @@ impl Difference {
         let w = cholesky::scaled_inverse(&factor, STATES, 1.0);
         let mut best = None;
         let mut least = f64::MAX;
-        // Each set but the empty one.
+        // All sets except the empty one.
         for set in 1..SETS {
             let is_in = |i: usize| match i {
                 0..GAINS => set & GAINS_BIT > 0,
@@ -102,7 +101,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// A delay that is told only together with the gains.
+    /// A delay that is reported only together with the gains.
     fn contrast(difference: [f64; STATES]) -> Contrast {
         let mut covariance = [[0.0; STATES]; STATES];
         for (i, row) in covariance.iter_mut().enumerate() {
@@ -122,7 +121,8 @@ mod tests {
 
     #[test]
     fn the_simplest_set_that_explains_is_told() {
-        // Along the delay alone: neither gains nor delay differ by much beside their own errors.
+        // Along the delay alone: neither gains nor delay differ by much compared with their own
+        // errors.
         let told = Difference::of(&contrast([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.5])).unwrap();
         assert_eq!(told.changed, [false, false, true]);
         assert!((told.value[6] - 1.5).abs() < 1e-9 && told.value[0] == 0.0);
@@ -130,7 +130,7 @@ mod tests {
         assert!(told.covariance[6][6] < 0.1, "{}", told.covariance[6][6]);
         let told = Difference::of(&contrast([0.0, 1.5, 0.0, 0.0, 2.0, 0.0, 0.0])).unwrap();
         assert_eq!(told.changed, [true, true, false]);
-        // All together are what the difference is.
+        // All together give the difference.
         let difference = [2.0, 2.0, 2.0, 2.0, 2.0, 2.0, -12.0];
         let told = Difference::of(&contrast(difference)).unwrap();
         assert_eq!(told.changed, [true; 3]);

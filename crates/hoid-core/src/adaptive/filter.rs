@@ -1,8 +1,8 @@
-//! The recursion: a sample in, an estimate out.
+//! The recursion: one sample in, one estimate out.
 //!
-//! The candidate of now ([`super::candidate`]) takes each sample as it comes; what it learns and what it only follows
-//! is decided here, and remembered for those who read the record again (`replay`). The detector looks at the blocks of
-//! the candidate of now.
+//! The live candidate ([`super::candidate`]) processes each sample on arrival. This module decides which samples update
+//! the estimate and which only advance the filters, and stores the decision for the replays (`replay`). The detector
+//! tests the blocks of the live candidate.
 
 mod replay;
 
@@ -14,12 +14,12 @@ use super::{
     candidate::{Candidate, LARGEST, LATEST_S},
     detector::Detector,
     history::{History, Use},
-    known::Known,
+    initial_estimate::InitialEstimate,
     mixture::{Mixture, NoiseScales},
     noise::NoiseModel,
     prior::AdaptivePrior,
     saturation::Saturation,
-    sizes::{GAINS, HELD, LINEAR, STATES},
+    sizes::{DYNAMICS, GAINS, LINEAR, STATES},
 };
 use crate::{
     recursion::Step,
@@ -27,25 +27,26 @@ use crate::{
 };
 
 /// Trust region of the corrections in a replay: shares of omega and zeta, and s.
-const NEAR: [f64; HELD] = [0.15, 0.3, 0.03];
-/// Time from which a replay learns nothing, s: its filters start at rest, and the person did not.
+const NEAR: [f64; DYNAMICS] = [0.15, 0.3, 0.03];
+/// Time that a replay skips at its start, s: its filters start at rest, the signals do not.
 const AT_REST_S: f64 = 2.0;
-/// Time from which nothing is learnt of signals that do not move, s.
+/// Time after which constant signals no longer update the estimate, s.
 const STILL_S: f64 = 0.1;
-/// Time after that until the filters have settled, s.
+/// Time after a constant span until the filters have settled, s.
 const SETTLING_S: f64 = 2.0;
 
-/// The recursion. E is the memory for past samples.
+/// The recursion. E is the memory of past samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdaptiveFilter<E> {
     prior: AdaptivePrior,
     origin: Basis,
-    known: Option<Known>,
-    supposed: NoiseModel,
+    initial: Option<InitialEstimate>,
+    prior_noise: NoiseModel,
     live: Candidate,
-    began: bool,
+    started: bool,
     trial: Candidate,
-    /// 0: nothing is replayed; 1: the estimate; from 2 on: a start elsewhere.
+    /// 0: no replay; 1: a replay from the estimate; 2 and more: a replay from another starting
+    /// point.
     stage: u64,
     /// The next sample of the replay.
     at: u64,
@@ -54,16 +55,16 @@ pub struct AdaptiveFilter<E> {
     detector: Detector,
     history: History<E>,
     saturation: Saturation,
-    /// Sums of the squares of e, of u, and of u behind the noise model that is supposed, which no estimate leaves
-    /// more of than that of no response at all.
+    /// Sums of the squares of e, of u, and of `D u` for the prior D: the last bounds the innovation variance from
+    /// above, since it is that of a response of zero.
     powers: [f64; 3],
     restarts: u64,
     age: u64,
-    /// Samples in which neither signal has moved.
+    /// Number of samples in which neither signal has changed.
     still: u64,
-    /// Samples since then.
+    /// Number of samples since then.
     settling: u64,
-    /// Samples that went into the filters alone.
+    /// Number of samples that only advanced the filters.
     passed: u64,
 }
 
@@ -73,7 +74,7 @@ impl<E: AsMut<[f64]>> State for AdaptiveFilter<E> {
             &mut [
                 &mut self.history,
                 &mut self.live,
-                &mut self.began,
+                &mut self.started,
                 &mut self.trial,
                 &mut self.stage,
                 &mut self.at,
@@ -94,8 +95,8 @@ impl<E: AsMut<[f64]>> State for AdaptiveFilter<E> {
 }
 
 impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
-    /// At rest. `memory` is for [`memory_needed`] numbers, or fewer for no replays, but never fewer than
-    /// [`least_memory`]. `None` for numbers that make no sense, or too little memory.
+    /// The recursion at rest. `memory` holds [`memory_needed`] numbers, or fewer for no replays, at least
+    /// [`least_memory`]. `None` for invalid numbers or too little memory.
     pub fn new(prior: AdaptivePrior, memory: E) -> Option<Self> {
         let ts = prior.sample_time;
         if !prior.is_sound() || prior.person.tau > LATEST_S || memory.as_ref().len() < least_memory(ts) {
@@ -103,7 +104,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
         let basis = Basis::new(prior.person, ts)?;
         let detector = Detector::new(prior.detection)?;
-        let supposed = NoiseModel::new(prior.order, prior.noise_memory, ts)?;
+        let prior_noise = NoiseModel::new(prior.order, prior.noise_memory, ts)?;
         let scales = NoiseScales {
             unit: 1.0,
             size: 1.0,
@@ -114,8 +115,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         let mixture = Mixture::new(&prior.changes, &basis, &scales, variances(&prior));
         let live = Candidate::new(
             basis.clone(),
-            &supposed,
-            supposed.clone(),
+            &prior_noise,
+            prior_noise.clone(),
             mixture,
             scales,
             &prior.changes,
@@ -124,11 +125,11 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         Some(Self {
             prior,
             origin: basis,
-            known: None,
-            supposed,
+            initial: None,
+            prior_noise,
             trial: live.clone(),
             live,
-            began: false,
+            started: false,
             stage: 0,
             at: 0,
             replays: 0,
@@ -145,25 +146,26 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         })
     }
 
-    /// Starts at once, at what is known of the person. `None` for numbers that make no sense.
-    pub fn with_initial_estimate(mut self, known: &Known) -> Option<Self> {
-        if !known.is_sound() || !known.place_in(&mut self.supposed, self.prior.sample_time) {
+    /// Starts immediately at an earlier estimate of the person. `None` for invalid numbers.
+    pub fn with_initial_estimate(mut self, known: &InitialEstimate) -> Option<Self> {
+        if !known.is_sound() || !known.apply_to_noise(&mut self.prior_noise, self.prior.sample_time) {
             return None;
         }
-        self.known = Some(*known);
-        self.live = self.candidate(self.origin.point(), &self.supposed, 1.0)?;
-        self.began = true;
+        self.initial = Some(*known);
+        self.live = self.candidate(self.origin.point(), &self.prior_noise, 1.0)?;
+        self.started = true;
         Some(self)
     }
 
-    /// Scales by the data so far.
+    /// Scales of the signals from the data so far.
     fn scales(&self, dispersion: f64) -> NoiseScales {
         let [e, u, y] = self.powers;
         let samples = self.history.samples().max(1) as f64;
         let measured = NoiseScales {
+            // |Y| is about sqrt(power of u/power of e): the scale of the prior of the gains.
             unit: libm::sqrt(u / e),
             size: libm::sqrt(u / samples),
-            innovations: match (self.began, &self.known) {
+            innovations: match (self.started, &self.initial) {
                 (true, _) => self.live.mixture.variance(),
                 (false, Some(known)) => known.variance,
                 (false, None) => y / samples,
@@ -171,7 +173,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             sample_time: self.prior.sample_time,
             dispersion,
         };
-        match &self.known {
+        match &self.initial {
             Some(known) => NoiseScales {
                 unit: known.unit,
                 size: measured.size.max(libm::sqrt(known.covariance[GAINS][GAINS])),
@@ -181,12 +183,12 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
     }
 
-    /// One that starts at the oldest sample that a replay reads.
+    /// A candidate that starts at the oldest sample that a replay reads.
     fn candidate(&self, point: Point, d: &NoiseModel, dispersion: f64) -> Option<Candidate> {
         let (ts, changes) = (self.prior.sample_time, &self.prior.changes);
         let basis = Basis::new(point, ts)?;
         let scales = self.scales(dispersion);
-        let mixture = match &self.known {
+        let mixture = match &self.initial {
             Some(known) => {
                 let units = self.origin.units_of(&basis);
                 let of = |i: usize| units.get(i).copied().unwrap_or(1.0);
@@ -200,18 +202,20 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
                 Mixture::at(changes, state, covariance, known.variance)
             }
             None => {
-                let held = match self.replays_anything() {
+                // With replays the basis moves between them, and each replay has a trust region about its point; without,
+                // the corrections carry the whole prior of people.
+                let dynamics = match self.replays_anything() {
                     true => trusted(point),
                     false => variances(&self.prior),
                 };
-                Mixture::new(changes, &basis, &scales, held)
+                Mixture::new(changes, &basis, &scales, dynamics)
             }
         };
         let start = self.history.samples().saturating_sub(self.window());
         let empty = NoiseModel::new(self.prior.order, self.prior.noise_memory, ts)?;
         let there = self.history.samples().saturating_sub(start);
         let skipped = (libm::round(AT_REST_S / ts) as u64).min(there / 2);
-        Some(Candidate::new(basis, d, empty, mixture, scales, changes, start).skipping(skipped))
+        Some(Candidate::new(basis, d, empty, mixture, scales, changes, start).with_skipped(skipped))
     }
 
     /// Samples that a replay reads.
@@ -227,21 +231,22 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// Takes a sample. Both must be finite.
     pub fn step(&mut self, e: f64, u: f64) -> Step {
         self.respond(e);
-        let end = self.saturation.end(u).filter(|_| self.began);
+        let end = self.saturation.end(u).filter(|_| self.started);
         self.saturation.remember(u);
         self.detector.pass_over();
         if let Some(end) = end {
-            // It was there a sample ago: so much was not known then, but the next replay knows it.
+            // The previous sample was at the limit as well, which is known only now. The next
+            // replay uses it.
             self.history.revise_previous(end);
             return self.pass(u, end);
         }
-        if self.stands_still(u) {
-            return self.pass(u, Use::Follow);
+        if self.is_stationary(u) {
+            return self.pass(u, Use::FilterOnly);
         }
         self.powers[0] += e * e;
         self.powers[1] += u * u;
-        if !self.began {
-            // Before that the whitening filter is not full.
+        if !self.started {
+            // Before, the whitening filter does not have all its outputs.
             if self.history.samples() > self.prior.order as u64 {
                 let y = self.live.whitened(u).y;
                 self.powers[2] += y * y;
@@ -255,8 +260,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
         let white = self.live.whitened(u);
         let innovation = self.live.innovation(&white);
-        if !self.live.learn(&white, u, &self.prior.changes) {
-            self.rest();
+        if !self.live.update(&white, u, &self.prior.changes) {
+            self.restart();
             return Step {
                 innovation: 0.0,
                 shortened: true,
@@ -269,7 +274,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             false => self.live.renew(),
         }
         if self.live.blocks.closed() {
-            self.look_for_changes();
+            self.test_for_change();
         }
         Step {
             innovation,
@@ -277,10 +282,10 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
     }
 
-    /// Nothing is learnt while neither signal moves: it would be that of a recording that stands, or of a
-    /// person who rests, and the innovation variance would vanish.
+    /// While neither signal changes there is no update: the recorder has stopped or the person rests, and the
+    /// innovation variance would go to zero.
     #[inline(always)]
-    fn stands_still(&mut self, u: f64) -> bool {
+    fn is_stationary(&mut self, u: f64) -> bool {
         let samples = self.history.samples();
         let moved = samples < 2 || {
             let (newest, before) = (samples - 1, samples - 2);
@@ -290,7 +295,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         if !moved {
             self.still += 1;
         } else if seconds(self.still) > STILL_S && seconds(self.settling) < SETTLING_S {
-            // What went on meanwhile is not in the filters.
+            // The filters lack the signals of the constant span and need time to settle.
             self.settling += 1;
         } else {
             (self.still, self.settling) = (0, 0);
@@ -298,7 +303,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         seconds(self.still) > STILL_S
     }
 
-    /// A sample from which nothing is learnt.
+    /// A sample without update.
     fn pass(&mut self, u: f64, use_of_it: Use) -> Step {
         let innovation = self.live.innovation(&self.live.whitened(u));
         let through = through_filters(&self.saturation, use_of_it, u, u - innovation);
@@ -311,7 +316,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
                 shortened: false,
             };
         }
-        self.rest();
+        self.restart();
         Step {
             innovation: 0.0,
             shortened: true,
@@ -322,7 +327,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     pub fn step_without_update(&mut self, e: f64, u: f64) -> Step {
         self.respond(e);
         self.detector.pass_over();
-        self.pass(u, Use::Follow)
+        self.pass(u, Use::FilterOnly)
     }
 
     /// As [`AdaptiveFilter::step_without_update`] where the output is missing: the one-step
@@ -333,7 +338,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.pass(0.0, Use::Missing);
     }
 
-    /// The signals of a sample.
+    /// Advances the basis by a sample.
     #[inline(always)]
     fn respond(&mut self, e: f64) {
         self.history.push(e);
@@ -343,44 +348,44 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     }
 
     fn keep(&mut self, u: f64) {
-        self.history.complete(u, Use::Learn);
+        self.history.complete(u, Use::Update);
         self.live.remember(u);
     }
 
-    /// What the detector says of the last blocks.
-    fn look_for_changes(&mut self) {
-        let held = core::array::from_fn(|j| self.live.mixture.mean()[LINEAR + j]);
-        self.detector.look(&self.live.blocks, held);
+    /// Step 12: tests the last blocks for a change.
+    fn test_for_change(&mut self) {
+        let dynamics = core::array::from_fn(|j| self.live.mixture.mean()[LINEAR + j]);
+        self.detector.test(&self.live.blocks, dynamics);
     }
 
-    /// Starts again where a signal has overflowed.
-    fn rest(&mut self) {
+    /// Restarts after an overflow of a signal.
+    fn restart(&mut self) {
         self.history.clear();
         self.detector.pass_over();
         self.saturation = Saturation::new();
         (self.powers, self.stage, self.age, self.replays, self.passed) = ([0.0; 3], 0, 0, 0, 0);
         self.alternatives = Alternatives::NONE;
         self.restarts += 1;
-        self.began = false;
-        if let Some(live) = self.candidate(self.origin.point(), &self.supposed, 1.0) {
+        self.started = false;
+        if let Some(live) = self.candidate(self.origin.point(), &self.prior_noise, 1.0) {
             self.live = live;
-            self.began = self.known.is_some();
+            self.started = self.initial.is_some();
         }
     }
 
-    /// True from when on there is an estimate.
-    pub fn began(&self) -> bool {
-        self.began
+    /// True once there is an estimate.
+    pub fn has_started(&self) -> bool {
+        self.started
     }
 
-    /// Samples that the estimate has learnt from.
+    /// Number of samples that have updated the estimate.
     pub fn samples(&self) -> u64 {
         self.age
     }
 
-    /// True where an earlier fit of the person is where the estimate started.
-    pub fn is_known(&self) -> bool {
-        self.known.is_some()
+    /// True if the estimate started at an earlier fit of the person.
+    pub fn has_initial_estimate(&self) -> bool {
+        self.initial.is_some()
     }
 
     /// s.
@@ -397,7 +402,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         &self.alternatives
     }
 
-    /// Samples of the record so far that said something: while nothing arrives nothing grows old.
+    /// Number of samples of the record that updated the estimate: samples without information do
+    /// not age old results.
     pub(super) fn read(&self) -> u64 {
         self.history.samples().saturating_sub(self.passed)
     }
@@ -406,12 +412,12 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         &self.live
     }
 
-    /// Where what is held is now, the corrections included: never outside of where the basis may be.
-    pub fn held(&self) -> Point {
+    /// The current basis point with its corrections, limited to the range of the basis.
+    pub fn dynamics(&self) -> Point {
         self.live.point()
     }
 
-    /// The response of each gain at a frequency in rad/s, for what is held now.
+    /// The response of each gain at a frequency in rad/s, at the current point.
     pub fn responses(&self, omega_rad_s: f64) -> [Complex; GAINS] {
         self.live.responses(omega_rad_s)
     }
@@ -447,7 +453,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.live.mixture.variance()
     }
 
-    /// How often a signal overflowed and the filters were brought to rest.
+    /// How often a signal overflowed and the filters were reset.
     pub fn restarts(&self) -> u64 {
         self.restarts
     }
@@ -455,17 +461,17 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
 
 fn remember(candidate: &mut Candidate, use_of_it: Use, u: f64) {
     match use_of_it {
-        Use::Learn => {}
-        Use::Follow | Use::Missing => candidate.blocks.skip(),
-        Use::AtMost | Use::AtLeast => candidate.blocks.pass_over(),
+        Use::Update => {}
+        Use::FilterOnly | Use::Missing => candidate.blocks.skip(),
+        Use::AtUpperLimit | Use::AtLowerLimit => candidate.blocks.pass_over(),
     }
     match use_of_it {
-        Use::Learn | Use::Follow => candidate.remember(u),
+        Use::Update | Use::FilterOnly => candidate.remember(u),
         _ => candidate.remember_prediction(u),
     }
 }
 
-/// The output that goes on in the filters.
+/// The output that enters the filters.
 fn through_filters(saturation: &Saturation, use_of_it: Use, u: f64, predicted: f64) -> f64 {
     match use_of_it {
         Use::Missing => predicted,
@@ -473,32 +479,32 @@ fn through_filters(saturation: &Saturation, use_of_it: Use, u: f64, predicted: f
     }
 }
 
-/// Variances of what is supposed of the corrections.
-fn variances(prior: &AdaptivePrior) -> [f64; HELD] {
+/// Prior variances of the corrections.
+fn variances(prior: &AdaptivePrior) -> [f64; DYNAMICS] {
     let [omega, zeta, tau] = prior.spread;
     [omega * prior.person.omega, zeta * prior.person.zeta, tau].map(|s| s * s)
 }
 
 /// Variances of the trust region of a replay.
-fn trusted(point: Point) -> [f64; HELD] {
+fn trusted(point: Point) -> [f64; DYNAMICS] {
     let [omega, zeta, tau] = NEAR;
     [omega * point.omega, zeta * point.zeta, tau].map(|s| s * s)
 }
 
-/// Errors that are kept for the longest delay, for a sample time in s.
+/// Number of past errors for the longest delay, for a sample time in s.
 pub fn errors_needed(sample_time: f64) -> usize {
     libm::ceil(LATEST_S / sample_time) as usize + 4
 }
 
-/// Numbers of memory without which nothing can be estimated, for a sample time in s.
+/// Least number of memory entries, for a sample time in s.
 pub fn least_memory(sample_time: f64) -> usize {
     3 * errors_needed(sample_time)
 }
 
-/// Samples that are replayed at most.
+/// Largest number of samples of a replay.
 const MOST_REPLAYED: f64 = 12_000.0;
 
-/// Numbers of memory for replays of so many seconds, for a sample time in s.
+/// Number of memory entries for replays over `seconds`, for a sample time in s.
 pub fn memory_needed(sample_time: f64, seconds: f64) -> usize {
     let samples = (seconds / sample_time).clamp(0.0, MOST_REPLAYED);
     3 * (2 * errors_needed(sample_time) + libm::ceil(samples) as usize)

@@ -1,34 +1,40 @@
 //! The last samples of the record, in memory of the caller.
 //!
-//! Errors, outputs, and what becomes of each sample, in three rings of the same length.
+//! Errors, outputs, and the use of each sample, in three rings of the same length.
 
 use crate::state::State;
 
-/// Their order.
+/// Indices of the rings.
 const ERRORS: usize = 0;
 const OUTPUTS: usize = 1;
 const USES: usize = 2;
 
-/// What becomes of a sample.
+/// Use of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Use {
-    /// The estimate learns from it.
-    Learn,
-    /// It passes through the filters.
-    Follow,
-    /// Its output is missing: the prediction takes its place.
+    /// The sample updates the estimate.
+    Update,
+    /// The sample only advances the filters.
+    FilterOnly,
+    /// The output is missing: its prediction enters the filters.
     Missing,
-    /// The stick is at its upper end: the output is at least as large.
-    AtMost,
-    /// The stick is at its lower end.
-    AtLeast,
+    /// The stick is at its upper limit: the intended output is at least as large.
+    AtUpperLimit,
+    /// The stick is at its lower limit.
+    AtLowerLimit,
 }
 
 impl Use {
-    const ALL: [Self; 5] = [Self::Follow, Self::Learn, Self::Missing, Self::AtMost, Self::AtLeast];
+    const ALL: [Self; 5] = [
+        Self::FilterOnly,
+        Self::Update,
+        Self::Missing,
+        Self::AtUpperLimit,
+        Self::AtLowerLimit,
+    ];
 
     fn of(number: f64) -> Self {
-        Self::ALL.get(number as usize).copied().unwrap_or(Self::Follow)
+        Self::ALL.get(number as usize).copied().unwrap_or(Self::FilterOnly)
     }
 
     fn number(self) -> f64 {
@@ -56,17 +62,17 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
         Self { memory, samples: 0 }
     }
 
-    /// Samples that there is room for.
+    /// Capacity, in samples.
     pub fn room(&self) -> usize {
         self.memory.as_ref().len() / 3
     }
 
-    /// Samples so far.
+    /// Number of samples so far.
     pub fn samples(&self) -> u64 {
         self.samples
     }
 
-    /// The place of a sample in one of the rings.
+    /// Index of a sample in one of the rings.
     #[inline(always)]
     fn place(&self, ring: usize, sample: u64) -> Option<usize> {
         let room = self.room();
@@ -86,14 +92,14 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
             .map_or(0.0, |place| self.memory.as_ref()[place])
     }
 
-    /// Takes the error of a sample; [`History::complete`] takes the rest.
+    /// Stores the error of a sample; [`History::complete`] stores the rest.
     #[inline(always)]
     pub fn push(&mut self, error: f64) {
         self.put(ERRORS, self.samples, error);
         self.samples += 1;
     }
 
-    /// The output of the newest sample, and what becomes of it.
+    /// Stores the output of the newest sample, and its use.
     #[inline(always)]
     pub fn complete(&mut self, output: f64, use_of_it: Use) {
         let newest = self.samples.saturating_sub(1);
@@ -101,28 +107,28 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
         self.put(USES, newest, use_of_it.number());
     }
 
-    /// Says something else of the sample before the newest, from which had been learnt.
+    /// Changes the use of the sample before the newest, which had updated the estimate.
     pub fn revise_previous(&mut self, use_of_it: Use) {
         if let Some(previous) = self.samples.checked_sub(2)
-            && self.output(previous).1 == Use::Learn
+            && self.output(previous).1 == Use::Update
         {
             self.put(USES, previous, use_of_it.number());
         }
     }
 
-    /// The error so many samples before a sample; zero before the record.
+    /// The error `age` samples before a sample; zero before the record.
     #[inline(always)]
     pub fn error(&self, sample: u64, age: usize) -> f64 {
         sample.checked_sub(age as u64).map_or(0.0, |at| self.get(ERRORS, at))
     }
 
-    /// The output of a sample, and what becomes of it.
+    /// The output of a sample, and its use.
     #[inline(always)]
     pub fn output(&self, sample: u64) -> (f64, Use) {
         (self.get(OUTPUTS, sample), Use::of(self.get(USES, sample)))
     }
 
-    /// Forgets all.
+    /// Removes all samples.
     pub fn clear(&mut self) {
         self.memory.as_mut().fill(0.0);
         self.samples = 0;
@@ -148,10 +154,10 @@ mod tests {
         assert_eq!(history.error(3, 4), 0.0);
         history.clear();
         assert_eq!((history.samples(), history.error(0, 0)), (0, 0.0));
-        // No room at all is no panic.
+        // No room at all is not a panic.
         let mut none = History::new([0.0; 2]);
         none.push(1.0);
-        none.complete(1.0, Use::Learn);
-        assert_eq!(none.output(0), (0.0, Use::Follow));
+        none.complete(1.0, Use::Update);
+        assert_eq!(none.output(0), (0.0, Use::FilterOnly));
     }
 }

@@ -1,20 +1,17 @@
-//! A hypothesis: the operator last changed at its birth, and has been the same, or nearly, since.
+//! A hypothesis: the operator last changed at its birth and has drifted slowly, or not at all, since.
 //!
-//! It is an extended Kalman filter of `s = [gains, level, corrections]` that takes a block of samples at a
-//! time ([`super::moments`]). With the prediction s, P before the block and the innovation variance
-//! `sigma^2`,
+//! Each hypothesis is an extended Kalman filter of `x = [gains, level, corrections]` that processes one block of samples at
+//! a time ([`super::moments`]). With x^ and P before the block, and the innovation variance `sigma^2`,
 //!
-//! `P+ = (I + P A/sigma^2)^-1 P`, `s+ = s + P+ b/sigma^2`,
-//! `ln p = -1/2 ln det(I + P A/sigma^2) - (E - b' P+ b/sigma^2)/2 sigma^2 + ..`
+//! `P+ = (I + P A/sigma^2)^-1 P`, `x+ = x^ + P+ b/sigma^2`,
+//! `ln Lambda = -1/2 ln det(I + P A/sigma^2) - (E - b' P+ b/sigma^2)/2 sigma^2 + ..`
 //!
-//! (Y. Bar-Shalom, X. R. Li and T. Kirubarajan, *Estimation with Applications to Tracking and
-//! Navigation*, 2001, section 7.2, in information form). The form with `(I + P A)^-1` takes a covariance
-//! that is singular, as that of a gain with a lead is in three gains.
+//! (Y. Bar-Shalom, X. R. Li and T. Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001, section
+//! 7.2, information form). `(I + P A)^-1 P` needs no inverse of P, which is singular for a gain with a lead in three gains.
 //!
-//! Its innovation variance is its own, so that a remnant that changes is part of a change. It is not known
-//! better than the samples allow: what the block has in common for all hypotheses has a Student density,
-//! with the degrees of freedom of the variance (A. Zellner, *An Introduction to Bayesian Inference in
-//! Econometrics*, 1971, section 3.2).
+//! Each hypothesis has its own innovation variance, so that a change of the remnant is part of a change. The variance is
+//! estimated: the part of the block energy that all hypotheses share has a Student density with the degrees of freedom of
+//! the variance (A. Zellner, *An Introduction to Bayesian Inference in Econometrics*, 1971, section 3.2).
 
 use hoid_numerics::elimination;
 
@@ -26,7 +23,7 @@ use super::{
 
 pub(super) type Covariance = [[f64; STATES]; STATES];
 
-/// What held before a change: up to which block, and the state at its end.
+/// A segment before a change: its last block, and the state at its end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Segment {
     pub until: u64,
@@ -40,11 +37,11 @@ crate::state!([] Segment { until, state });
 pub(super) struct Hypothesis {
     pub state: [f64; STATES],
     pub covariance: Covariance,
-    /// Innovation variance, and the samples that it rests on.
+    /// Innovation variance, and its degrees of freedom.
     pub variance: f64,
     pub residuals: f64,
     pub log_weight: f64,
-    /// Block of its birth, zero for those of the beginning.
+    /// Block of its birth; zero for the hypotheses of the start.
     pub born: u64,
     pub class: usize,
     segments: [Segment; SEGMENTS],
@@ -53,19 +50,20 @@ pub(super) struct Hypothesis {
 
 crate::state!([] Hypothesis { state, covariance, variance, residuals, log_weight, born, class, segments, changes });
 
-/// What a block left.
+/// Residual of a block.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Left {
-    /// Sum of the squares that are left after the update, those of the prediction's error included.
+pub(super) struct BlockResidual {
+    /// `E - b' P+ b/sigma^2`: the squares of the innovations, whitened by their covariance
+    /// `S = H P H' + sigma^2`, times sigma^2.
     pub energy: f64,
-    /// Samples of the block that were not taken, and the part of that sum which is set for them.
+    /// Number of skipped samples of the block, and the energy that is charged for them.
     pub passed: [f64; 2],
     /// `ln det(I + P A/sigma^2)`.
     log_determinant: f64,
 }
 
-impl Left {
-    pub const NOTHING: Self = Self {
+impl BlockResidual {
+    pub const ZERO: Self = Self {
         energy: 0.0,
         passed: [0.0; 2],
         log_determinant: 0.0,
@@ -99,7 +97,7 @@ impl Hypothesis {
         &self.segments[..self.changes.min(SEGMENTS)]
     }
 
-    /// One that says that the operator changes after this block.
+    /// A child, which assumes that the operator changes after this block.
     pub fn child(&self, block: u64) -> Self {
         let mut child = *self;
         let changes = self.changes.min(SEGMENTS);
@@ -115,8 +113,9 @@ impl Hypothesis {
         child
     }
 
-    /// The update by a block, each of whose samples counts for `1/dispersion` of one.
-    pub fn update(&mut self, moments: &Moments, basis: &Basis, dispersion: f64) -> Left {
+    /// Step 6: gain and update for a block, each of whose samples counts as `1/dispersion` of one.
+    pub fn update(&mut self, moments: &Moments, basis: &Basis, dispersion: f64) -> BlockResidual {
+        // Linearised about the predicted state; the response is bilinear in gains and corrections.
         let about = moments.about(basis, &self.state);
         let per = 1.0 / (self.variance * dispersion);
         let mut matrix: Covariance = core::array::from_fn(|i| {
@@ -128,8 +127,10 @@ impl Hypothesis {
             })
         });
         (0..STATES).for_each(|i| matrix[i][i] += 1.0);
+        // Solving (I + P A/sigma^2) P+ = P also gives its determinant, that of S over sigma^2.
         let mut after = self.covariance;
         let log_determinant = elimination::solve_any(&mut matrix, &mut after);
+        // Rounding makes P+ slightly asymmetric, and the asymmetry would grow from block to block.
         for i in 0..STATES {
             for j in 0..i {
                 let mean = 0.5 * (after[i][j] + after[j][i]);
@@ -138,11 +139,12 @@ impl Hypothesis {
         }
         let sound = after.iter().flatten().all(|p| p.is_finite()) && (0..STATES).all(|i| after[i][i] >= 0.0);
         if !sound {
-            return Left {
+            return BlockResidual {
                 energy: about.energy,
-                ..Left::NOTHING
+                ..BlockResidual::ZERO
             };
         }
+        // x+ - x^ = P+ b/sigma^2 is the sum of W_k nu_k over the samples of the block.
         let mut explained = 0.0;
         for i in 0..STATES {
             let step: f64 = (0..STATES).map(|k| after[i][k] * about.score[k]).sum();
@@ -150,16 +152,19 @@ impl Hypothesis {
             explained += per * about.score[i] * step;
         }
         self.covariance = after;
-        Left {
+        BlockResidual {
             energy: (about.energy - explained).max(0.0),
             log_determinant,
-            ..Left::NOTHING
+            ..BlockResidual::ZERO
         }
     }
 
-    /// The logarithm of the density of the block, and the update of the variance; `common` is the least
-    /// energy that any hypothesis left.
-    pub fn weigh(&mut self, left: &Left, samples: f64, common: f64, dispersion: f64, memory: f64) {
+    /// Step 7: adds `ln Lambda` to the log probability and updates the variance; `common` is the least residual energy
+    /// of all hypotheses.
+    pub fn weigh(&mut self, left: &BlockResidual, samples: f64, common: f64, dispersion: f64, memory: f64) {
+        // n samples count as n/c (overdispersion). nu: degrees of freedom of sigma^2. The energy `common` to all
+        // hypotheses enters through Student's density, what a hypothesis has beyond it through the normal one: a block
+        // that no hypothesis predicts (an outlier) then does not decide between them.
         let (n, nu) = (samples / dispersion, self.residuals);
         let over = common / (self.variance * dispersion);
         self.log_weight += libm::lgamma(0.5 * (nu + n))
@@ -168,6 +173,7 @@ impl Hypothesis {
             - 0.5 * (nu + n) * libm::log1p(over / nu)
             - 0.5 * left.log_determinant
             - 0.5 * (left.energy - common) / (self.variance * dispersion);
+        // Posterior mean of sigma^2 with nu degrees of freedom, limited by the memory; skipped samples do not count.
         let [passed, of_them] = left.passed;
         let n = n - passed / dispersion;
         self.variance = (nu * self.variance + (left.energy - of_them) / dispersion) / (nu + n);

@@ -1,16 +1,15 @@
-//! The last blocks of a candidate, behind one noise model and in one basis: what the detector compares.
+//! The last blocks of a candidate, with one noise model and in one basis: the data of the detector.
 //!
-//! Where samples are not taken for longer than a quarter of a second, or nothing moves, what is beside that
-//! gap is not kept: the samples before it may have been part of the same fault, and behind it the filters
-//! swing in.
+//! If samples are not used for longer than a quarter of a second, or the signals do not change, the blocks next to that gap
+//! are dropped: samples before it may belong to the same fault, and after it the filters have to settle.
 
 use super::blocks::{Block, EMPTY, Row};
 
-/// Blocks that there is room for.
+/// Capacity, in blocks.
 pub const BLOCKS: usize = 96;
 /// Length of a block, s.
 pub const BLOCK_S: f64 = 0.5;
-/// Time from which samples that are not taken are a gap, and time that is not looked at behind one, s.
+/// Time from which unused samples are a gap, and time that is skipped after one, s.
 const GAP_S: f64 = 0.25;
 const BEHIND_S: f64 = 2.0;
 
@@ -21,7 +20,7 @@ pub(super) struct LastBlocks {
     open: Block,
     blocks: [Block; BLOCKS],
     count: usize,
-    /// Samples that were not taken, one after another, and those that are not looked at from now on.
+    /// Number of consecutive unused samples, and number of samples that are still to be skipped.
     gap: u64,
     behind: u64,
     fresh: usize,
@@ -31,7 +30,7 @@ pub(super) struct LastBlocks {
 crate::state!([] LastBlocks { open, blocks, count, gap, behind, fresh, closed });
 
 impl LastBlocks {
-    /// None, for a sample time in s.
+    /// Without blocks, for a sample time in s.
     pub fn new(ts: f64) -> Self {
         Self {
             samples_of_block: libm::round(BLOCK_S / ts).max(1.0) as u64,
@@ -70,19 +69,19 @@ impl LastBlocks {
         self.closed = true;
     }
 
-    /// A sample says nothing, and is no fault.
+    /// A sample without information that is not a fault.
     pub fn pass_over(&mut self) {
         self.closed = false;
     }
 
-    /// A sample is not taken.
+    /// A sample that is not used.
     pub fn skip(&mut self) {
         self.pass_over();
         self.gap += 1;
         let samples = |seconds: f64| (seconds / BLOCK_S * self.samples_of_block as f64) as u64;
         let (long, behind) = (samples(GAP_S).max(1), samples(BEHIND_S));
         if self.gap == long {
-            // The block that is open, and the one before it.
+            // Drops the open block and the one before it.
             self.open = EMPTY;
             self.count = self.count.saturating_sub(1);
             self.fresh = 0;
@@ -102,7 +101,7 @@ impl LastBlocks {
         self.fresh
     }
 
-    /// True where the last sample ended a block.
+    /// True if the last sample ended a block.
     pub fn closed(&self) -> bool {
         self.closed
     }
@@ -142,7 +141,7 @@ mod tests {
         assert_eq!(last.all().len(), 2);
         (0..5).for_each(|_| last.skip());
         assert_eq!((last.all().len(), last.fresh()), (1, 0));
-        // Two seconds behind it are not looked at.
+        // Two seconds after it are not examined.
         (0..49).for_each(|_| last.take(&ROW));
         assert_eq!(last.all().len(), 1);
         last.take(&ROW);

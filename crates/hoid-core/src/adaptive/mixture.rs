@@ -1,61 +1,62 @@
-//! When did the operator last change? A mixture over the answers.
+//! When did the operator last change? A mixture of hypotheses about the time of the last change.
 //!
-//! After each block the likeliest hypotheses have children that say that the operator changed in it: they are what
-//! their parents were before it, and the covariance of a change is added to that of the gains. A whitening filter
-//! D of order p has D(theta x) for D theta x while it reaches back to before the change: where the noise is steep,
-//! the step of the response is then hundreds of innovations, which no gains explain. So a child takes nothing of
-//! that block, and of the next one the samples behind the first p. A child starts with the prior probability of a
-//! change in the time since the last birth, and its probability follows its likelihood. When there is no
-//! room, the least likely of those that are old enough is pruned. So between changes the estimate rests on
-//! all data since the last one, and after a change it is that of the child that was born there (P.
-//! Andersson, *International Journal of Control* 42 (1985) 1175-1193; R. P. Adams and D. J. C. MacKay,
-//! *Bayesian online changepoint detection*, 2007; the births of A. S. Willsky and H. L. Jones, *IEEE
-//! Trans. Automatic Control* 21 (1976) 108-112, with all their likelihoods).
+//! After each block the likeliest hypotheses have children: a child assumes that the operator changed in this block. It has
+//! the estimate of its parent before the block, with the covariance of a jump added to that of the gains (A. S. Willsky and
+//! H. L. Jones, *IEEE Trans. Automatic Control* 21 (1976) 108-112). It starts with the probability of its parent times the
+//! hazard, the prior probability of a change since the last birth, and is then weighted by its likelihood like all others
+//! (R. P. Adams and D. J. C. MacKay, *Bayesian online changepoint detection*, 2007, algorithm 1; P. Andersson,
+//! *International Journal of Control* 42 (1985) 1175-1193). If there is no free slot, the least likely of the hypotheses
+//! that are old enough is pruned. Between changes the estimate therefore uses all data since the last change.
 //!
-//! **Classes.** The numerator is any, or that of a gain with a lead, `(K_e + K_e_dot s)(s + a)`: the second
-//! is the first with a covariance that leaves the gains no other direction. Of each form the gains hardly
-//! drift between changes, or they wander, as people do. Children have the class of their parent, but one
-//! with a gain and a lead has children of any numerator too. The best of each class is never pruned.
+//! **Samples that a child skips.** Up to p samples after a change, a whitening filter D of order p computes
+//! `D (theta r)` with gains theta that differ within its window, and the model has theta `D r`. With a steep remnant the
+//! difference is hundreds of innovations, which no gains explain. A child therefore skips the block of its birth and the
+//! first p samples of the next one.
 //!
-//! **The estimate** is the mean of the mixture, its covariance that of the mixture, the differences between
-//! the hypotheses included.
+//! **Classes.** The numerator is free, or that of a gain with a lead, `(K_e + K_e_dot s)(s + a)`: the same filter with a
+//! covariance that has no other direction of the gains. In each form the gains drift slowly between changes, or they
+//! wander. A child has the class of its parent; a gain with a lead also has children with a free numerator. The best of
+//! each class is never pruned.
+//!
+//! **Estimate.** Mean and covariance of the mixture, with the spread of the means (Y. Bar-Shalom, X. R. Li and T.
+//! Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001, section 1.4.16).
 
 use hoid_numerics::elimination;
 
 use super::{
     basis::Basis,
-    hypothesis::{Covariance, Hypothesis, Left, Segment},
+    hypothesis::{BlockResidual, Covariance, Hypothesis, Segment},
     moments::Moments,
-    sizes::{CLASSES, GAINS, HELD, HYPOTHESES, LINEAR, SEGMENTS, STATES},
+    sizes::{CLASSES, DYNAMICS, GAINS, HYPOTHESES, LINEAR, SEGMENTS, STATES},
 };
 
-/// What is supposed of changes. Gains are in units of |Y| at the reference frequency.
+/// Prior of changes. Gains are in units of |Y| at the reference frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChangePrior {
     /// Length of a block, s.
     pub block: f64,
     /// Mean time between changes, s.
     pub between: f64,
-    /// Standard deviations of a change: of the gain and of the lead's part at 2 rad/s.
+    /// Standard deviations of a change: of the gain, and of the part of the lead at 2 rad/s.
     pub jump: [f64; 2],
-    /// Drifts of the gains in a second: of those who hardly drift, and of those who wander.
+    /// Drift of the gains in one second: of steady and of wandering hypotheses.
     pub drift: [f64; 2],
     /// The drift just after a change, and its time constant, s.
     pub settling: [f64; 2],
-    /// Drift of the level of u in a second, over the root mean square of u.
+    /// Drift of the level of u in one second, relative to the root mean square of u.
     pub level: f64,
-    /// Time that the innovation variance rests on, s, and that of a newborn.
+    /// Memory of the innovation variance, s, and that of a newborn hypothesis.
     pub variance: [f64; 2],
-    /// Probability of those who hardly drift.
+    /// Prior probability of steady gains.
     pub steady: f64,
-    /// Probability of any numerator.
+    /// Prior probability of a free numerator.
     pub any: f64,
-    /// Blocks for which a newborn is kept whatever it predicts.
+    /// Blocks for which a newborn hypothesis is not pruned.
     pub protected: u64,
-    /// Standard deviations beyond which an innovation counts no more than there.
+    /// Limit of an innovation, in standard deviations.
     pub limit: f64,
-    /// The same in the detector.
-    pub look: f64,
+    /// Limit of an innovation in the detector, in standard deviations.
+    pub detector_limit: f64,
 }
 
 impl ChangePrior {
@@ -68,20 +69,20 @@ impl ChangePrior {
             && self.settling[0] >= 0.0
             && self.level >= 0.0
             && self.limit > 0.0
-            && self.look > 0.0
+            && self.detector_limit > 0.0
             && share(self.steady)
             && share(self.any)
     }
 }
 
-/// Births before this time are of a start that is not settled, s.
+/// Time before which there are no births, s: the start has not settled.
 const FIRST_BIRTH_S: f64 = 3.0;
-/// A form is handed on from a gain with a lead to any numerator with this share of its probability.
-const HANDED_ON: f64 = 0.3;
-/// Least logarithm of a probability.
-const LEAST: f64 = -60.0;
-/// Size of the gains before anything is known, in units of the ratio of u to e.
-const WIDE: f64 = 2.0;
+/// Share of the probability of a gain with a lead with which its child has a free numerator.
+const FORM_SWITCH: f64 = 0.3;
+/// Lower limit of a log probability.
+const LEAST_LOG_WEIGHT: f64 = -60.0;
+/// Prior standard deviation of the gains, in units of the ratio of u to e.
+const INITIAL_GAIN_DEVIATION: f64 = 2.0;
 
 /// Scales of the signals.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,10 +90,10 @@ pub(super) struct NoiseScales {
     /// Ratio of u to e, and the root mean square of u.
     pub unit: f64,
     pub size: f64,
-    /// Innovation variance to begin with.
+    /// Initial innovation variance.
     pub innovations: f64,
     pub sample_time: f64,
-    /// Samples that count for one.
+    /// Number of samples that count as one.
     pub dispersion: f64,
 }
 
@@ -110,21 +111,21 @@ pub(super) struct Mixture {
 crate::state!([] Mixture { hypotheses, count, blocks, mean });
 
 impl Mixture {
-    /// One hypothesis of each class about a state. `held` are the variances of the corrections.
-    pub fn new(prior: &ChangePrior, basis: &Basis, scales: &NoiseScales, held: [f64; HELD]) -> Self {
+    /// One hypothesis of each class at the prior. `dynamics` are the variances of the corrections.
+    pub fn new(prior: &ChangePrior, basis: &Basis, scales: &NoiseScales, dynamics: [f64; DYNAMICS]) -> Self {
         let mut p = [[0.0; STATES]; STATES];
         p[GAINS][GAINS] = scales.size * scales.size;
-        for (j, variance) in held.into_iter().enumerate() {
+        for (j, variance) in dynamics.into_iter().enumerate() {
             p[LINEAR + j][LINEAR + j] = variance;
         }
         Self::of(prior, |class| {
             let mut p = p;
-            open_gains(&mut p, basis, class, [WIDE * scales.unit; 2]);
+            inflate_gains(&mut p, basis, class, [INITIAL_GAIN_DEVIATION * scales.unit; 2]);
             ([0.0; STATES], p, scales.innovations)
         })
     }
 
-    /// All classes at a known estimate.
+    /// One hypothesis of each class at a known estimate.
     pub fn at(prior: &ChangePrior, state: [f64; STATES], covariance: Covariance, variance: f64) -> Self {
         Self::of(prior, |_| (state, covariance, variance))
     }
@@ -133,7 +134,7 @@ impl Mixture {
         let share =
             |class: usize| [prior.steady, 1.0 - prior.steady][class % 2] * [1.0 - prior.any, prior.any][class / 2];
         let mut mixture = Self {
-            hypotheses: [Hypothesis::new([0.0; STATES], [[0.0; STATES]; STATES], 0.0, 0, LEAST); HYPOTHESES],
+            hypotheses: [Hypothesis::new([0.0; STATES], [[0.0; STATES]; STATES], 0.0, 0, LEAST_LOG_WEIGHT); HYPOTHESES],
             count: 0,
             blocks: 0,
             mean: [0.0; STATES],
@@ -156,8 +157,8 @@ impl Mixture {
         &mut self.hypotheses[..self.count.min(HYPOTHESES)]
     }
 
-    /// Takes a block, its first samples as many as the whitening filter reaches back, and those behind them;
-    /// the least energy that any hypothesis left.
+    /// Steps 5 to 9 for a block, given the sums of its first p samples and of the rest. Returns the least residual
+    /// energy of all hypotheses.
     pub fn update(
         &mut self,
         [early, late]: [&Moments; 2],
@@ -170,9 +171,10 @@ impl Mixture {
         let (blocks, seconds) = (self.blocks, moments.samples * scales.sample_time);
         let newborn = |h: &Hypothesis| h.born > 0 && h.born + 1 == blocks;
         let parents = self.best_of_classes().map(|best| best.map(|i| self.hypotheses[i]));
-        let mut left = [Left::NOTHING; HYPOTHESES];
+        let mut left = [BlockResidual::ZERO; HYPOTHESES];
         let (mut common, mut best) = (f64::INFINITY, self.mean);
         for (h, left) in self.all_mut().iter_mut().zip(&mut left) {
+            // Step 5, P_j + Q_j: a random walk of the gains, faster just after a change, when people still settle.
             let age = (blocks - h.born.min(blocks)) as f64 * seconds;
             let mut drift = prior.drift[h.class % 2] * prior.drift[h.class % 2];
             if h.born > 0 {
@@ -180,7 +182,7 @@ impl Mixture {
                 drift += size * size * libm::exp(-2.0 * age / time);
             }
             let step = libm::sqrt(drift * seconds) * scales.unit;
-            open_gains(&mut h.covariance, basis, h.class, [step; 2]);
+            inflate_gains(&mut h.covariance, basis, h.class, [step; 2]);
             let level = prior.level * scales.size;
             h.covariance[GAINS][GAINS] += level * level * seconds;
             if newborn(h) {
@@ -192,18 +194,20 @@ impl Mixture {
                 (common, best) = (left.energy, h.state);
             }
         }
-        // The samples that a newborn does not take are nothing by which it is better or worse.
+        // A newborn skips its early samples. It is charged the residual energy of the best
+        // hypothesis for them, so that skipping them is neither an advantage nor a disadvantage.
         let of_early = early.energy(basis, &best);
         for (_, left) in self.all().iter().zip(&mut left).filter(|(h, _)| newborn(h)) {
             left.passed = [early.samples, of_early];
             left.energy += of_early;
             common = common.min(left.energy);
         }
-        // Half of the time since the start: its errors, which are large, do not stay.
+        // Memory of half the time since the start: the large residuals of the start are forgotten.
         let [longest, shortest] = prior.variance.map(|seconds| seconds / scales.sample_time);
         let memory = longest.min((0.5 * blocks as f64 * moments.samples).max(shortest));
-        // What is predicted without an error leaves a variance that is still positive.
+        // A perfect prediction must leave a positive variance.
         let least = 1e-24 * scales.size * scales.size;
+        // Step 7.
         for (h, left) in self.all_mut().iter_mut().zip(&left) {
             h.weigh(left, moments.samples, common, scales.dispersion, memory);
             h.variance = h.variance.max(least);
@@ -228,12 +232,13 @@ impl Mixture {
             self.all_mut().iter_mut().for_each(|h| h.log_weight = even);
             return;
         }
+        // mu_j = exp(l_j - max)/sum: the maximum is subtracted against underflow.
         let sum: f64 = (self.all().iter())
             .map(|h| libm::exp(finite(h.log_weight) - best))
             .sum();
         let all = best + libm::log(sum);
         for h in self.all_mut() {
-            h.log_weight = (finite(h.log_weight) - all).max(LEAST);
+            h.log_weight = (finite(h.log_weight) - all).max(LEAST_LOG_WEIGHT);
         }
     }
 
@@ -266,12 +271,12 @@ impl Mixture {
             .sum()
     }
 
-    /// The likeliest of each class.
+    /// Index of the likeliest hypothesis of each class.
     fn best_of_classes(&self) -> [Option<usize>; CLASSES] {
         core::array::from_fn(|class| self.likeliest(|h| h.class == class))
     }
 
-    /// The children of a block, of the parents of before it. Those who wander have theirs every second block.
+    /// Step 9: the children of a block, from the parents before it. Wandering classes have children every second block.
     fn births(
         &mut self,
         parents: &[Option<Hypothesis>; CLASSES],
@@ -288,7 +293,7 @@ impl Mixture {
             }
             let own = self.probability(class);
             let other = if any {
-                HANDED_ON * self.probability(class - 2)
+                FORM_SWITCH * self.probability(class - 2)
             } else {
                 0.0
             };
@@ -298,19 +303,22 @@ impl Mixture {
                 found => (found.as_ref(), own),
             };
             let Some(parent) = parent else { continue };
+            // The parents are those before the block: a child must not contain the data of a change that it explains.
             let mut child = parent.child(self.blocks);
             let every = if wanders { 2.0 } else { 1.0 };
             child.class = class;
+            // mu of the class times the hazard H = seconds/between (AM, equation 5, for a geometric run length).
             child.log_weight = libm::log(share.max(1e-12) * (every * seconds / prior.between).min(0.5));
-            open_gains(
+            inflate_gains(
                 &mut child.covariance,
                 basis,
                 class,
                 prior.jump.map(|jump| jump * scales.unit),
             );
+            // A change may change the remnant too: the variance of a child follows its own data sooner.
             let youth = prior.variance[1] / scales.sample_time / scales.dispersion;
             child.residuals = child.residuals.min(youth);
-            let Some(place) = self.place_for_one(prior) else {
+            let Some(place) = self.free_slot(prior) else {
                 continue;
             };
             self.hypotheses[place] = child;
@@ -318,8 +326,9 @@ impl Mixture {
         self.normalise();
     }
 
-    /// A free place, or that of the least likely that is old enough and not the best of its class.
-    fn place_for_one(&mut self, prior: &ChangePrior) -> Option<usize> {
+    /// A free slot, or that of the least likely hypothesis that is old enough and not the best of
+    /// its class.
+    fn free_slot(&mut self, prior: &ChangePrior) -> Option<usize> {
         if self.count < HYPOTHESES {
             self.count += 1;
             return Some(self.count - 1);
@@ -335,12 +344,13 @@ impl Mixture {
             })
     }
 
-    /// The mean of the mixture.
+    /// `x^ = sum_j mu_j x^_j`.
     pub fn mean(&self) -> &[f64; STATES] {
         &self.mean
     }
 
-    /// Its covariance.
+    /// `P = sum_j mu_j (P_j + (x^_j - x^)(x^_j - x^)')`: the second term is the spread of the
+    /// means.
     pub fn covariance(&self) -> Covariance {
         let mut c = [[0.0; STATES]; STATES];
         for h in self.all() {
@@ -355,7 +365,7 @@ impl Mixture {
         c
     }
 
-    /// The mean over the hypotheses of what each says.
+    /// The mean of a function of state and covariance over the hypotheses.
     pub fn mean_of(&self, what: impl Fn(&[f64; STATES], &Covariance) -> f64) -> f64 {
         self.all()
             .iter()
@@ -368,9 +378,8 @@ impl Mixture {
         self.all().iter().map(|h| h.weight() * h.variance).sum()
     }
 
-    /// What the likeliest says of the past: the states before its changes, the oldest first, and the one of
-    /// now.
-    pub fn history(&self) -> Segments {
+    /// The segments of the likeliest hypothesis: the states before its changes, the oldest first, and the current one.
+    pub fn segments(&self) -> Segments {
         let mut segments = Segments::NONE;
         if let Some(best) = self.likeliest(|_| true) {
             for segment in self.hypotheses[best].segments() {
@@ -384,15 +393,15 @@ impl Mixture {
         segments
     }
 
-    /// Replaces what was supposed of the corrections, normal about zero with the variances `was`, by what is
-    /// supposed of people, normal about `mean` with the variances `is`:
-    /// `P' = (I + P D)^-1 P`, `D = 1/is - 1/was`, `s' = s + P' (mean/is - D s)`.
-    pub fn suppose(&mut self, was: [f64; HELD], is: [f64; HELD], mean: [f64; HELD]) {
+    /// Replaces the prior of the corrections, normal with mean zero and variances `was`, by the prior of people, normal
+    /// with `mean` and variances `is`: `P' = (I + P D)^-1 P`, `D = 1/is - 1/was`, `x' = x + P' (mean/is - D x)`. In
+    /// information form one prior is subtracted and the other added.
+    pub fn replace_prior(&mut self, was: [f64; DYNAMICS], is: [f64; DYNAMICS], mean: [f64; DYNAMICS]) {
         for h in self.all_mut() {
             let mut matrix: Covariance = [[0.0; STATES]; STATES];
             for (i, row) in matrix.iter_mut().enumerate() {
                 row[i] = 1.0;
-                for j in 0..HELD {
+                for j in 0..DYNAMICS {
                     row[LINEAR + j] += h.covariance[i][LINEAR + j] * (1.0 / is[j] - 1.0 / was[j]);
                 }
             }
@@ -402,12 +411,12 @@ impl Mixture {
             if !sound {
                 continue;
             }
-            let pull: [f64; HELD] = core::array::from_fn(|j| {
+            let pull: [f64; DYNAMICS] = core::array::from_fn(|j| {
                 let s = h.state[LINEAR + j];
                 (mean[j] - s) / is[j] + s / was[j]
             });
             for i in 0..STATES {
-                h.state[i] += (0..HELD).map(|j| after[i][LINEAR + j] * pull[j]).sum::<f64>();
+                h.state[i] += (0..DYNAMICS).map(|j| after[i][LINEAR + j] * pull[j]).sum::<f64>();
                 for j in 0..i {
                     let half = 0.5 * (after[i][j] + after[j][i]);
                     (after[i][j], after[j][i]) = (half, half);
@@ -419,7 +428,7 @@ impl Mixture {
     }
 }
 
-/// States of a past, with the block up to which each held.
+/// The states of successive segments, each with its last block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Segments {
     all: [Segment; SEGMENTS + 1],
@@ -444,7 +453,7 @@ impl Segments {
         }
     }
 
-    /// The same in another count of blocks, and in other coordinates.
+    /// The segments with another first block and in other coordinates.
     pub fn carried(mut self, later: u64, to: impl Fn(&[f64; STATES]) -> [f64; STATES]) -> Self {
         for segment in &mut self.all {
             *segment = Segment {
@@ -464,7 +473,7 @@ impl Segments {
     }
 }
 
-/// Directions of the gains that are those of a gain and of a lead, `n_0 = K a`, `n_1 = K + K_dot a`,
+/// Directions of a gain and of a lead in the space of the gains, `n_0 = K a`, `n_1 = K + K_dot a`,
 /// `n_2 = K_dot`, each response over its scale; K_dot in units of K at 2 rad/s.
 fn gain_and_lead(basis: &Basis) -> [[f64; GAINS]; 2] {
     let (a, [s0, s1, s2]) = (1.0 / basis.point().lag, basis.scale());
@@ -474,8 +483,9 @@ fn gain_and_lead(basis: &Basis) -> [[f64; GAINS]; 2] {
     ]
 }
 
-/// Adds the variance of a change of the gains: of a gain and a lead, or of any numerator, by the class.
-fn open_gains(p: &mut Covariance, basis: &Basis, class: usize, [gain, lead]: [f64; 2]) {
+/// Adds a variance to the gains (`Q_j`, the jump of a child, or the prior), along gain and lead or in all directions by
+/// the class.
+fn inflate_gains(p: &mut Covariance, basis: &Basis, class: usize, [gain, lead]: [f64; 2]) {
     if class >= 2 {
         for (i, size) in [gain, lead, lead].into_iter().enumerate() {
             p[i][i] += size * size;
@@ -495,13 +505,13 @@ fn open_gains(p: &mut Covariance, basis: &Basis, class: usize, [gain, lead]: [f6
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::adaptive::{basis::Point, sizes::SIGNALS, usual::Usual};
+    use crate::adaptive::{basis::Point, defaults::DefaultOperator, sizes::SIGNALS};
 
     /// The sample of the change: two before the end of block 56.
     const CHANGE: usize = 32 * 56 - 2;
 
-    /// How far the gains are after so many blocks from those of an operator that has changed, over the change, with a
-    /// remnant of four poles; of each block so many samples are its first.
+    /// How far the gains are after a given number of blocks from those of an operator that has changed, over the
+    /// change, with a remnant of four poles; of each block so many samples are its first.
     fn off(first: usize, blocks: usize) -> f64 {
         let point = Point {
             tau: 0.2,
@@ -511,7 +521,7 @@ mod tests {
         };
         let (mut basis, prior) = (
             Basis::new(point, 0.01).unwrap(),
-            Usual::with_delay(0.2).prior(0.01).changes,
+            DefaultOperator::with_delay(0.2).prior(0.01).changes,
         );
         let scales = NoiseScales {
             unit: 1.0,

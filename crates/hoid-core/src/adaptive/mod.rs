@@ -1,57 +1,58 @@
-//! A person in a basis that people share: what changes is a few gains.
+//! Tracks a human operator sample by sample: a bank of Kalman filters in a physical basis, with change detection.
 //!
-//! People who track integrate slow errors, lead, and act through a neuromuscular system and a delay,
+//! Symbols follow Y. Bar-Shalom, X. R. Li and T. Kirubarajan, *Estimation with Applications to Tracking and Navigation*,
+//! 2001 (BLK); for changes R. P. Adams and D. J. C. MacKay, *Bayesian online changepoint detection*, 2007 (AM), and A. S.
+//! Willsky and H. L. Jones, *IEEE Trans. Automatic Control* 21 (1976) 108-112 (WJ). In the order of the code:
 //!
-//! `Y(s) = N(s)/((T_I s + 1) (s^2/omega^2 + 2 zeta s/omega + 1)) e^{-tau s}`,
-//! `N(s) = n_0 + n_1 s + n_2 s^2`
+//! 1. **Model** ([`basis`]; D. T. McRuer and H. R. Jex, *IEEE Trans. Human Factors in Electronics* 8 (1967) 231-249).
+//!    `Y(s) = (n_0 + n_1 s + n_2 s^2)/((T_I s + 1)(s^2/omega^2 + 2 zeta s/omega + 1)) e^{-tau s}`. With the responses z_i
+//!    of `s^i/(..)` to the error, `u = sum_i theta_i z_i(omega, zeta, tau) + level + v`, `D(q^-1) v = eps`. The state is
+//!    `x = [theta (3), level, d omega, d zeta, d tau]`: gains change; omega, zeta and tau have small corrections; T_I is
+//!    fixed. Seconds of data determine the numerator, a minute also omega, zeta and tau.
+//! 2. **Whitening** (`candidate`). `y = D u`, `H = D [dz/dx]`: measurement and its row, free of the coloured noise v.
+//! 3. **Innovation** (`candidate`). `nu = y - H x^`, with the mean x^ of step 8 before the sample. It updates D and sigma^2.
+//! 4. **Measurement sums** (`moments`). Over a block of 0.32 s, `A = sum H' H`, `b = sum H' nu`, `E = sum nu^2`.
+//! 5. **Prediction** ([`mixture`], `hypothesis`). Hypothesis j: no change since its birth, `P_j <- P_j + Q_j`.
+//! 6. **Gain and update** (`hypothesis`; BLK section 7.2, information form). `P_j <- (I + P_j A/sigma_j^2)^-1 P_j`,
+//!    `x^_j <- x^_j + P_j b/sigma_j^2`, with the new P_j. `W_j = P_j H'/sigma_j^2` is the gain of a sample.
+//! 7. **Probability** (`hypothesis`; BLK section 11.6). `mu_j <- Lambda_j mu_j/sum_i Lambda_i mu_i`, Lambda_j the density
+//!    of the block: `ln Lambda_j = -1/2 ln det(I + P_j A/sigma_j^2) - (E - b' P_j b/sigma_j^2)/2 sigma_j^2 + ..`
+//! 8. **Mixture** ([`mixture`]; BLK section 1.4.16). `x^ = sum_j mu_j x^_j`,
+//!    `P = sum_j mu_j (P_j + (x^_j - x^)(x^_j - x^)')`.
+//! 9. **Births and pruning** ([`mixture`]; AM algorithm 1, WJ). The best hypothesis of each class has a child with the
+//!    probability `mu_j H`, hazard `H = block/mean time between changes`, and the covariance of a jump added to P_j.
+//! 10. **Noise** ([`noise`], `volatility`). D is an autoregression of the residuals by least squares; the spread of the
+//!     block energies gives the number of samples that count as one independent sample.
+//! 11. **Replay** (`filter`). A second candidate reads the record again with the new basis point and D, and replaces the
+//!     first one when it has caught up: a batch prediction error fit, repeated at a bounded cost per sample.
+//! 12. **Change test** ([`detector`], [`contrast`], [`difference`]). Least squares before and after, `T = d' C^-1 d` (Wald;
+//!     G. C. Chow, *Econometrica* 28 (1960) 591-605; H. White, *Econometrica* 48 (1980) 817-838).
 //!
-//! (D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in Electronics 8 (1967) 231-249). Data of
-//! seconds determine the numerator; poles, lag and delay they do not, and they are nearly the same
-//! for everybody. So those begin at what is usual ([`basis`]), and with the responses x_i of
-//! `s^i/(..)` to the error
+//! | here | BLK | filterpy `IMMEstimator` | difference |
+//! |---|---|---|---|
+//! | `Hypothesis` | mode-matched filter M_j | `filters[j]` | information form, a block per update |
+//! | `state`, `covariance` | `x^_j`, `P_j` | `filters[j].x`, `.P` | P may be singular (a gain with a lead) |
+//! | `inflate_gains` | `Q_j` | `filters[j].Q` | drift decays after a birth |
+//! | `log_weight`, `weigh` | `mu_j`, `Lambda_j` | `mu[j]`, `likelihood` | Student density: sigma_j^2 is estimated |
+//! | `mean`, `covariance` | `x^`, `P` | `x`, `P` | the same |
+//! | `child`, `births` | transition p_ij | `M` | run-length births (AM) from the parent's P plus a jump (WJ) |
+//! | `free_slot` | merging | mixing | the least likely is pruned; nothing is merged |
 //!
-//! `u = sum_i theta_i x_i + level + v`, `D(q^-1) v = eps`,
-//!
-//! which is linear in the gains. Data of a minute do determine omega, zeta and tau: corrections of
-//! them are estimated with the gains, to first order, and where they have grown the basis moves
-//! there. The lag stays. A gain with a lead but without a lag is in the span: then
-//! `N = (K_e + K_e_dot s)(T_I s + 1)`, and is weighed against any numerator.
-//!
-//! - **Candidates** (`candidate`). One basis and one noise model read the data sample by sample: that is the
-//!   prediction error method for given D and a linearisation. The candidate of now answers; beside it another one
-//!   reads the record again ([`AdaptiveFilter`]), from where the estimate points, with what has been learnt of the
-//!   noise, and takes over when it has caught up. Every second one starts elsewhere. So the estimate is that of a
-//!   batch fit which is repeated again and again, at a bounded cost for each sample.
-//! - **Changes** ([`mixture`]). Within a candidate, hypotheses say when the operator last changed: they are born
-//!   in each block, weighed by what they predicted, and pruned. Of each there are forms and drifts.
-//! - **Noise** ([`noise`], `volatility`). D is a long autoregression of the residuals, by least squares. The
-//!   innovations of a steep remnant have 1e-7 of the power of u, those of a flat one 1e-2: what is supposed of
-//!   their variance and of D before the data is in the scale of what D leaves, never in that of u. How unevenly
-//!   the innovations come says how many samples count for one.
-//! - **What else predicts as well** (`alternatives`). Other poles and delays that predict u about as well are in
-//!   the errors that are told.
-//! - **The end of the stick** (`saturation`). An output that stands there says that it would be at least so far.
-//! - **Declared changes** ([`detector`]). From the difference of gains and what is held between the last seconds
-//!   and the time before (`blocks`, `last_blocks`), by least squares, with the errors that the scores show
-//!   ([`contrast`]; G. C. Chow, Econometrica 28 (1960) 591-605; H. White, Econometrica 48 (1980) 817-838). What
-//!   changed is told by [`difference`].
-//!
-//! Nothing has to be fitted before: the estimate begins with the first second, whose ratio of
-//! output to error gives the scale of the gains' prior. Where an earlier fit of the person is at hand
-//! ([`known`]), it begins there. [`AdaptiveFilter`] is the recursion: it needs no operating system, and its memory
-//! is an array of the caller's.
-//!
+//! Outputs at a limit of the stick are censored samples (`saturation`). Other poles and delays that predict u as well
+//! widen the reported errors (`alternatives`). The estimate starts after one second, whose ratio of output to error scales
+//! the prior of the gains, or at an earlier fit ([`initial_estimate`]). [`AdaptiveFilter`] needs no operating system; its
+//! memory is an array of the caller.
 //! ```
-//! use hoid_core::adaptive::{AdaptiveFilter, least_memory, usual::Usual};
+//! use hoid_core::adaptive::{AdaptiveFilter, least_memory, defaults::DefaultOperator};
 //!
 //! const SAMPLE_TIME_S: f64 = 0.02;
-//! // Without what is kept for replays, as on a microcontroller; memory_needed() says how much those take.
+//! // Without memory for replays, as on a microcontroller; memory_needed() gives the numbers that replays take.
 //! const MEMORY: usize = 192;
 //! assert!(MEMORY >= least_memory(SAMPLE_TIME_S));
-//! let person = Usual::with_delay(0.2);
+//! let person = DefaultOperator::with_delay(0.2);
 //! let mut tracker = AdaptiveFilter::new(person.prior(SAMPLE_TIME_S), [0.0; MEMORY]).ok_or("no filter")?;
 //!
-//! // Two minutes of somebody with a gain of 0.5, muscles of 11 rad/s and a delay of 0.2 s; some noise.
+//! // Two minutes of an operator with a gain of 0.5, muscles of 11 rad/s and a delay of 0.2 s; some noise.
 //! let (mut u, mut rate, mut late, mut draw) = (0.0, 0.0, [0.0; 10], 1_u32);
 //! for k in 0..6000_u32 {
 //!     let t = f64::from(k) * SAMPLE_TIME_S;
@@ -72,30 +73,30 @@
 
 pub mod basis;
 pub mod contrast;
+pub mod defaults;
 pub mod detector;
 pub mod difference;
-pub mod known;
+pub mod initial_estimate;
 pub mod mixture;
 pub mod noise;
-pub mod usual;
 
 mod alternatives;
 mod blocks;
 mod candidate;
+mod f64x2;
 mod filter;
 mod history;
 mod hypothesis;
 mod last_blocks;
 mod moments;
 mod operator;
-mod pair;
-mod past;
 mod prior;
 mod saturation;
+mod signal_history;
 mod sizes;
 mod volatility;
 
 pub use filter::{AdaptiveFilter, REPLAYED, errors_needed, least_memory, memory_needed};
 pub use operator::through;
 pub use prior::AdaptivePrior;
-pub use sizes::{GAINS, HELD, HYPOTHESES, LARGEST_ORDER, LINEAR, PARAMETERS, SIGNALS, STARTS, STATES};
+pub use sizes::{DYNAMICS, GAINS, HYPOTHESES, LARGEST_ORDER, LINEAR, PARAMETERS, SIGNALS, STARTS, STATES};

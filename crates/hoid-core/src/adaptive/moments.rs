@@ -1,21 +1,21 @@
-//! The second moments of a block: all that its samples say of an operator.
+//! Step 4: the second moments of a block, which are sufficient for its likelihood.
 //!
-//! After the whitening filter a sample has the signals of the basis and the level, `z` (seven numbers),
-//! and the output y. The response of a state s (gains, level, corrections) is `w(s)' z`, bilinear in
-//! gains and corrections, so that the block says of s only what is in
+//! After the whitening filter a sample has the signals of the basis and the level, `z` (seven numbers), and the output y.
+//! The response of a state x (gains, level, corrections) is `w(x)' z`, bilinear in gains and corrections, so that the block
+//! enters the likelihood only through
 //!
 //! `sum z z'`, `sum z y`, `sum y^2`.
 //!
-//! About a state s with the derivatives `T = dw/ds`, with `r = y - w' z`, the Gauss-Newton model of the
+//! About a state x, with the derivatives `T = dw/dx` and the innovations `nu = y - w' z`, the Gauss-Newton model of the
 //! block is
 //!
-//! `A = T' (sum z z') T`, `b = T' sum z r`, `E = sum r^2`
+//! `A = T' (sum z z') T`, `b = T' sum z nu`, `E = sum nu^2`
 //!
-//! (the information, the score and the energy; all over the innovation variance).
+//! (information, score and energy; each times sigma^2). `H = z' T` is the measurement row of a sample.
 
 use super::{
     basis::Basis,
-    sizes::{GAINS, HELD, INPUTS, LINEAR, SIGNALS, STATES},
+    sizes::{DYNAMICS, GAINS, INPUTS, LINEAR, SIGNALS, STATES},
 };
 
 const ALL: usize = INPUTS + 1;
@@ -46,13 +46,14 @@ impl Moments {
         samples: 0.0,
     };
 
-    /// Takes a whitened sample.
+    /// Adds a whitened sample.
     #[inline(always)]
     pub fn add(&mut self, signals: &[f64; SIGNALS], level: f64, y: f64) {
         let mut z = [0.0; ALL];
         z[..SIGNALS].copy_from_slice(signals);
         (z[SIGNALS], z[INPUTS]) = (level, y);
-        // All of a row: what is below the diagonal is not used, and the loop has a known length.
+        // Sums whole rows: entries below the diagonal are not used, but the loop has a known
+        // length.
         for (row, a) in self.products.iter_mut().zip(z) {
             for (sum, b) in row.iter_mut().zip(z) {
                 *sum += a * b;
@@ -87,7 +88,7 @@ impl Moments {
             c[i] = with_output - response;
             energy += w[i] * (response - 2.0 * with_output);
         }
-        // Rounding may leave less than nothing of a residual that is next to zero.
+        // Rounding can make a vanishing energy negative.
         (c, energy.max(0.0))
     }
 
@@ -132,7 +133,7 @@ fn derivatives(basis: &Basis, state: &[f64; STATES], w: &[f64; INPUTS]) -> [[f64
         t[i] = weights(basis, &one);
     }
     t[GAINS][SIGNALS] = 1.0;
-    for j in 0..HELD {
+    for j in 0..DYNAMICS {
         let mut moved = *state;
         moved[LINEAR + j] += 1.0;
         let there = weights(basis, &moved);

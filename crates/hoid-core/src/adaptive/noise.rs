@@ -1,51 +1,50 @@
 //! The noise model: a long autoregression `D v = eps`, by least squares with a slow memory.
 //!
-//! D minimises `sum_k lambda^{t-k} w_k (v(k) + d_1 v(k-1) + .. + d_p v(k-p))^2` with
-//! `v = u - theta' x - level` (L. Ljung, *System Identification*, 1999, section 10.1). The products
-//! of `[v(t), .., v(t-p)]` are summed at each sample, all its lags with the gains of that sample, and
-//! solved now and then. The weights w are one, and less where eps is far out. The memory grows with the time since the start up to its limit: the first
-//! seconds, in which the gains are not known, do not stay.
+//! D minimises `sum_k lambda^{t-k} w_k (v(k) + d_1 v(k-1) + .. + d_p v(k-p))^2` with `v = u - theta' r - level` (L. Ljung,
+//! *System Identification*, 1999, section 10.1). The products of `[v(t), .., v(t-p)]`, all lags for the gains of that
+//! sample, are summed at each sample and solved at intervals. The weights w are one, and less for large eps. The memory
+//! grows with the time since the start up to a limit, so that the first seconds, with unknown gains, are forgotten.
 //!
-//! Before the data say more the coefficients are supposed to be normal about those of a usual remnant, with the
-//! standard deviation `WIDE`, which adds `sigma^2/WIDE^2` to the diagonal of the sums, sigma^2 the variance of eps.
-//! It is in units of eps and not of v: the spectrum of a steep remnant, of more than two poles, falls far
-//! below a share of its power, and D has to follow it there.
+//! The prior of the coefficients is normal about those of a typical remnant with the standard deviation `PRIOR_DEVIATION`,
+//! which adds `sigma^2/PRIOR_DEVIATION^2` to the diagonal of the sums (ridge), sigma^2 the variance of eps. The ridge scales
+//! with eps and not with v: the spectrum of a remnant of more than two poles falls far below a share of its power, and D has
+//! to follow it there.
 //!
-//! D is only ever used as a filter of finite length: it need not be stable.
+//! D is only used as a finite impulse response filter: it need not be stable.
 
 use hoid_numerics::{cholesky, elimination};
 
-use super::{pair::Pair, sizes::LARGEST_ORDER, usual::ORDER};
+use super::{defaults::ORDER, f64x2::F64x2, sizes::LARGEST_ORDER};
 
 const WIDTH: usize = LARGEST_ORDER + 1;
-/// The same in pairs, a whole number of them.
+/// Number of pairs of lags, rounded up.
 const PAIRS: usize = WIDTH.div_ceil(2);
 /// A number for each lag from zero on.
 pub type Lags = [f64; WIDTH];
-/// Time constants of the remnant that is supposed before anything is known, s.
-const USUAL: [f64; 2] = [0.3, 0.06];
-/// Standard deviation of the coefficients about that.
-const WIDE: f64 = 10.0;
+/// Time constants of the prior remnant, s.
+const DEFAULT_TIME_CONSTANTS_S: [f64; 2] = [0.3, 0.06];
+/// Prior standard deviation of the coefficients.
+const PRIOR_DEVIATION: f64 = 10.0;
 
-/// Least of that weight, where nothing is left.
+/// Lower limit of the ridge, for vanishing residuals.
 const LEAST: f64 = 1e-300;
 
-/// Share of the sums from which on they are scaled anew.
-const FADED: f64 = 0.5;
+/// Fading factor below which the sums are rescaled.
+const RESCALE_BELOW: f64 = 0.5;
 
 /// The sums and D.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseModel {
     order: usize,
-    supposed: [f64; 2],
-    /// Longest memory and shortest, in samples.
+    prior_d: [f64; 2],
+    /// Longest and shortest memory, in samples.
     longest: f64,
     shortest: f64,
-    /// Upper triangle of the sums over `fade`, in pairs of rows and of columns: a sample leaves those of
-    /// before as they are and counts for more.
-    products: [[[Pair; PAIRS]; 2]; PAIRS],
+    /// Upper triangle of the sums divided by `fade`, in pairs of rows and columns: instead of fading all sums at each
+    /// sample, a new sample gets the weight 1/fade.
+    products: [[[F64x2; PAIRS]; 2]; PAIRS],
     fade: f64,
-    /// The sum of the weights, and that of the squares of eps with them.
+    /// The sum of the weights, and the weighted sum of eps^2.
     weight: f64,
     squares: f64,
     samples: f64,
@@ -55,22 +54,22 @@ pub struct NoiseModel {
 crate::state!([] NoiseModel { products, fade, weight, squares, samples, d });
 
 impl NoiseModel {
-    /// Before anything is known. Ts and memory in s. `None` for an order below 2 or above
+    /// The prior noise model. Ts and memory in s. `None` for an order below 2 or above
     /// [`LARGEST_ORDER`].
     pub fn new(order: usize, memory: f64, ts: f64) -> Option<Self> {
         if !(2..=LARGEST_ORDER).contains(&order) || memory.is_nan() || memory <= 0.0 {
             return None;
         }
-        let [a, b] = USUAL.map(|t| libm::exp(-ts / t));
-        let supposed = [-(a + b), a * b];
+        let [a, b] = DEFAULT_TIME_CONSTANTS_S.map(|t| libm::exp(-ts / t));
+        let prior_d = [-(a + b), a * b];
         let mut d = [0.0; LARGEST_ORDER];
-        d[..2].copy_from_slice(&supposed);
+        d[..2].copy_from_slice(&prior_d);
         Some(Self {
             order,
-            supposed,
+            prior_d,
             longest: memory / ts,
             shortest: (3.0 / ts).min(memory / ts).max(2.0 * order as f64),
-            products: [[[Pair::ZERO; PAIRS]; 2]; PAIRS],
+            products: [[[F64x2::ZERO; PAIRS]; 2]; PAIRS],
             fade: 1.0,
             weight: 0.0,
             squares: 0.0,
@@ -79,14 +78,14 @@ impl NoiseModel {
         })
     }
 
-    /// Begins as if so many samples of a v had been seen, with this variance of eps and autocovariances over
-    /// it; false where they are none.
-    pub(super) fn suppose(&mut self, lags: &Lags, variance: f64, samples: f64) -> bool {
+    /// Sets the sums to those of a number of samples with this variance of eps and these autocovariances relative to
+    /// it; false for invalid numbers.
+    pub(super) fn set_prior(&mut self, lags: &Lags, variance: f64, samples: f64) -> bool {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         if !(positive(variance) && lags[0] > 0.0 && lags.iter().all(|c| c.is_finite()) && positive(samples)) {
             return false;
         }
-        // The memory is half of the samples that were taken.
+        // The memory is half the number of samples.
         let weight = samples.min(self.longest);
         self.samples = 2.0 * weight;
         (self.weight, self.squares, self.fade) = (weight, weight * variance, 1.0);
@@ -99,7 +98,7 @@ impl NoiseModel {
         true
     }
 
-    /// Coefficients behind the 1.
+    /// Coefficients after the 1.
     pub fn d(&self) -> &[f64] {
         &self.d[..self.order]
     }
@@ -114,17 +113,18 @@ impl NoiseModel {
         1.0 + self.d().iter().sum::<f64>()
     }
 
-    /// Takes v, the newest first, and its eps by the D of now, with a weight.
+    /// Adds v, the newest first, and its eps for the current D, with a weight.
     #[inline(always)]
     pub fn update(&mut self, v: &[f64; WIDTH], eps: f64, weight: f64) {
         self.samples += 1.0;
         let memory = (0.5 * self.samples).clamp(self.shortest, self.longest.max(self.shortest));
+        // lambda = 1 - 1/memory is an exponential window of this length.
         let lambda = 1.0 - 1.0 / memory;
         self.weight = lambda * self.weight + weight;
         self.squares = lambda * self.squares + weight * eps * eps;
         self.fade *= lambda;
-        if self.fade < FADED {
-            let fade = Pair::both(self.fade);
+        if self.fade < RESCALE_BELOW {
+            let fade = F64x2::both(self.fade);
             self.products
                 .as_flattened_mut()
                 .as_flattened_mut()
@@ -133,7 +133,7 @@ impl NoiseModel {
             self.fade = 1.0;
         }
         let weight = weight / self.fade;
-        // As a constant the usual order makes loops of known length.
+        // The default order as a constant gives loops of known length.
         match self.order {
             ORDER => self.add(v, weight, ORDER),
             order => self.add(v, weight, order),
@@ -143,10 +143,10 @@ impl NoiseModel {
     #[inline(always)]
     fn add(&mut self, v: &Lags, weight: f64, order: usize) {
         let pairs = (order / 2 + 1).min(PAIRS);
-        let v: [Pair; PAIRS] = core::array::from_fn(|i| Pair([v[2 * i], v.get(2 * i + 1).copied().unwrap_or(0.0)]));
+        let v: [F64x2; PAIRS] = core::array::from_fn(|i| F64x2([v[2 * i], v.get(2 * i + 1).copied().unwrap_or(0.0)]));
         for first in 0..pairs {
             let [above, below] = &mut self.products[first];
-            let [a, b] = v[first].0.map(|v| Pair::both(weight * v));
+            let [a, b] = v[first].0.map(|v| F64x2::both(weight * v));
             for k in first..pairs {
                 above[k] += a * v[k];
                 below[k] += b * v[k];
@@ -154,7 +154,7 @@ impl NoiseModel {
         }
     }
 
-    /// The sum of the products of two lags, the first not the larger.
+    /// The sum of the products of two lags, the smaller first.
     fn product(&self, i: usize, j: usize) -> f64 {
         self.fade * self.products[i / 2][i % 2][j / 2].0[j % 2]
     }
@@ -168,12 +168,12 @@ impl NoiseModel {
         }
     }
 
-    /// Weight of what is supposed, in the unit of the sums.
+    /// Weight of the prior, in the unit of the sums.
     fn ridge(&self) -> f64 {
-        self.variance() / (WIDE * WIDE) + LEAST
+        self.variance() / (PRIOR_DEVIATION * PRIOR_DEVIATION) + LEAST
     }
 
-    /// The sums over the lags, and what is supposed: the upper triangle.
+    /// The sums over the lags plus the ridge: the upper triangle.
     #[inline(always)]
     fn sums<const N: usize>(&self, p: usize) -> [[f64; N]; N] {
         let (mut matrix, ridge) = ([[0.0; N]; N], self.ridge());
@@ -202,7 +202,7 @@ impl NoiseModel {
         Some(cholesky::scaled_inverse(&matrix, self.order, 0.6 * self.variance()))
     }
 
-    /// D of what was taken so far. It stays where the sums do not determine it.
+    /// Solves for D. D stays unchanged if the sums do not determine it.
     pub fn solve(&mut self) {
         match self.order {
             ORDER => self.solve_of::<ORDER>(ORDER),
@@ -213,9 +213,10 @@ impl NoiseModel {
     #[inline(always)]
     fn solve_of<const N: usize>(&mut self, p: usize) {
         let ridge = self.ridge();
+        // Normal equations S d = -s_0 with the ridge on both sides: (S + r I) d = r d_prior - s_0.
         let mut d = [0.0; N];
         for (i, d) in d.iter_mut().enumerate().take(p) {
-            *d = ridge * self.supposed.get(i).copied().unwrap_or(0.0) - self.product(0, i + 1);
+            *d = ridge * self.prior_d.get(i).copied().unwrap_or(0.0) - self.product(0, i + 1);
         }
         let solved = elimination::solve(&mut self.sums(p), p, &mut d);
         if solved && d.iter().all(|d| d.is_finite()) {
@@ -317,7 +318,7 @@ mod tests {
         // An autoregression of order 1 with the pole .9: its autocovariances are .9^k/(1 - .81).
         let (mut model, mut seed) = (NoiseModel::new(6, 40.0, 0.01).unwrap(), 5);
         let lags: Lags = core::array::from_fn(|k| 0.9_f64.powi(k as i32) / 0.19);
-        assert!(model.suppose(&lags, 1.0 / 12.0, 2000.0));
+        assert!(model.set_prior(&lags, 1.0 / 12.0, 2000.0));
         assert!(
             (model.d()[0] + 0.9).abs() < 1e-3 && model.d()[1].abs() < 1e-3,
             "{:?}",
@@ -334,7 +335,7 @@ mod tests {
         // Ten memories of 4000 samples: what was supposed is gone, d1 has a standard error of .01.
         assert!((model.d()[0] + 0.5).abs() < 0.05, "{:?}", model.d());
         let mut other = NoiseModel::new(6, 40.0, 0.01).unwrap();
-        assert!(!other.suppose(&[0.0; WIDTH], 1.0, 2000.0) && !other.suppose(&lags, 1.0, f64::NAN));
+        assert!(!other.set_prior(&[0.0; WIDTH], 1.0, 2000.0) && !other.set_prior(&lags, 1.0, f64::NAN));
     }
 
     #[test]

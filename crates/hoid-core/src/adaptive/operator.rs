@@ -1,31 +1,27 @@
-//! The operator that is told: parameters and their covariance from gains and corrections.
+//! The reported operator: parameters and their covariance from gains and corrections.
 //!
-//! Gains of the basis are no parameters of an operator. K_e and K_e_dot are those of the gain and lead
-//! that are nearest to it at [`NEAR_RAD_S`], by least squares in
-//! `K_e + K_e_dot j omega = Y e^{j tau omega} (1 - omega^2/omega_nm^2 + 2 j zeta omega/omega_nm)`;
-//! exactly those of a person who has a gain and a lead. They are linear in the state s, so that their
-//! covariance is `M C M'`.
-//!
-//! Their covariance is that of the mixture over changes ([`super::mixture`]) at the basis of now, and the
-//! scatter of other operators that predict u about as well ([`super::alternatives`]).
+//! K_e and K_e_dot are those of the gain and lead that are nearest to the numerator at [`NEAR_RAD_S`], by least squares in
+//! `K_e + K_e_dot j omega = Y e^{j tau omega} (1 - omega^2/omega_nm^2 + 2 j zeta omega/omega_nm)`; exact for an operator
+//! with a gain and a lead. They are linear in the state, so that their covariance is `M P M'`. P is the covariance of the
+//! mixture ([`super::mixture`]); the scatter of other operators that predict u as well ([`super::alternatives`]) is added.
 
 use super::{
     AdaptiveFilter,
     candidate::NEAR_RAD_S,
-    sizes::{GAINS, HELD, LINEAR, PARAMETERS, STATES},
-    usual::HOLD_S,
+    defaults::HOLD_S,
+    sizes::{DYNAMICS, GAINS, LINEAR, PARAMETERS, STATES},
 };
 
-/// In the first seconds the noise model has not been seen for long, and the errors of what it whitens are
-/// too small: they are reported `1 + UNLEARNT_S/t` times as large after t seconds. Set on virtual people of
-/// another seed than those of the test (`tests/first_seconds.rs` of `hoid-track`).
-const UNLEARNT_S: f64 = 4.0;
+/// In the first seconds the noise model is uncertain, and the standard errors are too small: after t seconds they are
+/// multiplied by `1 + SETTLING_S/t`. Set on virtual people of another seed than those of the test
+/// (`tests/first_seconds.rs` of `hoid-track`).
+const SETTLING_S: f64 = 4.0;
 
 impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// K_e, K_e_dot, omega_nm in rad/s, zeta_nm, and tau_e in s.
     pub fn operator(&self) -> [f64; PARAMETERS] {
         let [k_e, k_e_dot, omega, zeta, tau] = self.live().operator();
-        // The error of a sample is held: half a sample of the delay is the hold's.
+        // The error of a sample is held: half a sample of the delay belongs to the zero-order hold.
         let hold = 0.5 * self.sample_time();
         [k_e, k_e_dot, omega, zeta, (tau - hold).max(0.0)]
     }
@@ -36,7 +32,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         for (row, gains) in rows.iter_mut().zip(self.gain_and_lead()) {
             row[..GAINS].copy_from_slice(&gains);
         }
-        for j in 0..HELD {
+        for j in 0..DYNAMICS {
             rows[2 + j][LINEAR + j] = 1.0;
         }
         let own = through(&rows, &self.state_covariance());
@@ -46,9 +42,9 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         core::array::from_fn(|i| core::array::from_fn(|j| own[i][j] + scatter[i][j]))
     }
 
-    /// T_L in s and its variance. Each hypothesis has the T that makes its `E (K_e_dot - T K_e)^2` least, and T_L is
-    /// their mean; the variance is that of the difference by the covariance of all. By that covariance alone T_L
-    /// would be far too short where some unlikely hypotheses, as those of the last second, leave K_e open.
+    /// T_L in s and its variance. Each hypothesis has the T with the least `E (K_e_dot - T K_e)^2`; T_L is their mean,
+    /// and its variance that of `K_e_dot - T_L K_e` for the covariance of the mixture. The T of the mixture itself
+    /// would be far too short if unlikely hypotheses, such as those of the last second, leave K_e undetermined.
     pub fn lead_time(&self) -> [f64; 2] {
         let map = self.gain_and_lead();
         let pair = |state: &[f64; STATES]| map.map(|row| (0..GAINS).map(|k| row[k] * state[k]).sum::<f64>());
@@ -70,7 +66,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         [lead, variance.max(0.0) / square]
     }
 
-    /// K_e and K_e_dot by the gains of the basis.
+    /// The matrix from the gains of the basis to K_e and K_e_dot.
     pub fn gain_and_lead(&self) -> [[f64; GAINS]; 2] {
         self.basis().gain_and_lead(&NEAR_RAD_S)
     }
@@ -78,9 +74,9 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// Covariance of gains, level and corrections, as it is reported.
     pub fn state_covariance(&self) -> [[f64; STATES]; STATES] {
         let mut c = self.live().mixture.covariance();
-        if !self.is_known() {
+        if !self.has_initial_estimate() {
             let seconds = self.samples() as f64 * self.sample_time();
-            let wider = 1.0 + UNLEARNT_S / seconds.max(HOLD_S);
+            let wider = 1.0 + SETTLING_S / seconds.max(HOLD_S);
             c.iter_mut().flatten().for_each(|c| *c *= wider * wider);
         }
         c

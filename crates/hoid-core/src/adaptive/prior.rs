@@ -1,20 +1,19 @@
-//! What is supposed of a person and their changes.
+//! The prior of a person and of the changes of the operator.
 
 use super::{
     basis::Point,
     detector::Detection,
     mixture::ChangePrior,
-    sizes::{HELD, STARTS},
+    sizes::{DYNAMICS, STARTS},
 };
 
-/// What is supposed of a person and their changes.
+/// The prior of a person and of the changes of the operator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdaptivePrior {
-    /// What is held of the person, and how far they may be from it: shares of omega and zeta, and s for
-    /// the delay.
+    /// Point of the basis, and its prior standard deviations: relative for omega and zeta, in s for the delay.
     pub person: Point,
     /// See `person`.
-    pub spread: [f64; HELD],
+    pub spread: [f64; DYNAMICS],
     /// Ts, s.
     pub sample_time: f64,
     /// Order of the noise model.
@@ -25,14 +24,14 @@ pub struct AdaptivePrior {
     pub hold: f64,
     /// How the operator changes.
     pub changes: ChangePrior,
-    /// Where estimates start when there are data for the first time; their lags are that of the person.
+    /// Starting points of the first estimate; their lags are that of the person.
     pub starts: [Point; STARTS],
     /// The detector.
     pub detection: Detection,
 }
 
 impl AdaptivePrior {
-    /// True for numbers that make sense.
+    /// True for valid numbers.
     pub(super) fn is_sound(&self) -> bool {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         [self.sample_time, self.hold].into_iter().all(positive)

@@ -1,24 +1,22 @@
-//! Where the stick ends.
+//! Outputs at a limit of the stick: censored samples.
 //!
-//! A stick that stands at its end says only that they would have gone at least as far. Taken as it is, such
-//! an output says that they answered less than they do, and the samples behind it are held against a noise
-//! that was none. So nothing is learnt of it, and what goes on in the filters is the output that was
-//! predicted, where that lies beyond the end, and the end where it does not: the output given what is known,
-//! but for the noise (J. Tobin, *Econometrica* 26 (1958) 24-36, has the regression with both).
+//! An output at a limit only shows that the intended output was at least as large. Used as measured, it would bias the gains
+//! towards zero, and the following samples would be compared with a wrong noise. These samples therefore do not update the
+//! estimate, and the filters get the predicted output if it lies beyond the limit, otherwise the limit (J. Tobin,
+//! *Econometrica* 26 (1958) 24-36, has the regression with censored outputs).
 //!
-//! The stick is at its end where two samples one after another are alike, and none has been farther out;
-//! from then on one sample there is enough. The first time, the sample before is only known to be at the end
-//! when a replay reads it.
+//! The stick is at a limit if two consecutive samples are equal and no output has been farther out; from then on one sample
+//! there is enough. The first time, the first of the two samples is known to be at the limit only in a replay.
 
 use super::history::Use;
 
-/// The ends that have been reached.
+/// The limits that have been reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Saturation {
     lowest: f64,
     highest: f64,
     last: f64,
-    /// Whether the stick has stayed at its lowest and at its highest output.
+    /// Whether the stick has stayed at its lower and at its upper limit.
     known: [bool; 2],
 }
 
@@ -35,31 +33,30 @@ impl Saturation {
         }
     }
 
-    /// The end at which the stick is, if it is at one.
+    /// The limit at which the stick is, if it is at one.
     #[inline(always)]
     pub fn end(&self, u: f64) -> Option<Use> {
         let [low, high] = self.known;
         let again = u == self.last;
         match self.highest > self.lowest {
-            true if u == self.highest && (again || high) => Some(Use::AtMost),
-            true if u == self.lowest && (again || low) => Some(Use::AtLeast),
+            true if u == self.highest && (again || high) => Some(Use::AtUpperLimit),
+            true if u == self.lowest && (again || low) => Some(Use::AtLowerLimit),
             _ => None,
         }
     }
 
-    /// What goes on in the filters in the place of an output at an end, from what was predicted: never
-    /// farther beyond it than the ends are from one another.
+    /// The output for the filters in place of one at a limit, from the prediction; at most one range beyond the limit.
     #[inline(always)]
     pub fn beyond(&self, end: Use, u: f64, predicted: f64) -> f64 {
         let range = self.highest - self.lowest;
         match end {
-            Use::AtMost => predicted.max(u).min(u + range),
-            Use::AtLeast => predicted.min(u).max(u - range),
+            Use::AtUpperLimit => predicted.max(u).min(u + range),
+            Use::AtLowerLimit => predicted.min(u).max(u - range),
             _ => u,
         }
     }
 
-    /// Saturation a sample.
+    /// Updates the limits with a sample.
     #[inline(always)]
     pub fn remember(&mut self, u: f64) {
         let again = u == self.last && self.highest > self.lowest;
@@ -85,15 +82,15 @@ mod tests {
     #[test]
     fn a_stick_that_stands_farther_out_than_ever_is_at_its_end() {
         let ends = after(&[0.1, -0.4, 1.0]);
-        // Foretold beyond the end, this side of it, and farther than can be.
+        // Predictions beyond the limit, inside of it, and farther than one range beyond.
         let beyond = |u: f64, predicted: f64| ends.end(u).map(|end| ends.beyond(end, u, predicted));
         assert_eq!(beyond(1.0, 1.3), Some(1.3));
         assert_eq!(beyond(1.0, 0.2), Some(1.0));
         assert_eq!(beyond(1.0, 1e9), Some(1.0 + 1.4));
         let lower = after(&[0.1, -0.4]);
-        assert_eq!(lower.end(-0.4), Some(Use::AtLeast));
-        assert_eq!(lower.beyond(Use::AtLeast, -0.4, -0.5), -0.5);
-        assert_eq!(lower.beyond(Use::AtLeast, -0.4, 3.0), -0.4);
+        assert_eq!(lower.end(-0.4), Some(Use::AtLowerLimit));
+        assert_eq!(lower.beyond(Use::AtLowerLimit, -0.4, -0.5), -0.5);
+        assert_eq!(lower.beyond(Use::AtLowerLimit, -0.4, 3.0), -0.4);
     }
 
     #[test]
@@ -107,9 +104,9 @@ mod tests {
     #[test]
     fn an_end_at_which_the_stick_has_stayed_is_known_at_once() {
         let ends = after(&[0.1, 1.0, 1.0, -0.3]);
-        assert_eq!(ends.end(1.0), Some(Use::AtMost));
-        assert_eq!(ends.end(-0.3), Some(Use::AtLeast));
-        // Farther out than the end is no end.
+        assert_eq!(ends.end(1.0), Some(Use::AtUpperLimit));
+        assert_eq!(ends.end(-0.3), Some(Use::AtLowerLimit));
+        // An output beyond the limit is not at a limit.
         assert_eq!(after(&[0.1, 1.0, 1.0, 1.2, 0.0]).end(1.2), None);
     }
 
@@ -122,6 +119,6 @@ mod tests {
     #[test]
     fn a_pedal_ends_where_it_is_let_go() {
         let ends = after(&[0.0, 0.3, 0.0]);
-        assert_eq!(ends.end(0.0), Some(Use::AtLeast));
+        assert_eq!(ends.end(0.0), Some(Use::AtLowerLimit));
     }
 }

@@ -1,32 +1,30 @@
-//! How unevenly the innovations come.
+//! How unevenly the innovations are distributed in time.
 //!
-//! A remnant of constant power has blocks whose energies are chi-square: of n samples the logarithm of an
-//! energy has the variance 2/n. People who act in pulses have innovations that come in bursts, some tens
-//! of times more uneven. A likelihood that takes each of their samples for an independent one believes
-//! too much: it splits a steady person into many. So each sample counts for `1/c` of one, the
-//! quasi-likelihood of overdispersed data (R. W. M. Wedderburn, *Biometrika* 61 (1974) 439-447), with
-//! `c = v^POWER`, v the variance of the logarithm of energies over that of a constant power, by the
-//! differences of one block from the next, so that a slow drift of the level does not count:
+//! For a remnant of constant power the block energies are chi-square: the logarithm of the energy of n samples has the
+//! variance 2/n. People who act in pulses have innovations in bursts, with a variance tens of times larger. A likelihood
+//! that treats their samples as independent is too sharp and splits a constant operator into many. Each sample therefore
+//! counts as `1/c` of one, the quasi-likelihood of overdispersed data (R. W. M. Wedderburn, *Biometrika* 61 (1974) 439-447),
+//! with `c = v^POWER`, v the ratio of the variance of the log energies to that for constant power. Differences of
+//! successive blocks remove slow drifts of the level:
 //!
 //! `v = (pi/2) (mean |ln E_k - ln E_{k-1}|)^2/(4/n)`,
 //!
-//! by absolute values, so that a change, which is one burst, counts little.
+//! and absolute values limit the influence of a change, which is one burst.
 //!
-//! It is not c = v: where the energy is, the response is too, and bursts are not independent of it. The
-//! power is empirical. At most 4.5 for v = 75, that of pilots with a dead zone; 1.9 for v = 6, that of
-//! people with a mouse; 1 for simulated remnants.
+//! c is not v itself: bursts coincide with the response and are not independent of it. The power is empirical: c is at most
+//! 4.5 for v = 75 (pilots with a dead zone), 1.9 for v = 6 (people with a mouse), and 1 for simulated remnants.
 
-/// Power of v that the dispersion is.
+/// Exponent of the dispersion `c = v^POWER`.
 const POWER: f64 = 0.3;
-/// Differences that the supposition v = 1 counts for.
-const SUPPOSED: f64 = 4.0;
+/// Number of differences that the prior v = 1 counts as.
+const PRIOR_DIFFERENCES: f64 = 4.0;
 /// Largest v.
-const MOST: f64 = 1000.0;
+const LARGEST: f64 = 1000.0;
 
 /// The running mean of the squared differences.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Volatility {
-    /// Blocks that are taken together.
+    /// Blocks per energy.
     blocks: u64,
     taken: u64,
     energy: f64,
@@ -53,7 +51,7 @@ impl Volatility {
         }
     }
 
-    /// Takes the energy of a block of so many samples.
+    /// Adds the energy of a block with its number of samples.
     pub fn take(&mut self, energy: f64, samples: f64) {
         self.energy += energy;
         self.samples += samples;
@@ -64,6 +62,7 @@ impl Volatility {
         let log = libm::log(self.energy);
         if log.is_finite() {
             if self.started {
+                // E|N(0, 2 var)| = sqrt(4 var/pi): the scale makes the mean of the steps sqrt(v) with var = 2/n.
                 let step = log - self.last;
                 self.steps += step.abs() * libm::sqrt(0.125 * core::f64::consts::PI * self.samples);
                 self.differences += 1.0;
@@ -73,10 +72,10 @@ impl Volatility {
         (self.taken, self.energy, self.samples) = (0, 0.0, 0.0);
     }
 
-    /// Samples that count for one.
+    /// Number of samples that count as one.
     pub fn dispersion(&self) -> f64 {
-        let root = (self.steps + SUPPOSED) / (self.differences + SUPPOSED);
-        libm::pow((root * root).clamp(1.0, MOST), POWER)
+        let root = (self.steps + PRIOR_DIFFERENCES) / (self.differences + PRIOR_DIFFERENCES);
+        libm::pow((root * root).clamp(1.0, LARGEST), POWER)
     }
 }
 

@@ -1,21 +1,20 @@
-//! One signal: what its next sample may be.
+//! Guard of one signal: limits for its next sample.
 //!
-//! **Prediction.** With `nabla x(t) = x(t) - x(t-1)`, the polynomial of degree j-1 through the last j
-//! samples goes on to a value from which x(t) differs by exactly `r_j(t) = nabla^j x(t)` (Newton's
-//! backward formula). The backward differences of order 1 to 4 are therefore the errors of holding
-//! the last sample, of a line, of a parabola and of a cubic, at one subtraction each. The order with
-//! the smallest scale is used: 1 for a signal like white noise behind one lag, 3 or 4 for a smooth
-//! one.
+//! **Prediction.** With `nabla x(t) = x(t) - x(t-1)`, the polynomial of degree j-1 through the last j samples goes on
+//! to a value from which x(t) differs by exactly `r_j(t) = nabla^j x(t)` (Newton's backward formula). The backward
+//! differences of order 1 to 4 are therefore the errors of holding the last sample, of a line, of a parabola and of a
+//! cubic, at one subtraction each. The order with the smallest scale is used: 1 for a signal like white noise after one
+//! lag, 3 or 4 for a smooth one.
 //!
 //! **Scale.** q_j is the 99 % quantile of `|r_j|`, by stochastic approximation in its logarithm (H.
 //! Robbins and S. Monro, *Annals of Mathematical Statistics* 22 (1951) 400-407):
 //!
 //! `q <- q (1 + g (1 - p))` where `|r| > q`, else `q <- q (1 - g p)`, with p = .01, g = .05.
 //!
-//! The size of an outlier does not enter: one sample moves q by 5 % whatever it is. A quantile in the
-//! tail, and not a median: people's u rests and moves by pulses, and its tails are what the limit
-//! must let pass. p_j is the 90 % quantile, in the same way with g = .02. Samples at which the signal
-//! stands still say nothing of how it moves: they enter neither.
+//! The size of an outlier does not enter: one sample moves q by 5 % whatever it is. A quantile in the tail, and not a
+//! median: people's u rests and moves by pulses, and its tails are what the limit must let pass. p_j is the 90 %
+//! quantile, in the same way with g = .02. Samples at which the signal stays constant carry no information about how it
+//! moves: they enter neither.
 //!
 //! **Outliers.** A sample is held back where `|r_j| > max(m_j q_j, floor)` with
 //!
@@ -30,10 +29,10 @@
 //! deviations on, one of 8e9 samples. The floor is a share of the signal's mean magnitude below which an
 //! outlier is worth nothing.
 //!
-//! **While it is held back** the signal goes on along its last slope where that has a meaning (order
-//! 2 or more), damped with a time constant of [`SLOPE_S`], else at its last value. It has come back
-//! when it is as near to that as it may be after h samples: within `max(m q_j, floor) + h q_1` where
-//! it has a slope, and `max(m q_1, floor) sqrt(h + 1)` where it wanders.
+//! **While it is held back** the signal continues along its last slope where that has a meaning (order 2 or more),
+//! damped with a time constant of [`SLOPE_S`], else at its last value. It has come back when it is as near to that as
+//! it may be after h samples: within `max(m q_j, floor) + h q_1` if it has a slope, and `max(m q_1, floor) sqrt(h + 1)`
+//! if it wanders.
 
 /// Orders of the differences.
 pub const ORDERS: usize = 4;
@@ -46,9 +45,9 @@ const INNER_GAIN: f64 = 0.02;
 /// Least and largest limit in units of the quantile.
 const LIMIT: f64 = 2.5;
 const HEAVIEST: f64 = 12.0;
-/// Largest mean magnitude, in units of the inner quantile, of a signal that moves as usual: Gaussian errors have
+/// Largest mean magnitude, in units of the inner quantile, of a signal that moves as by default: Gaussian errors have
 /// .49 and Laplacian ones .43, and those of a signal five times as large 2.4 and 2.2.
-const USUAL: f64 = 1.3;
+const TYPICAL: f64 = 1.3;
 /// Blocks over which the tails are averaged.
 const AVERAGED: u32 = 20;
 /// Inner quantile over the outer one, of Gaussian errors.
@@ -68,14 +67,14 @@ pub struct ChannelGuard {
     known: usize,
     /// Quantiles; those of nothing are zero.
     quantiles: [f64; ORDERS],
-    /// Those further in, from which the tail is foretold.
+    /// Those further in, from which the tail is predicted.
     inner: [f64; ORDERS],
     /// Mean of the squares of the quotients of the two, and what they were averaged over.
     heavy: [f64; ORDERS],
     averaged: u32,
-    /// True once outliers are looked for.
+    /// True once outliers are searched for.
     watching: bool,
-    /// A first difference within which the signal stands still.
+    /// A first difference within which the signal stays constant.
     resting: f64,
     /// Order less one that is used.
     order: usize,
@@ -95,7 +94,7 @@ crate::state!([] ChannelGuard {
 });
 
 impl ChannelGuard {
-    /// A signal of which nothing is known: everything passes until [`ChannelGuard::set_quantiles`].
+    /// A signal without prior knowledge: everything passes until [`ChannelGuard::set_quantiles`].
     pub fn new(sample_time: f64) -> Self {
         Self {
             last: 0.0,
@@ -134,7 +133,7 @@ impl ChannelGuard {
 
     /// First values of quantiles that are not known, from the mean magnitudes of the differences; they are
     /// learnt from then on, and nothing is an outlier until [`ChannelGuard::watch`].
-    pub fn begin_learning(&mut self, means: [f64; ORDERS]) {
+    pub fn start_learning(&mut self, means: [f64; ORDERS]) {
         for (j, mean) in means.into_iter().enumerate() {
             if self.quantiles[j] <= 0.0 {
                 self.quantiles[j] = QUANTILE_OVER_MEAN * mean;
@@ -149,13 +148,13 @@ impl ChannelGuard {
         self.choose();
     }
 
-    /// True once the quantiles are known and outliers are looked for.
+    /// True once the quantiles are known and outliers are searched for.
     pub fn is_known(&self) -> bool {
         self.watching
     }
 
-    /// True for samples in a row, the first of them behind a jump, that move as the signal does: the mean
-    /// magnitude of their differences of the order in use is below that of a signal about three times as large.
+    /// True for samples in a row, the first of them after a jump, that move as the signal does: the mean magnitude of
+    /// their differences of the order in use is below that of a signal about three times as large.
     pub fn moves_as_usual(&self, samples: impl Iterator<Item = f64>) -> bool {
         let (mut past, mut count, mut sum) = ([0.0; ORDERS], 0, 0.0);
         for x in samples {
@@ -174,7 +173,7 @@ impl ChannelGuard {
             }
         }
         let counted = count as f64 - self.order as f64 - 1.0;
-        counted > 0.0 && sum <= USUAL * self.inner[self.order] * counted
+        counted > 0.0 && sum <= TYPICAL * self.inner[self.order] * counted
     }
 
     /// The first difference from which on a sample is a jump.
@@ -182,17 +181,17 @@ impl ChannelGuard {
         self.limit(0)
     }
 
-    /// A first difference within which the signal stands still.
+    /// A first difference within which the signal stays constant.
     pub fn set_resting(&mut self, difference: f64) {
         self.resting = difference;
     }
 
-    /// The last sample, or what stands for it.
+    /// The last sample, or what represents it.
     pub fn last(&self) -> f64 {
         self.last
     }
 
-    /// The last difference where the signal is foretold by more than its last value, else zero.
+    /// The last difference where the signal is predicted by more than its last value, else zero.
     pub fn slope(&self) -> f64 {
         if self.order_in_use() > 0 {
             self.differences[0]
@@ -201,7 +200,7 @@ impl ChannelGuard {
         }
     }
 
-    /// True where the signal is foretold by more than its last value.
+    /// True if the signal is predicted by more than its last value.
     pub fn has_slope(&self) -> bool {
         self.order > 0
     }
@@ -234,7 +233,7 @@ impl ChannelGuard {
         if limit > self.floor { limit } else { self.floor }
     }
 
-    /// True for errors beyond the limit, and for those that are no numbers. Nothing is beyond it
+    /// True for errors beyond the limit, and for those that are not numbers. Nothing is beyond it
     /// while the quantiles, or a sample before, are not known.
     #[inline(always)]
     pub fn is_outlier(&self, errors: &[f64; ORDERS]) -> bool {
@@ -279,13 +278,13 @@ impl ChannelGuard {
         let weight = 1.0 / f64::from(self.averaged);
         for ((heavy, q), p) in self.heavy.iter_mut().zip(&self.quantiles).zip(&self.inner) {
             let quotient = q / p;
-            // A tail of which nothing is known (0/0) is a Gaussian one.
+            // A tail without prior knowledge (0/0) is a Gaussian one.
             let square = (quotient * quotient).clamp(LIMIT, HEAVIEST);
             *heavy += weight * (square - *heavy);
         }
     }
 
-    /// The end of a block: averages the tails and chooses the order of the prediction anew.
+    /// The end of a block: averages the tails and chooses the order of the prediction again.
     pub fn end_block(&mut self) {
         self.average_tails();
         self.choose();
@@ -309,7 +308,7 @@ impl ChannelGuard {
         self.size
     }
 
-    /// Holds back a sample, or a missing one (NaN); returns what stands for it.
+    /// Holds back a sample, or a missing one (NaN); returns what represents it.
     pub fn hold(&mut self, x: f64) -> f64 {
         if self.held == 0 {
             (self.size, self.base) = (0.0, self.last);
@@ -325,7 +324,7 @@ impl ChannelGuard {
         self.last
     }
 
-    /// True where a signal that is held back has come back with this sample.
+    /// True if a signal that is held back has come back with this sample.
     pub fn is_back(&self, x: f64) -> bool {
         let expected = self.last + self.damping * self.slope;
         let (limit, held) = (self.limit(self.order_in_use()), f64::from(self.held));
@@ -337,7 +336,7 @@ impl ChannelGuard {
         (x - expected).abs() <= room
     }
 
-    /// Goes on from a sample that has come back, with the mean slope since the last good one.
+    /// Continues from a sample that has come back, with the mean slope since the last good one.
     pub fn resume(&mut self, x: f64) {
         let slope = (x - self.base) / (f64::from(self.held) + 1.0);
         self.last = x;
@@ -346,7 +345,7 @@ impl ChannelGuard {
         (self.held, self.size) = (0, 0.0);
     }
 
-    /// Goes on from the last samples of the signal as they came, the newest last.
+    /// Continues from the last samples of the signal as they came, the newest last.
     pub fn restart(&mut self, samples: impl Iterator<Item = f64>) {
         (self.known, self.held, self.size, self.slope) = (0, 0, 0.0, 0.0);
         let mut first = true;
@@ -521,10 +520,10 @@ mod tests {
     fn while_quantiles_are_learnt_nothing_is_held_back() {
         let mut channel = ChannelGuard::new(0.01);
         channel.follow(0.0, &[0.0; ORDERS]);
-        channel.begin_learning([0.0; ORDERS]);
+        channel.start_learning([0.0; ORDERS]);
         channel.watch();
         assert!(!channel.is_known());
-        channel.begin_learning([0.1; ORDERS]);
+        channel.start_learning([0.1; ORDERS]);
         assert!(!channel.is_outlier(&channel.errors(1e9)));
         channel.watch();
         assert!(channel.is_known() && channel.is_outlier(&channel.errors(1e9)));

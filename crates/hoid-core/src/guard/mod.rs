@@ -1,20 +1,17 @@
-//! A guard in front of a recursion: samples that no tracking signal makes, and spans that are no
-//! tracking.
+//! A guard in front of a recursion: samples that no tracking signal makes, and spans that are not tracking.
 //!
-//! A wrong sample of e does not pass with its innovation. It enters `w = (B/F) q^-nk e` and the
-//! gradients of w only nk samples later, and stays in them for the time constants of F. To limit
-//! innovations is therefore not enough: the samples themselves are compared with what the signal
-//! foretells, before anything sees them.
+//! A wrong sample of e does not pass with its innovation. It enters `w = (B/F) q^-nk e` and the gradients of w only nk
+//! samples later, and stays in them for the time constants of F. To limit innovations is therefore not enough: the
+//! samples themselves are compared with what the signal predicts, before anything sees them.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | [`channel`] | one signal: the causal prediction of its next sample, the scale of its errors, samples that are held back |
-//! | [`profile`] | both signals over a second: sizes and smoothness against those of the past; idle, frozen and swapped channels, a model that foretells less than the past of u alone |
+//! | [`profile`] | both signals over a second: sizes and smoothness against those of the past; idle, frozen and swapped channels, a model that predicts less than the past of u alone |
 //! | [`resting`] | a stick that rests, told from a channel that is frozen |
-//! | [`mod@reference`] | the model of the start beside the estimate: an estimate that has gone astray |
+//! | [`mod@reference`] | the model of the start next to the estimate: an estimate that has gone diverged |
 //!
-//! What is done with such samples and spans stands where the recursion is at hand, in the crate
-//! `hoid-track`.
+//! Such samples and spans are handled where the recursion is available, in the crate `hoid-track`.
 
 pub mod channel;
 pub mod profile;

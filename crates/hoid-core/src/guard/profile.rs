@@ -1,20 +1,20 @@
 //! Both signals over a second, against what they were before.
 //!
-//! Of each block of a second the mean magnitudes of e and u about their long-run means are kept,
-//! `m_c`, of their backward differences of order 1 to 4, `a_cj`, and of the innovations of the
-//! recursion, `a_eps`. Their long-run means M_c and A_cj follow with a time constant of 60 blocks; a
-//! block enters with no less than half and no more than twice the long-run value, so that no block
-//! moves them by more than 1/60. Blocks that are not as they should be do not enter.
+//! For each block of a second the mean magnitudes of e and u about their long-run means are kept, `m_c`, of their
+//! backward differences of order 1 to 4, `a_cj`, and of the innovations of the recursion, `a_eps`. Their long-run means
+//! M_c and A_cj follow with a time constant of 60 blocks; a block enters with no less than half and no more than twice
+//! the long-run value, so that no block moves them by more than 1/60. Blocks that are not as they should be do not
+//! enter.
 //!
 //! | what | rule | why |
 //! |---|---|---|
-//! | frozen e | `a_e1 <= A_e1/1000` in a block | the error of somebody who tracks never stands still |
-//! | frozen u | `a_u1 <= A_u1/1000` in three blocks in a row, but for a rest ([`super::resting`]) in which `a_eps` is at most twice its long-run value | a hand may rest |
+//! | frozen e | `a_e1 <= A_e1/1000` in a block | the error of a person who tracks never stays constant |
+//! | frozen u | `a_u1 <= A_u1/1000` in three blocks in a row, except for a rest ([`super::resting`]) in which `a_eps` is at most twice its long-run value | a hand may rest |
 //! | idle | e and u each within a range of `M_c/20` in two blocks in a row | silence, with noise |
 //! | larger | `a_c1 > 5 A_c1` and `a_c3 > 5 A_c3` for e and u in two blocks in a row | both signals are what they were, times a factor |
 //! | rescaled | all four `a_cj/A_cj` of one channel above 3.5 and within a factor of 1.5 of each other, those of the other below 2, in two blocks in a row | another unit, a gain that was turned |
 //! | swapped | the sum over blocks of `d(own) - d(other) - 1`, at most 4 a block and never below 0, reaches 6 | e is as u was and u as e was; d is the sum over both channels of `\|log a_1/A_1\| + \|log a_3/A_3\|` |
-//! | misfit | `R = a_eps/min_j a_uj` is above 4 times its long-run value, and above 1.5, and a_eps above twice its own, in two blocks in a row | what u has been for the last samples foretells it better than the model does, which knows e too, and did not before |
+//! | misfit | `R = a_eps/min_j a_uj` is above 4 times its long-run value, and above 1.5, and a_eps above twice its own, in two blocks in a row | what u has been for the last samples predicts it better than the model does, which knows e too, and did not before |
 //!
 //! The sum for swapped channels is a one-sided CUSUM (E. S. Page, *Biometrika* 41 (1954) 100-115) of
 //! a difference that is negative for channels as they were and at most the distance of the two
@@ -29,8 +29,7 @@ pub const CHANNELS: usize = 2;
 const LEARNT: u32 = 10;
 /// Weight of a block thereafter.
 const WEIGHT: f64 = 1.0 / 60.0;
-/// Limits of the rules.
-/// Share of the usual mean difference up to which a signal stands still.
+/// Limits of the rules. Share of the typical mean difference up to which a signal stays constant.
 pub const STILL: f64 = 1e-3;
 const FROZEN_U_BLOCKS: u32 = 3;
 const IDLE: f64 = 0.05;
@@ -42,15 +41,15 @@ const OTHER: f64 = 2.0;
 const LARGER_BLOCKS: u32 = 2;
 const SWAPPED_DRIFT: f64 = 1.0;
 const SWAPPED: f64 = 6.0;
-/// What one block says at most.
+/// Largest evidence of one block.
 const MOST_EVIDENCE: f64 = 4.0;
 const MISFIT: f64 = 4.0;
-/// R below which no model foretells too little.
+/// Ratio R below which a model predicts well enough.
 const LEAST_RATIO: f64 = 1.5;
-/// Growth of the innovations without which it is no misfit.
+/// Growth of the innovations without which it is not a misfit.
 const LEAST_GROWTH: f64 = 2.0;
 const MISFIT_BLOCKS: u32 = 2;
-/// Distance of a block that is as usual: four logarithms of four.
+/// Distance of a block that is as by default: four logarithms of four.
 const ALIKE: f64 = 4.0 * 1.386;
 /// And of one that is not.
 const UNLIKE: f64 = 4.0;
@@ -146,34 +145,34 @@ impl Block {
     }
 }
 
-/// What is wrong with a block.
+/// Problems with a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trouble {
-    /// e stands still.
+    /// e stays constant.
     FrozenInput,
-    /// u stands still.
+    /// u stays constant.
     FrozenOutput,
     /// e and u are nearly silent.
     Idle,
-    /// Both are larger by a factor.
+    /// Both are scaled by a factor.
     Larger,
-    /// e is larger by a factor.
+    /// e is scaled by a factor.
     RescaledInput,
-    /// u is larger by a factor.
+    /// u is scaled by a factor.
     RescaledOutput,
     /// e is as u was, and u as e was.
     Swapped,
-    /// The model foretells u worse than the past of u does.
+    /// The model predicts u worse than the past of u does.
     Misfit,
 }
 
 impl Trouble {
-    /// True for what may have become usual; nobody tracks in silence.
-    pub fn may_be_the_new_usual(self) -> bool {
+    /// True for what may have become typical; no one tracks in silence.
+    pub fn may_be_the_new_level(self) -> bool {
         !matches!(self, Self::FrozenInput | Self::FrozenOutput | Self::Idle)
     }
 
-    /// Blocks that it has lasted for at least when it is first told.
+    /// Blocks that it has lasted for at least when it is first reported.
     pub fn blocks(self) -> u32 {
         match self {
             Self::FrozenInput => 1,
@@ -189,7 +188,7 @@ impl Trouble {
 /// The long-run values, and how long something has been wrong.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Profile {
-    usual: Block,
+    typical: Block,
     /// Blocks that it was learnt from.
     blocks: u32,
     frozen_u: u32,
@@ -205,7 +204,7 @@ pub struct Profile {
     innovation: f64,
 }
 
-crate::state!([] Profile { usual, blocks, frozen_u, idle, larger, rescaled, swapped, misfits, ratio, ratios, innovation });
+crate::state!([] Profile { typical, blocks, frozen_u, idle, larger, rescaled, swapped, misfits, ratio, ratios, innovation });
 
 impl Default for Profile {
     fn default() -> Self {
@@ -217,7 +216,7 @@ impl Profile {
     /// Nothing is known.
     pub fn new() -> Self {
         Self {
-            usual: Block::default(),
+            typical: Block::default(),
             blocks: 0,
             frozen_u: 0,
             idle: 0,
@@ -232,15 +231,15 @@ impl Profile {
     }
 
     /// With long-run values that are known.
-    pub fn of(usual: &Block) -> Self {
+    pub fn of(typical: &Block) -> Self {
         Self {
-            usual: *usual,
+            typical: *typical,
             blocks: LEARNT,
             ..Self::new()
         }
     }
 
-    /// True where the last blocks gave no reason to suspect anything.
+    /// True if the last blocks gave no reason to suspect anything.
     pub fn is_calm(&self) -> bool {
         self.is_known()
             && self.frozen_u == 0
@@ -251,14 +250,13 @@ impl Profile {
             && self.misfits == 0
     }
 
-    /// True for the means of a block unlike those that are usual: by a factor of e in the mean of the
-    /// logarithms.
+    /// True for the means of a block unlike those that are typical: by a factor of e in the mean of the logarithms.
     pub fn is_unusual(&self, block: &Block) -> bool {
         self.is_known() && self.distance(block, [0, 1]) > UNLIKE
     }
 
-    /// True for the means of a block like those that are usual: within a factor of four in the mean
-    /// of the logarithms.
+    /// True for the means of a block like those that are typical: within a factor of four in the
+    /// mean of the logarithms.
     pub fn resembles(&self, block: &Block) -> bool {
         self.is_known() && self.distance(block, [0, 1]) < ALIKE
     }
@@ -269,18 +267,18 @@ impl Profile {
     }
 
     /// The long-run values.
-    pub fn usual(&self) -> &Block {
-        &self.usual
+    pub fn typical(&self) -> &Block {
+        &self.typical
     }
 
     /// Lets the means of a sound block enter the long-run values.
-    pub fn learn(&mut self, block: &Block) {
+    pub fn update(&mut self, block: &Block) {
         let known = self.is_known();
         self.blocks = self.blocks.saturating_add(1);
         let weight = if known { WEIGHT } else { 1.0 / f64::from(self.blocks) };
-        let toward = |usual: &mut f64, found: f64, least: f64, most: f64| {
+        let toward = |typical: &mut f64, found: f64, least: f64, most: f64| {
             let bounded = if known { within(found, [least, most]) } else { found };
-            *usual += weight * (bounded - *usual);
+            *typical += weight * (bounded - *typical);
         };
         // Signals whose squares underflow have no ratio.
         let sound = |ratio: &f64| ratio.is_finite() && block.innovation.is_finite();
@@ -303,18 +301,23 @@ impl Profile {
             self.innovation += weight * (bounded - self.innovation);
         }
         for c in 0..CHANNELS {
-            for (usual, found) in self.usual.differences[c].iter_mut().zip(block.differences[c]) {
-                let now = *usual;
-                toward(usual, found, 0.5 * now, 2.0 * now);
+            for (typical, found) in self.typical.differences[c].iter_mut().zip(block.differences[c]) {
+                let now = *typical;
+                toward(typical, found, 0.5 * now, 2.0 * now);
             }
-            let size = self.usual.magnitude[c];
-            toward(&mut self.usual.magnitude[c], block.magnitude[c], 0.5 * size, 2.0 * size);
-            let mean = self.usual.mean[c];
-            toward(&mut self.usual.mean[c], block.mean[c], mean - size, mean + size);
+            let size = self.typical.magnitude[c];
+            toward(
+                &mut self.typical.magnitude[c],
+                block.magnitude[c],
+                0.5 * size,
+                2.0 * size,
+            );
+            let mean = self.typical.mean[c];
+            toward(&mut self.typical.mean[c], block.mean[c], mean - size, mean + size);
         }
     }
 
-    /// Blocks that a trouble which was just told has lasted for at least.
+    /// Blocks that a trouble which was just reported has lasted for at least.
     pub fn lasting(&self, trouble: Trouble) -> u32 {
         match trouble {
             Trouble::FrozenOutput => self.frozen_u.max(trouble.blocks()),
@@ -322,23 +325,23 @@ impl Profile {
         }
     }
 
-    /// What is wrong with the means of a block, in the light of those before it; `rests` where u stands
-    /// still at its end as the person rests.
+    /// Problems with the means of a block, in the light of those before it; `rests` where u stays constant at its end
+    /// as the person rests.
     pub fn judge(&mut self, block: &Block, rests: bool) -> Option<Trouble> {
         if !self.is_known() {
             return None;
         }
         // A channel that never moved (there is no input, or it was never recorded) is not frozen.
-        let below = |found: f64, share: f64, usual: f64| usual > 0.0 && found <= share * usual;
-        let still = |c: usize| below(block.differences[c][0], STILL, self.usual.differences[c][0]);
-        let silent = |c: usize| below(block.range[c][1] - block.range[c][0], IDLE, self.usual.magnitude[c]);
+        let below = |found: f64, share: f64, typical: f64| typical > 0.0 && found <= share * typical;
+        let still = |c: usize| below(block.differences[c][0], STILL, self.typical.differences[c][0]);
+        let silent = |c: usize| below(block.range[c][1] - block.range[c][0], IDLE, self.typical.magnitude[c]);
         let count = |run: u32, is: bool| if is { run.saturating_add(1) } else { 0 };
         let frozen_e = still(0);
         self.frozen_u = count(self.frozen_u, still(1));
         self.idle = count(self.idle, silent(0) && silent(1));
         let grown = |c: usize, j: usize| {
-            let usual = self.usual.differences[c][j];
-            usual > 0.0 && block.differences[c][j] > LARGER * usual
+            let typical = self.typical.differences[c][j];
+            typical > 0.0 && block.differences[c][j] > LARGER * typical
         };
         self.larger = count(self.larger, [0, 2].iter().all(|j| grown(0, *j) && grown(1, *j)));
         let ratios = [0, 1].map(|c| self.ratios_of(block, c));
@@ -352,7 +355,7 @@ impl Profile {
         self.swapped = (self.swapped + evidence).clamp(0.0, 2.0 * SWAPPED);
         let limit = (MISFIT * self.ratio).max(LEAST_RATIO);
         let misfit = self.ratios >= LEARNT && block.ratio().is_some_and(|ratio| ratio > limit);
-        // Of somebody who rests the past foretells all, and the model need not be wrong.
+        // For a person who rests the past predicts all, and the model need not be wrong.
         let as_foretold = self.ratios < LEARNT || block.innovation <= LEAST_GROWTH * self.innovation;
         let misfit = misfit && !as_foretold;
         self.misfits = count(self.misfits, misfit);
@@ -377,11 +380,11 @@ impl Profile {
         }
     }
 
-    /// The least and the largest ratio of the differences of a channel to what is usual.
+    /// The least and the largest ratio of the differences of a channel to the default.
     fn ratios_of(&self, block: &Block, c: usize) -> [f64; 2] {
         let mut ends = [f64::INFINITY, 0.0];
-        for (found, usual) in block.differences[c].iter().zip(&self.usual.differences[c]) {
-            let ratio = if found == usual { 1.0 } else { found / usual };
+        for (found, typical) in block.differences[c].iter().zip(&self.typical.differences[c]) {
+            let ratio = if found == typical { 1.0 } else { found / typical };
             ends = [ends[0].min(ratio), ends[1].max(ratio)];
         }
         ends
@@ -390,14 +393,14 @@ impl Profile {
     /// Distance of a block from the long-run values, those of `of[c]` for channel c.
     fn distance(&self, block: &Block, of: [usize; CHANNELS]) -> f64 {
         let mut sum = 0.0;
-        for (c, usual) in of.into_iter().enumerate() {
+        for (c, typical) in of.into_iter().enumerate() {
             for j in [0, 2] {
-                let (found, usual) = (block.differences[c][j], self.usual.differences[usual][j]);
-                // Zero against zero is no difference.
-                let log = if found == usual {
+                let (found, typical) = (block.differences[c][j], self.typical.differences[typical][j]);
+                // Zero against zero is not a difference.
+                let log = if found == typical {
                     0.0
                 } else {
-                    libm::log(found / usual).abs()
+                    libm::log(found / typical).abs()
                 };
                 sum += if log < LARGEST_LOG { log } else { LARGEST_LOG };
             }
@@ -426,14 +429,14 @@ mod tests {
     fn known() -> Profile {
         let mut profile = Profile::new();
         for _ in 0..20 {
-            let usual = block([0.02, 0.1], [0.1, 1.1]);
-            assert_eq!(profile.judge(&usual, false), None);
-            profile.learn(&usual);
+            let typical = block([0.02, 0.1], [0.1, 1.1]);
+            assert_eq!(profile.judge(&typical, false), None);
+            profile.update(&typical);
         }
         profile
     }
 
-    /// Squares that underflow: infinite innovations are no long-run value, and nothing panics after them.
+    /// Squares that underflow: infinite innovations are not a long-run value, and nothing panics after them.
     #[test]
     fn numbers_without_a_size_are_not_learnt() {
         let mut profile = known();
@@ -442,14 +445,14 @@ mod tests {
                 innovation,
                 ..block([0.02, 0.1], [0.1, 1.1])
             };
-            profile.learn(&found);
+            profile.update(&found);
             assert!(profile.ratio.is_finite() && profile.innovation.is_finite());
         }
     }
 
     #[test]
     fn each_trouble_has_its_name_and_ends() {
-        let usual = block([0.02, 0.1], [0.1, 1.1]);
+        let typical = block([0.02, 0.1], [0.1, 1.1]);
         let cases = [
             (block([0.0, 0.1], [0.1, 1.1]), Trouble::FrozenInput, 1),
             (block([0.02, 0.0], [0.1, 1.1]), Trouble::FrozenOutput, 3),
@@ -461,7 +464,7 @@ mod tests {
             (
                 Block {
                     innovation: 1.0,
-                    ..usual
+                    ..typical
                 },
                 Trouble::Misfit,
                 2,
@@ -473,13 +476,13 @@ mod tests {
                 let found = profile.judge(&bad, false);
                 assert_eq!(found, (n >= after).then_some(trouble), "{n} {trouble:?}");
             }
-            let left = (0..30).find(|_| profile.judge(&usual, false).is_none());
+            let left = (0..30).find(|_| profile.judge(&typical, false).is_none());
             assert!(left.is_some_and(|n| n <= 12), "{trouble:?}: {left:?}");
         }
     }
 
-    /// The stick stands where it rests and e goes on; not so where the person does what nobody foretold, or e
-    /// stands too.
+    /// The stick is where it rests and e continues; not so where the person does an unpredicted sample, or e is
+    /// stationary too.
     #[test]
     fn a_rest_is_not_frozen_but_a_rest_that_does_not_fit_is() {
         let still = block([0.02, 0.0], [0.1, 1.1]);
@@ -496,7 +499,7 @@ mod tests {
         assert_eq!(after(true, &quiet(0.19, 0.02)), None);
         assert_eq!(after(true, &quiet(0.21, 0.02)), Some((3, Trouble::FrozenOutput)));
         assert_eq!(after(true, &quiet(0.0, 0.0)), Some((1, Trouble::FrozenInput)));
-        // One that was believed for long has lasted for as long.
+        // One that was trusted for long has lasted for as long.
         let mut profile = known();
         (0..9).for_each(|_| assert_eq!(profile.judge(&quiet(0.0, 0.02), true), None));
         let told = profile.judge(&quiet(0.0, 0.02), false);
@@ -506,10 +509,10 @@ mod tests {
     #[test]
     fn a_block_moves_the_long_run_values_by_a_sixtieth() {
         let mut profile = known();
-        let before = *profile.usual();
-        profile.learn(&block([20.0, 100.0], [0.1, 1.1]));
+        let before = *profile.typical();
+        profile.update(&block([20.0, 100.0], [0.1, 1.1]));
         for c in 0..CHANNELS {
-            let ratio = profile.usual().differences[c][0] / before.differences[c][0];
+            let ratio = profile.typical().differences[c][0] / before.differences[c][0];
             assert!((1.0..1.02).contains(&ratio), "{ratio}");
         }
     }
@@ -521,7 +524,7 @@ mod tests {
         for n in 0..200 {
             let found = block([size, size], [0.9, 0.9]);
             assert_eq!(profile.judge(&found, false), None, "{n}");
-            profile.learn(&found);
+            profile.update(&found);
             size *= if n % 7 < 4 { 1.5 } else { 0.6 };
         }
     }

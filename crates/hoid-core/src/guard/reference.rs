@@ -1,29 +1,26 @@
-//! A model that stays: how well does what a recursion began with foretell u today?
+//! A model that stays: how well does what a recursion started with predict u today?
 //!
-//! The general model `A u = (B/F) q^-nk e + (C/D) eps` with the coefficients of the start gives the
-//! innovations eps_0 beside those of the recursion, eps. Over a block of n samples the estimate is
-//! the worse of the two by
+//! The general model `A u = (B/F) q^-nk e + (C/D) eps` with the coefficients of the start gives the innovations eps_0
+//! next to those of the recursion, eps. Over a block of n samples the estimate is the worse of the two by
 //!
 //! `s = n log(mean |eps| / mean |eps_0|)`
 //!
-//! units of log likelihood: the ratio of the mean magnitudes is that of the standard deviations for
-//! every shape of the distribution, and a few outliers weigh little. The innovations of a sound
-//! recursion are larger than those of a fixed model by half of its effective number of parameters
-//! over its memory: .2 % for memories of 2 to 5 s and white innovations, several per cent for seconds
-//! where its noise model is too small for the remnant, and more for a person who is not steady. What a block says beyond [`DRIFT`] counts. The
-//! one-sided cumulative sum (E. S. Page, *Biometrika* 41 (1954) 100-115) tells of an estimate that
-//! has gone astray when it reaches [`ASTRAY`].
+//! units of log likelihood: the ratio of the mean magnitudes is that of the standard deviations for every shape of the
+//! distribution, and a few outliers weigh little. The innovations of a sound recursion are larger than those of a fixed
+//! model by half of its effective number of parameters over its memory: .2 % for memories of 2 to 5 s and white
+//! innovations, several per cent for seconds where its noise model is too small for the remnant, and more for a person
+//! who is not steady. What a block shows beyond [`DRIFT`] counts. The one-sided cumulative sum (E. S. Page,
+//! *Biometrika* 41 (1954) 100-115) reports an estimate that has gone diverged when it reaches [`ASTRAY`].
 //!
-//! A person who has changed is foretold better by an estimate that followed than by the start: the
-//! sum stays at zero.
+//! A person who has changed is predicted better by an estimate that followed than by the start: the sum stays at zero.
 
 /// Largest order of a polynomial.
 pub const ROOM: usize = 16;
 /// Share by which the innovations must be larger to count.
 pub const DRIFT: f64 = 0.2;
-/// Sum at which the estimate is astray.
+/// Sum at which the estimate is diverged.
 pub const ASTRAY: f64 = 40.0;
-/// What one block says at most.
+/// Largest evidence of one block.
 const MOST: f64 = 15.0;
 
 /// Orders of the model: na, nb, nc, nd, nf.
@@ -65,7 +62,7 @@ impl ReferenceModel {
         })
     }
 
-    /// At rest, with nothing said.
+    /// At rest, with nothing reported.
     pub fn reset(&mut self) {
         (self.past, self.sum, self.samples, self.score) = ([[0.0; ROOM]; 5], 0.0, 0, 0.0);
     }
@@ -79,7 +76,7 @@ impl ReferenceModel {
         let sum = |c: &[f64; ROOM], past: &[f64; ROOM], n: usize| -> f64 {
             c[..n].iter().zip(&past[..n]).map(|(c, x)| c * x).sum()
         };
-        // b begins with x(t) itself.
+        // b starts with x(t) itself.
         let mut w = -sum(f, ws, nf);
         if nb > 0 {
             w += b[0] * x;
@@ -104,12 +101,12 @@ impl ReferenceModel {
     }
 
     /// The end of a block in which the mean magnitude of the recursion's innovations was so large:
-    /// true when its estimate is astray.
+    /// true when its estimate is diverged.
     pub fn end_block(&mut self, innovation: f64) -> bool {
         let own = self.sum / f64::from(self.samples.max(1));
         let said = f64::from(self.samples) * (libm::log(innovation / own) - DRIFT);
         self.skip_block();
-        // A comparison with NaN is false: zero over zero says nothing.
+        // A comparison with NaN is false: zero over zero carries no information.
         if said.abs() <= f64::INFINITY {
             self.score = (self.score + said.clamp(-MOST, MOST)).max(0.0);
         }

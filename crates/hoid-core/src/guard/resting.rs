@@ -1,20 +1,20 @@
-//! A stick that rests, and a channel that is frozen: both stand still, and only one of them is a fault.
+//! A stick that rests, and a channel that is frozen: both stay constant, and only one of them is a fault.
 //!
-//! A stick with a dead zone rests at its centre, and one that is pushed to its end rests there. Such
-//! values are atoms of the distribution of u: u comes back to them often, and stays. The last
-//! [`ATOMS`] values at which u stood for `LEAST_S` or more are kept, each with the number of its
-//! rests n, their sum s and the longest of them, l. A stand of length T is a **rest**, and no fault, where
+//! A stick with a dead zone rests at its centre, and one that is pushed to its end rests there. Such values are atoms
+//! of the distribution of u: u comes back to them often, and stays. The last [`ATOMS`] values at which u represented
+//! `LEAST_S` or more are kept, each with the number of its rests n, their sum s and the longest of them, l. A stand of
+//! length T is a **rest**, and no fault, where
 //!
 //! `n >= 3`, `s >= .05 t`, `T < max(8 s, 2 l)`
 //!
-//! after t seconds. A frozen channel stands at whatever the value was, to which u never came back before or
-//! hardly ever, for a distribution without an atom there gives it probability zero; and one that froze within
-//! a rest stands longer than the person ever rested. For a longest of n equally distributed rests the next
-//! one is larger with probability 1/(n+1), whatever their distribution (order statistics; H. A. David and H. N.
-//! Nagaraja, *Order Statistics*, 2003, §2.1); twice as long it is, with exponential rests, with a
-//! probability of about `2/((n+1)(n+2))`. The least of 8 s is for the time in which only a few rests have been seen.
+//! after t seconds. A frozen channel is at whatever the value was, to which u never came back before or hardly ever,
+//! for a distribution without an atom there gives it probability zero; and one that froze within a rest is stationary
+//! longer than the person ever rested. For a longest of n equally distributed rests the next one is larger with
+//! probability 1/(n+1), whatever their distribution (order statistics; H. A. David and H. N. Nagaraja, *Order
+//! Statistics*, 2003, §2.1); twice as long it is, with exponential rests, with a probability of about `2/((n+1)(n+2))`.
+//! The least of 8 s is for the time in which only a few rests have been seen.
 //!
-//! A rest is judged by who calls: e has to move on meanwhile, and the innovations must be no larger than usual.
+//! A rest is judged by who calls: e has to move on meanwhile, and the innovations must be no larger than typical.
 
 /// Values that are kept.
 pub const ATOMS: usize = 4;
@@ -47,10 +47,10 @@ pub struct Resting {
     tolerance: f64,
     atoms: [Atom; ATOMS],
     samples: u64,
-    /// The value at which u stands, and for how long.
+    /// The value at which u is stationary, and for how long.
     value: f64,
     stands: u64,
-    /// True where the stand is not to be learnt.
+    /// True if the stand is not to be learnt.
     doubted: bool,
 }
 
@@ -75,7 +75,7 @@ impl Resting {
         self.tolerance = tolerance;
     }
 
-    /// Takes a sample of u; one that is no number ends a stand.
+    /// Takes a sample of u; one that is not a number ends a stand.
     #[inline]
     pub fn take(&mut self, u: f64) {
         self.samples += 1;
@@ -90,7 +90,7 @@ impl Resting {
         }
     }
 
-    /// The stand of now is no rest: it is not learnt.
+    /// The current stand is not a rest: it is not learnt.
     pub fn doubt(&mut self) {
         self.doubted = true;
     }
@@ -111,13 +111,13 @@ impl Resting {
         atom.longest = atom.longest.max(stands);
     }
 
-    /// Where the value of now is kept.
+    /// Where the current value is kept.
     fn place(&self) -> Option<usize> {
         let known = |atom: &Atom| atom.rests > 0 && (atom.value - self.value).abs() <= self.tolerance;
         self.atoms.iter().position(known)
     }
 
-    /// True while u stands as the person rests.
+    /// True while u is stationary as the person rests.
     pub fn is_rest(&self) -> bool {
         let Some(place) = self.place() else {
             return false;
@@ -151,7 +151,7 @@ mod tests {
         resting
     }
 
-    /// The time after which a stand at a value is no rest, s.
+    /// The time after which a are at a value is not a rest, s.
     fn told_after(mut resting: Resting, value: f64) -> f64 {
         let last = (1..10_000).take_while(|_| {
             resting.take(value);
@@ -170,7 +170,7 @@ mod tests {
         assert!(told_after(person(&[150]), 0.0) == 0.0);
     }
 
-    /// A signal that was seen to stand at many values for a moment, as one of a coarse converter does.
+    /// A signal that was seen to be at many values for a moment, as one of a coarse converter does.
     #[test]
     fn values_of_a_coarse_signal_are_no_atoms() {
         let mut resting = Resting::new(0.01);

@@ -47,7 +47,7 @@ fn column(jacobian: &[[f64; 5]; 5], j: usize) -> [f64; 5] {
     core::array::from_fn(|i| jacobian[i][j])
 }
 
-/// Of a numerator and of a denominator with its leading one.
+/// For a numerator and of a denominator with its leading one.
 fn scales(coefficients: &[f64; 5]) -> [f64; 5] {
     let (b, f) = (largest(&coefficients[..3]), largest(&coefficients[3..]).max(1.0));
     [b, b, b, f, f]

@@ -10,14 +10,14 @@ use super::{
     contrast::{Contrast, Resolved, conditions_of, contrasts},
     d_z,
     factor::Factor,
-    group_estimates::Known,
+    group_estimates::EstimatedValue,
     hedges_g,
     learning::Practice,
     meta_mean, meta_regression,
     sentence::sentence,
 };
 
-/// What is done about many tests.
+/// Treatment of many tests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Adjustment {
     /// Holm's, over all differences of the comparison.
@@ -32,7 +32,7 @@ named_choice!(Adjustment, "adjustment", 2, {
     None => "none",
 });
 
-/// What differs from run to run.
+/// A covariate that differs between runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Covariate {
     /// The number of the run.
@@ -48,13 +48,13 @@ named_choice!(Covariate, "covariate", 1, {
 pub struct Comparing {
     /// The factors; the conditions where there is none.
     pub factors: Vec<Factor>,
-    /// Where they vary; found from the group where it is not said.
+    /// Where they vary; found from the group where it is not specified.
     pub variation: Option<Variation>,
-    /// What is compared; [`Quantity::usual`], as far as it is there, where there is nothing.
+    /// Quantities compared; [`Quantity::defaults`], as far as it is there, where there is nothing.
     pub of: Vec<Quantity>,
-    /// What is taken out of the estimates.
+    /// Trend removed from the estimates.
     pub covariate: Option<Covariate>,
-    /// What is done about many tests.
+    /// Treatment of many tests.
     pub adjustment: Adjustment,
     /// How people are weighted.
     pub weights: Weights,
@@ -67,7 +67,8 @@ impl Comparing {
     /// Compares.
     ///
     /// # Errors
-    /// Those of factors without meaning, and [`CompareError::NotInJson`]. What cannot be estimated of somebody is part of the result.
+    /// The errors of factors without meaning, and [`CompareError::NotInJson`]. What cannot be estimated of a person is
+    /// part of the result.
     pub fn run(&self, group: &GroupEstimates) -> Result<Comparison, CompareError> {
         let asked = match self.factors.is_empty() {
             true => vec![Factor::conditions()],
@@ -77,12 +78,12 @@ impl Comparing {
         let factors: Vec<Resolved> = asked.iter().map(resolve).collect::<Result<_, _>>()?;
         let contrasts = contrasts(&factors, group)?;
         let quantities = match self.of.is_empty() {
-            true => Quantity::usual(),
+            true => Quantity::defaults(),
             false => self.of.clone(),
         };
         if !group.has_runs() {
             let from_runs = |q: &&Quantity| matches!(q.column(), None | Some("rms_e" | "rms_u"));
-            let what = self.covariate.map(|_| "what each run says".to_owned());
+            let what = self.covariate.map(|_| "what each run shows".to_owned());
             if let Some(what) = what.or(quantities.iter().find(from_runs).map(Quantity::words)) {
                 return Err(CompareError::NotInJson { what });
             }
@@ -134,7 +135,7 @@ impl Comparing {
         if result.differences.is_empty() {
             findings.push(Finding::undetermined(
                 "nothing-compared",
-                "there is no difference: too few people have what was asked for in all of its levels",
+                "there is no difference: too few people have the request in all of its levels",
             ));
         }
         findings.extend(missing(&result));
@@ -177,7 +178,7 @@ struct Work<'a> {
 }
 
 /// The estimate of a cell, or why there is none, and its change a run.
-type OfCell = (String, String, Result<(Known, Option<Coefficient>), String>);
+type OfCell = (String, String, Result<(EstimatedValue, Option<Coefficient>), String>);
 
 impl Work<'_> {
     fn compare(&mut self, quantity: &Quantity, contrasts: &[Contrast]) {
@@ -207,7 +208,7 @@ impl Work<'_> {
                     None => Ok((known, None)),
                     Some(practice) => {
                         let [at_middle, slope] = practice.of_cell(self.group, cell, quantity)?;
-                        let known = Known {
+                        let known = EstimatedValue {
                             value: at_middle.value,
                             standard_error: Some(at_middle.standard_error),
                             ..known
@@ -252,7 +253,7 @@ impl Work<'_> {
         }
         let most = forms.iter().max_by_key(|(_, names)| names.len()).map_or("", |f| f.0);
         let why = format!(
-            "a parameter means the same in one form alone ({all}); say form = \"{most}\" under [analysis] in group.toml and run the group again"
+            "a parameter means the same in one form alone ({all}); write form = \"{most}\" under [analysis] in group.toml and run the group again"
         );
         match self.apart.iter_mut().find(|(known, _)| *known == why) {
             Some((_, names)) => names.push(quantity.to_string()),
@@ -304,7 +305,7 @@ impl Work<'_> {
             ));
         }
         let own = self.result.estimates.iter().filter(|e| e.quantity == *quantity);
-        let mut places: Vec<(String, String, Vec<Known>)> = Vec::new();
+        let mut places: Vec<(String, String, Vec<EstimatedValue>)> = Vec::new();
         for e in own {
             let known = known_of(e);
             match places.iter_mut().find(|(c, g, _)| (c, g) == (&e.condition, &e.group)) {
@@ -328,11 +329,11 @@ impl Work<'_> {
     }
 
     fn learning(&mut self, quantity: &Quantity, cells: &[OfCell]) {
-        let slopes = |condition: Option<&String>| -> Vec<Known> {
+        let slopes = |condition: Option<&String>| -> Vec<EstimatedValue> {
             let of = cells
                 .iter()
                 .filter(|(_, c, _)| condition.is_none_or(|condition| condition == c));
-            let slope = |c: &Coefficient| Known {
+            let slope = |c: &Coefficient| EstimatedValue {
                 value: c.value,
                 standard_error: Some(c.standard_error),
                 determined: true,
@@ -358,7 +359,7 @@ impl Work<'_> {
     /// One difference, of the people who have all that it takes.
     fn difference(&mut self, quantity: &Quantity, contrast: &Contrast, cells: &[OfCell]) {
         let mut people: Vec<(String, usize)> = Vec::new();
-        let mut of: Vec<Known> = Vec::new();
+        let mut of: Vec<EstimatedValue> = Vec::new();
         for (subject, weights, group) in &contrast.people {
             let mut sum = known(0.0, Some(0.0));
             let mut whole = true;
@@ -419,7 +420,7 @@ impl Work<'_> {
             self.findings.push(Finding::doubt(
                 "few-people",
                 format!(
-                    "{name}: {} people leave one degree of freedom, and an interval of so few says little",
+                    "{name}: {} people leave one degree of freedom, and an interval of so few carries little information",
                     people.len()
                 ),
             ));
@@ -472,20 +473,20 @@ fn fitted(
     }
 }
 
-/// With the squares of the errors; where somebody has none each counts the same.
-fn observations(all: &[Known]) -> Vec<Observation> {
+/// With the squares of the errors; where someone has none each counts the same.
+fn observations(all: &[EstimatedValue]) -> Vec<Observation> {
     let known = all
         .iter()
         .all(|k| k.standard_error.is_some_and(|e| e > 0.0 && e.is_finite()));
-    let one = |k: &Known| Observation {
+    let one = |k: &EstimatedValue| Observation {
         value: k.value,
         variance: k.standard_error.filter(|_| known).map_or(0.0, |e| e * e),
     };
     all.iter().map(one).collect()
 }
 
-fn known(value: f64, standard_error: Option<f64>) -> Known {
-    Known {
+fn known(value: f64, standard_error: Option<f64>) -> EstimatedValue {
+    EstimatedValue {
         value,
         standard_error,
         determined: true,
@@ -494,11 +495,11 @@ fn known(value: f64, standard_error: Option<f64>) -> Known {
     }
 }
 
-fn known_of(e: &PersonEstimate) -> Known {
+fn known_of(e: &PersonEstimate) -> EstimatedValue {
     known(e.value, e.standard_error)
 }
 
-/// Who is missing, by their reason.
+/// Missing people, by their reason.
 fn missing(result: &Comparison) -> Vec<Finding> {
     let mut all: Vec<(String, Vec<String>)> = Vec::new();
     for out in &result.left_out {

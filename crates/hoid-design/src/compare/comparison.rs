@@ -16,13 +16,13 @@ pub struct PersonEstimate {
     pub subject: String,
     /// In which condition.
     pub condition: String,
-    /// The group of people that they are in; empty where none are compared.
+    /// The group of people that they are in; empty if none are compared.
     pub group: String,
     /// The value; with a covariate that at its middle.
     pub value: f64,
     /// Its standard error.
     pub standard_error: Option<f64>,
-    /// Runs behind it.
+    /// Runs after it.
     pub runs: usize,
 }
 
@@ -33,7 +33,7 @@ pub struct Mean {
     pub quantity: Quantity,
     /// In which condition.
     pub condition: String,
-    /// Of which group of people; empty where none are compared.
+    /// Of which group of people; empty if none are compared.
     pub group: String,
     /// How many people.
     pub people: usize,
@@ -57,7 +57,7 @@ pub struct Difference {
     pub from: String,
     /// The level from which it is.
     pub to: String,
-    /// Of an interaction the factor whose effect differs, and its levels.
+    /// For an interaction the factor whose effect differs, and its levels.
     pub effect: Option<[String; 3]>,
     /// The people, and of a difference between them the group of each.
     pub people: Vec<(String, usize)>,
@@ -66,7 +66,7 @@ pub struct Difference {
     pub estimate: Coefficient,
     /// Degrees of freedom of t.
     pub degrees_of_freedom: usize,
-    /// p beside all other differences of this comparison.
+    /// p next to all other differences of this comparison.
     pub p_adjusted: f64,
     /// Its size.
     pub effect_size: Option<EffectSize>,
@@ -96,16 +96,16 @@ pub struct Learning {
     pub estimate: Coefficient,
 }
 
-/// An estimate that is not there, and why.
+/// An estimate that does not exist, and why.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LeftOut {
-    /// What was compared without it.
+    /// The quantity that was compared without it.
     pub quantity: Quantity,
     /// Who.
     pub subject: String,
     /// In which condition.
     pub condition: String,
-    /// Why it is not there.
+    /// Why it is missing.
     pub reason: String,
 }
 
@@ -120,17 +120,17 @@ pub struct Comparison {
     pub means: Vec<Mean>,
     /// The differences.
     pub differences: Vec<Difference>,
-    /// Changes from run to run, where they were asked for.
+    /// Changes from run to run, where they were requested.
     pub learning: Vec<Learning>,
-    /// Who is missing.
+    /// Missing people.
     pub left_out: Vec<LeftOut>,
     /// The settings.
     pub settings: Vec<Setting>,
-    /// What it is worth.
+    /// The verdict on it.
     pub verdict: Verdict,
 }
 
-/// What [`Comparison::json`] calls itself.
+/// Kind in the JSON of [`Comparison::json`].
 const KIND: &str = "comparison";
 
 impl Comparison {
@@ -178,13 +178,14 @@ impl Comparison {
         format!("{:#}", Value::Object(self.json()))
     }
 
-    /// Reads what [`Self::to_json`] wrote.
+    /// Reads the output of [`Self::to_json`].
     ///
     /// # Errors
-    /// [`AnalysisError::NotAResult`] for a text that is none, is damaged, or is of another version.
+    /// [`AnalysisError::NotAResult`] for a text that is invalid, is damaged, or is of another
+    /// version.
     pub fn from_json(text: &str) -> Result<Self, AnalysisError> {
         let none = |found: String| AnalysisError::NotAResult { found };
-        let object: Value = serde_json::from_str(text).map_err(|error| none(format!("it is no JSON: {error}")))?;
+        let object: Value = serde_json::from_str(text).map_err(|error| none(format!("it is not JSON: {error}")))?;
         if object["kind"] != KIND {
             return Err(none(format!("its kind is {}, expected {KIND:?}", object["kind"])));
         }

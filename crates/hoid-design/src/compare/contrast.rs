@@ -1,11 +1,13 @@
-//! What is compared of each person: a sum of their conditions with weights.
+//! Quantity compared for each person: a sum of their conditions with weights.
 //!
 //! - A factor **within** people: the mean over the conditions of the one level less that over those of the other, so
-//!   that a second factor is averaged out. One contrast a person, and its mean over people: no assumption on how the conditions of
-//!   a person scatter together (sphericity) is left, and a mixed model of the balanced experiment says the same.
+//!   that a second factor is averaged out. One contrast a person, and its mean over people: no assumption on how the
+//!   conditions of a person scatter together (sphericity) is left, and a mixed model of the balanced experiment states
+//!   the same.
 //! - A factor **between** people: the mean over the conditions that they have, and the difference of two groups of people.
-//! - **Two factors within**: beside each of them their interaction, by how much the effect of the first differs between the
-//!   levels of the second. **One within, one between**: the effect of the first, compared between the groups.
+//! - **Two factors within**: next to each of them their interaction, by how much the effect of the first differs
+//!   between the levels of the second. **One within, one between**: the effect of the first, compared between the
+//!   groups.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +16,7 @@ use super::{
     factor::{CONDITION, Factor, Variation},
 };
 
-/// A level with what belongs to it.
+/// A level with its data.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Members {
     pub name: String,
@@ -38,7 +40,7 @@ pub(super) struct Contrast {
     pub variation: Variation,
     pub from: String,
     pub to: String,
-    /// Of an interaction the effect that differs, and its levels.
+    /// For an interaction the effect that differs, and its levels.
     pub effect: Option<[String; 3]>,
     /// People with the weights of their conditions, of group 0 or 1.
     pub people: Vec<(String, BTreeMap<String, f64>, usize)>,
@@ -82,7 +84,7 @@ impl Resolved {
         let pool = if of_people { &subjects } else { &conditions };
         if let Some(other) = all.iter().find(|member| !pool.contains(member)) {
             return Err(bad(format!(
-                "{other} is no condition and nobody in this group: the conditions are {}, the people {}",
+                "{other} is neither a condition nor a person of this group: the conditions are {}, the people {}",
                 conditions.join(", "),
                 subjects.join(", ")
             )));
@@ -106,7 +108,7 @@ impl Resolved {
             }
             (Some(Variation::Within), None) => {
                 return Err(bad(
-                    "nobody is in two of its levels: it varies between people".to_owned()
+                    "no person is in two of its levels: it varies between people".to_owned()
                 ));
             }
             (_, Some(_)) => Variation::Within,
@@ -318,7 +320,7 @@ mod tests {
             .iter()
             .map(|c| (c.from.as_str(), c.to.as_str(), c.people.len()))
             .collect();
-        // Q lacks c: that is found when its estimates are looked for, and named.
+        // Q lacks c: that is found when its estimates are searched for, and named.
         assert_eq!(pairs, [("a", "b", 2), ("a", "c", 2), ("b", "c", 2)]);
         let all = of(&three[..4], &["who:one=P;two=Q"]).unwrap();
         assert_eq!((all.len(), all[0].variation), (1, Variation::Between));
@@ -339,7 +341,7 @@ mod tests {
         let people = [("P", "a"), ("P", "b"), ("Q", "a"), ("Q", "b")];
         for (factors, word) in [
             (&["display"][..], "levels are not known"),
-            (&["x:a;z"], "z is no condition"),
+            (&["x:a;z"], "z is not a condition"),
             (&["who:one=P;two=Q", "else:1=P;2=Q"], "one of them at a time"),
         ] {
             let error = of(&people, factors).unwrap_err().to_string();

@@ -15,21 +15,21 @@ pub enum CompareError {
         /// The least number of them.
         expected: usize,
     },
-    /// A value or an error that is no number.
+    /// A value or an error that is not a number.
     #[error("an estimate or its standard error is not finite, or negative: leave that person out")]
     NotFinite,
-    /// Columns that cannot be told apart.
-    #[error("the covariates cannot be told apart (one is constant, or a sum of others): leave one out")]
+    /// Columns that cannot be distinguished.
+    #[error("the covariates cannot be distinguished (one is constant, or a sum of others): leave one out")]
     Collinear,
     /// Nothing to judge a mean by.
     #[error("all estimates are equal: there is no scatter to judge a difference by; is a run given twice?")]
     NoScatter,
-    /// A quantity that is none.
+    /// A quantity that is invalid.
     #[error(
         "there is no quantity {found:?} to compare; expected crossover, phase_margin, tau_e, gain_db@W or phase_deg@W with W in rad/s, rms_e, rms_u, or a parameter of the operator such as K, T_L, omega_nm"
     )]
     Quantity {
-        /// What was asked for.
+        /// The request.
         found: String,
     },
     /// A factor without meaning.
@@ -37,9 +37,9 @@ pub enum CompareError {
         "factor {name:?}: {reason}; expected NAME, or NAME:LEVEL=A,B;LEVEL=C with conditions or people of the group"
     )]
     Factor {
-        /// What was asked for.
+        /// The request.
         name: String,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// A place that holds no group.
@@ -49,13 +49,13 @@ pub enum CompareError {
     NoGroup {
         /// The place.
         place: String,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
-    /// What the JSON of a group does not hold.
+    /// Contents of the JSON of a group does not.
     #[error("{what} is not in the JSON of a group: name the directory that `hoid group DIR --out` wrote")]
     NotInJson {
-        /// What was asked for.
+        /// The request.
         what: String,
     },
     /// Tables that cannot be read.

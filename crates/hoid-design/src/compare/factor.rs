@@ -32,18 +32,18 @@ named_choice!(Variation, "variation", 2, {
 /// A level of a factor.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Level {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// Its conditions or people.
     pub members: Vec<String>,
 }
 
-/// A factor as it is asked for.
+/// A factor as it is requested.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Factor {
-    /// What it is called.
+    /// Its name.
     pub name: String,
-    /// Its levels; none where they are those of the manifest, or the conditions.
+    /// Its levels; none if they are those of the manifest, or the conditions.
     pub levels: Vec<Level>,
 }
 

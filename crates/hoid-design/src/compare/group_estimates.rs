@@ -1,4 +1,4 @@
-//! What a group says of each person in each condition: from the directory of its results, or from the JSON that
+//! Report of a group on each person in each condition: from the directory of its results, or from the JSON that
 //! `hoid group` printed.
 //!
 //! A person in a condition is a cell. Crossover, margin and parameters are those of all runs together with
@@ -18,9 +18,9 @@ use serde_json::Value;
 
 use super::{CompareError, Observation, Quantity};
 
-/// What is known of a number.
+/// Known properties of a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Known {
+pub(super) struct EstimatedValue {
     pub value: f64,
     pub standard_error: Option<f64>,
     pub determined: bool,
@@ -38,7 +38,7 @@ pub(super) struct Cell {
     pub missing: Option<String>,
     pub doubtful: bool,
     runs: usize,
-    known: BTreeMap<String, Known>,
+    known: BTreeMap<String, EstimatedValue>,
 }
 
 /// The estimates of a group.
@@ -53,7 +53,7 @@ impl GroupEstimates {
     /// Reads a directory with the results of a group, or the JSON of one.
     ///
     /// # Errors
-    /// [`CompareError::NoGroup`] with what was found; those of tables that cannot be read.
+    /// [`CompareError::NoGroup`] with the findings; those of tables that cannot be read.
     pub fn read(place: &Path) -> Result<Self, CompareError> {
         let none = |reason: String| CompareError::NoGroup {
             place: place.display().to_string(),
@@ -61,7 +61,7 @@ impl GroupEstimates {
         };
         if !place.is_dir() {
             let bytes = hoid_io::read_bytes(place).map_err(StudyError::Io)?;
-            let object = serde_json::from_slice(&bytes).map_err(|error| none(format!("it is no JSON: {error}")))?;
+            let object = serde_json::from_slice(&bytes).map_err(|error| none(format!("it is not JSON: {error}")))?;
             return Self::of_json(&object).map_err(none);
         }
         let path = place.join(MANIFEST);
@@ -112,7 +112,7 @@ impl GroupEstimates {
     }
 
     /// A quantity of a cell, or why it has none.
-    pub(super) fn estimate(&self, cell: &Cell, quantity: &Quantity) -> Result<Known, String> {
+    pub(super) fn estimate(&self, cell: &Cell, quantity: &Quantity) -> Result<EstimatedValue, String> {
         let of_runs = || {
             let all: Vec<f64> = self.of_runs(cell, quantity).into_iter().map(|(_, o)| o.value).collect();
             if all.is_empty() {
@@ -130,7 +130,7 @@ impl GroupEstimates {
             let response = self.response(cell, None, quantity);
             let value = response.ok_or_else(|| format!("its operator has no {}", quantity.words()))?;
             let scatter = of_runs().ok().filter(|runs| runs.runs > 1);
-            return Ok(Known {
+            return Ok(EstimatedValue {
                 value,
                 standard_error: scatter.and_then(|runs| runs.standard_error),
                 ..over_runs(&vec![value; cell.runs.max(1)])
@@ -153,7 +153,7 @@ impl GroupEstimates {
         }
     }
 
-    /// A quantity in each run of a cell, with the names of the runs; empty where the runs are not known.
+    /// A quantity in each run of a cell, with the names of the runs; empty if the runs are not known.
     pub(super) fn of_runs(&self, cell: &Cell, quantity: &Quantity) -> Vec<(&str, Observation)> {
         let Some(runs) = &self.runs else { return Vec::new() };
         let one = |run: &str| match quantity.column() {
@@ -222,7 +222,7 @@ impl Cell {
         cell.form.clone_from(&person.form);
         let runs = if person.is_of_all_runs() { person.runs } else { 1 };
         for p in &person.parameters {
-            let known = Known {
+            let known = EstimatedValue {
                 value: p.value,
                 standard_error: p.standard_error_person.or(p.standard_error),
                 determined: p.determined,
@@ -264,7 +264,7 @@ impl Cell {
         let runs = if text("run") == "all" { runs } else { 1 };
         let parts = [&person["parameters"], &person["open_loop"]];
         for (name, found) in parts.into_iter().filter_map(Value::as_object).flatten() {
-            let one = Known {
+            let one = EstimatedValue {
                 determined: found["determined"] != false,
                 prior_share: found["prior_share"].as_f64().unwrap_or(0.0),
                 ..known(
@@ -279,8 +279,8 @@ impl Cell {
     }
 }
 
-fn known(value: f64, standard_error: Option<f64>, runs: usize) -> Known {
-    Known {
+fn known(value: f64, standard_error: Option<f64>, runs: usize) -> EstimatedValue {
+    EstimatedValue {
         value,
         standard_error,
         determined: true,
@@ -290,7 +290,7 @@ fn known(value: f64, standard_error: Option<f64>, runs: usize) -> Known {
 }
 
 /// The mean over runs, with the error of their scatter.
-fn over_runs(values: &[f64]) -> Known {
+fn over_runs(values: &[f64]) -> EstimatedValue {
     let error = (sample_variance(values) / values.len() as f64).sqrt();
     known(mean(values), Some(error).filter(|e| e.is_finite()), values.len())
 }
@@ -309,9 +309,9 @@ fn merged(cells: Vec<Cell>) -> Vec<Cell> {
         if of.len() > 1 {
             let names: Vec<String> = of[0].known.keys().cloned().collect();
             let means = names.into_iter().map(|name| {
-                let each: Vec<Known> = of.iter().filter_map(|cell| cell.known.get(&name).copied()).collect();
+                let each: Vec<EstimatedValue> = of.iter().filter_map(|cell| cell.known.get(&name).copied()).collect();
                 let values: Vec<f64> = each.iter().map(|k| k.value).collect();
-                let merged = Known {
+                let merged = EstimatedValue {
                     determined: each.iter().all(|k| k.determined),
                     prior_share: each.iter().map(|k| k.prior_share).fold(0.0, f64::max),
                     ..over_runs(&values)

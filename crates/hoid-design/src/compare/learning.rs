@@ -1,8 +1,9 @@
 //! Learning: a quantity over the runs of a person in a condition.
 //!
-//! `y_r = a + b (r - r0) + u_r + e_r`, r the number of a run, r0 the middle of all runs of the group: a regression of the runs
-//! with their errors, and a variance between runs beside them ([`meta_regression`]). a is what is compared, so that conditions are compared
-//! at the same practice; b is the change a run, of which the mean over people is told.
+//! `y_r = a + b (r - r0) + u_r + e_r`, r the number of a run, r0 the middle of all runs of the group: a regression of
+//! the runs with their errors, and a variance between runs next to them ([`meta_regression`]). a is what is compared,
+//! so that conditions are compared at the same practice; b is the change a run, of which the mean over people is
+//! reported.
 
 use hoid_numerics::statistics::mean;
 

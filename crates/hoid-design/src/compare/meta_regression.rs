@@ -6,7 +6,7 @@
 //!
 //! - **tau^2** maximises the restricted likelihood (D. A. Harville, *J. Am. Stat. Assoc.* 72 (1977) 320-338)
 //!   `l = -1/2 sum log(v_i + tau^2) - 1/2 log |X'W X| - 1/2 y'P y`, whose slope is `1/2 (y'P P y - tr P)`: the best
-//!   place of a grid, then the zero of the slope beside it. l may have two maxima where errors differ much.
+//!   place of a grid, then the zero of the slope next to it. l may have two maxima where errors differ much.
 //! - **The weights** are those of the tau^2 that maximises `l + log tau^2`, which is never zero (the idea of Y. Chung,
 //!   S. Rabe-Hesketh and I.-H. Choi, *Stat. Med.* 32 (2013) 4071-4089, who add `log tau`): with few people l is at its greatest at zero
 //!   by chance, and the one with the smallest error decides alone. Three people whose errors are .1, .3 and .5 and who
@@ -14,14 +14,15 @@
 //!   (`tests/coverage.rs`, where other numbers of people and other tau are). With one or two degrees of freedom all weights are
 //!   equal: two and three people are a t test.
 //! - **beta** is `(X'W X)^-1 X'W y`, its covariance `s^2 (X'W X)^-1` with `s^2 = y'P y/(n - p)`, and its interval
-//!   Student's with n - p degrees of freedom (J. Hartung and G. Knapp, *Stat. Med.* 20 (2001) 3875-3889; of
-//!   regression G. Knapp and J. Hartung, *Stat. Med.* 22 (2003) 2693-2710). With equal errors and X of ones alone this is the
-//!   t test of one sample, whatever tau^2 is; s^2 is not held at one or above, which would make few people say less than they do.
+//!   Student's with n - p degrees of freedom (J. Hartung and G. Knapp, *Stat. Med.* 20 (2001) 3875-3889; of regression
+//!   G. Knapp and J. Hartung, *Stat. Med.* 22 (2003) 2693-2710). With equal errors and X of ones alone this is the t
+//!   test of one sample, whatever tau^2 is; s^2 is not held at one or above, which would make few people show less than
+//!   they do.
 //! - **Q** is `y'P y` at tau^2 = 0, chi-squared with n - p degrees of freedom where all people are the same, and
 //!   `I^2 = tau^2/(tau^2 + v)` with the typical `v = (n - p)/tr P` at zero (J. P. T. Higgins and S. G. Thompson,
 //!   *Stat. Med.* 21 (2002) 1539-1558).
 //!
-//! Where no error is known all `v_i` are zero: tau^2 is the sample variance, and Q is not there.
+//! Where no error is known all `v_i` are zero: tau^2 is the sample variance, and Q is missing.
 
 use hoid_model::named_choice;
 use nalgebra::{DMatrix, DVector};
@@ -35,17 +36,17 @@ use super::CompareError;
 pub struct Observation {
     /// The value.
     pub value: f64,
-    /// Square of its standard error; zero where it is not known.
+    /// Square of its standard error; zero if it is not known.
     pub variance: f64,
 }
 
-/// Whose tau^2 the weights of people have.
+/// The people whose tau^2 enters the weights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Weights {
     /// Kept away from zero.
     #[default]
     Penalised,
-    /// That of the restricted likelihood.
+    /// The value for the restricted likelihood.
     Restricted,
 }
 
@@ -69,14 +70,14 @@ pub struct Coefficient {
     pub interval: (f64, f64),
 }
 
-/// What is found.
+/// The findings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MetaRegression {
     /// By the columns of X.
     pub coefficients: Vec<Coefficient>,
     /// Variance between people, by the restricted likelihood.
     pub tau_squared: f64,
-    /// That of the weights.
+    /// The value for the weights.
     pub tau_squared_of_weights: f64,
     /// Degrees of freedom n - p.
     pub degrees_of_freedom: usize,
@@ -220,7 +221,7 @@ struct At {
     q: f64,
     /// tr P.
     trace: f64,
-    /// The restricted log-likelihood but for constants.
+    /// The restricted log-likelihood except for constants.
     likelihood: f64,
     /// Its slope by tau^2.
     slope: f64,
@@ -259,7 +260,7 @@ impl Model {
         })
     }
 
-    /// Variance of y about its regression, all weights equal; none where X is singular.
+    /// Variance of y about its regression, all weights equal; none if X is singular.
     fn scatter(&self) -> Option<f64> {
         let (n, p) = self.x.shape();
         let information = self.x.transpose() * &self.x;
@@ -288,7 +289,7 @@ impl Model {
         let heights: Vec<f64> = grid.iter().map(|tau| height(*tau)).collect::<Option<_>>()?;
         let best = (0..grid.len()).max_by(|a, b| heights[*a].total_cmp(&heights[*b]))?;
         let rises = slope(grid[best])? > 0.0;
-        // At the edges nothing is beside it.
+        // At the edges nothing is next to it.
         if (best == 0 && !rises) || (best + 1 == grid.len() && rises) {
             return Some(grid[best]);
         }

@@ -4,12 +4,12 @@
 //! their conditions (`contrast`), and the mean of those over people, or the difference of groups of people, is a
 //! random-effects meta-analysis: people who are known well count more, as far as people are alike.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`meta_regression`](fn@meta_regression) | estimates of people with their errors: restricted likelihood, interval by Hartung and Knapp |
 //! | [`EffectSize`] | d_z, Hedges g, with intervals |
 //! | [`holm`] | probabilities of several tests |
-//! | [`GroupEstimates`] | what a group says of each person, from its directory or its JSON |
+//! | [`GroupEstimates`] | what a group reports about each person, from its directory or its JSON |
 //! | [`Quantity`] | what is compared |
 //! | [`Factor`] | what conditions, or people, differ in; `contrast`: the weights of conditions |
 //! | [`Comparing`] | from a group to a comparison; `learning`: runs as a covariate |

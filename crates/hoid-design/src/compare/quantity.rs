@@ -1,4 +1,4 @@
-//! What is compared: quantities that mean the same for every person, and parameters of one form.
+//! Quantities compared: quantities that mean the same for every person, and parameters of one form.
 
 use std::{fmt, str::FromStr};
 
@@ -31,12 +31,12 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// What is compared where nothing is asked for.
-    pub fn usual() -> Vec<Self> {
+    /// Default quantities of a comparison.
+    pub fn defaults() -> Vec<Self> {
         vec![Self::Crossover, Self::PhaseMargin, Self::Parameter(DELAY.to_owned())]
     }
 
-    /// Its unit; empty where there is none, or it is that of the recording.
+    /// Its unit; empty if there is none, or it is that of the recording.
     pub fn unit(&self) -> &str {
         match self {
             Self::Crossover => "rad/s",

@@ -8,7 +8,7 @@ use super::{Difference, Variation};
 pub(super) const LEVEL: f64 = 0.05;
 
 /// `crossover fell by 0.63 rad/s from fo to so (95 % 0.14 to 1.12, t(2) = -5.5, p = 0.032, d_z = -3.2, n = 3)`; where p
-/// beside the other tests is not below .05 that no difference was found. An interaction says whose effect differs.
+/// next to the other tests is not below .05 that no difference was found. An interaction reports whose effect differs.
 pub(super) fn sentence(difference: &Difference, adjusted: bool) -> String {
     let Difference {
         quantity,

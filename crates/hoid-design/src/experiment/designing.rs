@@ -1,9 +1,10 @@
-//! The forcing function that tells most of a person.
+//! The forcing function that is most informative about a person.
 //!
-//! With a remnant that has its share of the variance of u, the errors depend on how the power of u is spread over the lines, not on its size
-//! (`information`): of the shares q of the lines in the response of u to the forcing function the information is
-//! `I = sum q_k M_k`. What is wanted, parameters or crossover or margin with gradients g and accepted errors s, is the least
-//! `J = sum over wanted g' I^-1 g/s^2`, the sum of the squares of the errors by those that are accepted.
+//! With a remnant that has its share of the variance of u, the errors depend on how the power of u is spread over the
+//! lines, not on its size (`information`): of the shares q of the lines in the response of u to the forcing function
+//! the information is `I = sum q_k M_k`. The quantities requested, parameters or crossover or margin with gradients g
+//! and accepted errors s, is the least `J = sum over wanted g' I^-1 g/s^2`, the sum of the squares of the errors by
+//! those that are accepted.
 //!
 //! - **Amplitudes.** J is convex in q. From equal shares on, `q_k <- q_k sqrt(d_k/sum q d)`, `d_k = sum g' I^-1 M_k I^-1 g/s^2`, which lets J fall in
 //!   every step (D. M. Titterington, *Applied Statistics* 27 (1978) 227-234; Y. Yu, *Ann. Stat.* 38 (2010) 1593-1606). Each line keeps a part of
@@ -27,7 +28,7 @@ use super::{
     lines::{crest_factor, multiples, set_phases},
 };
 
-/// What is wanted of a person.
+/// Quantities requested of a person.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Wanted {
     /// `crossover`, `phase_margin`, or a parameter.
@@ -39,7 +40,7 @@ pub struct Wanted {
 /// How a forcing function is designed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Designing {
-    /// What is wanted; all parameters, each by its value, where there is nothing.
+    /// The quantities requested; all parameters, each by its value, where there is nothing.
     pub wanted: Vec<Wanted>,
     /// Its period, s: one run, or a whole part of one.
     pub period_s: f64,
@@ -89,7 +90,7 @@ const STEPS_OF_TRIAL: usize = 60;
 /// By how many multiples a line is moved, and rounds of it.
 const MOVES: [i64; 6] = [-4, -2, -1, 1, 2, 4];
 const ROUNDS: usize = 3;
-/// What a move must be worth.
+/// Least improvement for a move.
 const WORTH: f64 = 1e-3;
 
 impl Designing {
@@ -255,7 +256,7 @@ impl Search<'_> {
         Ok((shares, last))
     }
 
-    /// Takes from lines what is more than they may have, and makes the sum one.
+    /// Limits lines to their largest amplitude, and spreads the rest, and makes the sum one.
     fn limit(&self, places: &[u32], shares: &mut [f64]) {
         let lines: Vec<(f64, bool)> = places
             .iter()

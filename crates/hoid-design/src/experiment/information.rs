@@ -1,4 +1,4 @@
-//! What an experiment will say of a person: standard errors before it is done.
+//! Report of an experiment will on a person: standard errors before it is done.
 //!
 //! A person H(s; theta) answers the error of a loop with the controlled element P, `u = H e + n`, and a line of the forcing function of
 //! amplitude A at omega makes one of e of amplitude `a = A |S|` (a target), or `A |P S|` (a disturbance at the input of P), with `S = 1/(1 + H P)`.
@@ -13,8 +13,8 @@
 //! information is lost to it (U. Forssell and L. Ljung, *Automatica* 35 (1999) 1215-1241, section 5). Errors of functions of theta, such as
 //! crossover and margin, are those of the first order.
 //!
-//! It takes lines that stand out of the remnant in e: a line that does not is one at which H is drawn to -1/P, and predicted to be known
-//! better than it is.
+//! It uses lines that exceed the remnant in e: at a line that does not, H is drawn to -1/P, and
+//! predicted to be known better than it is.
 //!
 //! **The remnant** is a lag of order m, `S_n = K^2/(1 + (T_n omega)^2)^m`, whose share p of the variance of u, through the loop,
 //! sets K: `K^2 = p/(1 - p) sum a^2 |H|^2/2 / int |S|^2/(1 + (T_n omega)^2)^m df`. It grows with the forcing function, as people's
@@ -35,7 +35,7 @@ use super::DesignError;
 /// Where the forcing function enters the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Enters {
-    /// It is what is to be followed.
+    /// It is the signal to be tracked.
     #[default]
     Target,
     /// It is added at the input of the controlled element.
@@ -67,11 +67,11 @@ impl Default for Remnant {
 /// Who does what.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Task {
-    /// The person and what they control.
+    /// The person and the controlled element.
     pub state: FamilyState,
     /// Where the forcing function enters.
     pub enters: Enters,
-    /// What the person does besides.
+    /// Additional activity of the person.
     pub remnant: Remnant,
 }
 
@@ -90,7 +90,7 @@ pub struct Expected {
     pub rms_u: f64,
 }
 
-/// What a line is worth, before its amplitude.
+/// Reliability of a line, before its amplitude.
 struct Worth {
     /// `|e|^2` by `A^2`.
     error: f64,
@@ -191,7 +191,7 @@ impl<'a> Loop<'a> {
         ]
     }
 
-    /// The errors of a forcing function over so many seconds of whole periods.
+    /// The errors of a forcing function over a given number of seconds of whole periods.
     pub fn expected(&self, forcing: &ForcingFunction, length_s: f64) -> Result<Expected, DesignError> {
         if !(length_s.is_finite() && length_s > 0.0) {
             return Err(DesignError::OutOfRange {
@@ -240,7 +240,8 @@ impl<'a> Loop<'a> {
         self.worth(omega).control
     }
 
-    /// What can be wanted: its name, its gradient along the coordinates, and what its error is told by: 1 deg, or the value.
+    /// Quantities that can be requested: its name, its gradient along the coordinates, and what its error is reported
+    /// by: 1 deg, or the value.
     pub fn gradients(&self) -> Vec<(&'static str, DVector<f64>, f64)> {
         let [(crossover, of_crossover), (_, of_margin)] = self.margin_gradients(&self.task.state.operator);
         let parameters = self.task.state.operator.named_gradients().into_iter();
@@ -280,7 +281,7 @@ impl<'a> Loop<'a> {
 }
 
 impl Expected {
-    /// The same with errors that are so many times as large.
+    /// The same with errors that are scaled by a factor.
     #[must_use]
     pub fn scaled(&self, by: f64) -> Self {
         let of = |e: &Estimate| Estimate {
@@ -318,7 +319,7 @@ pub fn expected(task: &Task, forcing: &ForcingFunction, length_s: f64) -> Result
     Loop::of(task)?.expected(forcing, length_s)
 }
 
-/// The inverse by rows and columns of unit diagonal; none where that is singular.
+/// The inverse by rows and columns of unit diagonal; none if that is singular.
 pub(super) fn inverse(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = information.nrows();
     let scale: Vec<f64> = (0..n).map(|k| information[(k, k)].sqrt()).collect();

@@ -1,9 +1,9 @@
-//! What an experiment will say, before it is done.
+//! Report of an experiment will, before it is done.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`expected`] | standard errors of a person by the information of the lines of a forcing function |
-//! | [`Designing`] | amplitudes and places of the lines that tell most, under limits |
+//! | [`Designing`] | amplitudes and places of the lines that are most informative, under limits |
 //! | [`crest_factor`] | lines without common harmonics (`lines`), and their phases |
 
 mod designing;
@@ -26,9 +26,9 @@ pub enum DesignError {
     OutOfRange {
         /// What.
         quantity: &'static str,
-        /// What it is.
+        /// Its definition.
         found: f64,
-        /// What it may be.
+        /// Its admissible values.
         expected: &'static str,
     },
     /// A loop of which there is no crossover.
@@ -38,7 +38,7 @@ pub enum DesignError {
     NoCrossover,
     /// Lines that leave the person open.
     #[error(
-        "{lines} lines do not determine {coordinates} parameters: add lines, each of which tells two numbers, and spread them over the frequencies at which the person works"
+        "{lines} lines do not determine {coordinates} parameters: add lines, each of which gives two numbers, and spread them over the frequencies at which the person works"
     )]
     NotIdentifiable {
         /// Lines of the forcing function.
@@ -46,12 +46,12 @@ pub enum DesignError {
         /// Parameters of the person.
         coordinates: usize,
     },
-    /// What is wanted and is no parameter of the person.
+    /// A requested quantity that is not a parameter of the person.
     #[error("{name} is nothing that this person has; expected one of {expected}")]
     NotThere {
-        /// What was wanted.
+        /// The requested item.
         name: String,
-        /// What there is.
+        /// The available items.
         expected: String,
     },
     /// An operator or element without meaning, or a loop that is not stable.

@@ -7,8 +7,8 @@ use std::{
     slice,
 };
 
-use super::{given::Done, instance::Instance};
-use crate::status::said;
+use super::{instance::Instance, values::Done};
+use crate::status::panic_message;
 
 /// Statuses, of both interfaces.
 pub(super) const OK: i32 = 0;
@@ -20,7 +20,7 @@ pub type Fmi2Logger = unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *c
 /// `fmi3LogMessageCallback`.
 pub type Fmi3Logger = unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char);
 
-/// Who is told what went wrong.
+/// Pages that show the error.
 #[derive(Clone, Copy)]
 pub(super) enum Logger {
     Nobody,
@@ -37,7 +37,7 @@ pub(super) enum Logger {
 const CATEGORY: &CStr = c"logStatusError";
 
 impl Logger {
-    /// Tells a message.
+    /// Prints a message.
     ///
     /// # Safety
     /// The function is that of the importer, and its environment is alive.
@@ -74,13 +74,13 @@ pub struct Component {
     is_broken: bool,
 }
 
-/// Makes an instance; null where that fails.
+/// Makes an instance; null if that fails.
 ///
 /// # Safety
 /// `logger` is that of the importer.
 pub(super) unsafe fn made(name: &str, logger: Logger, instance: impl FnOnce() -> Done<Instance>) -> *mut Component {
     let name = CString::new(name.replace('\0', " ")).unwrap_or_default();
-    let made = catch_unwind(AssertUnwindSafe(instance)).unwrap_or_else(|panic| Err(said(&*panic)));
+    let made = catch_unwind(AssertUnwindSafe(instance)).unwrap_or_else(|panic| Err(panic_message(&*panic)));
     match made {
         Ok(instance) => Box::into_raw(Box::new(Component {
             instance,
@@ -108,7 +108,7 @@ pub(super) unsafe fn free(component: *mut Component) {
     drop(unsafe { Box::from_raw(component) });
 }
 
-/// Works on an instance: its status; what went wrong is told.
+/// Works on an instance: its status; what went wrong is reported.
 ///
 /// # Safety
 /// `component` is null or was made here, and no other thread uses it.
@@ -127,7 +127,7 @@ pub(super) unsafe fn with(component: *mut Component, call: impl FnOnce(&mut Inst
         Ok(Err(message)) => (ERROR, message),
         Err(panic) => {
             component.is_broken = true;
-            (FATAL, said(&*panic))
+            (FATAL, panic_message(&*panic))
         }
     };
     // SAFETY: the logger is that of the importer.
@@ -146,14 +146,14 @@ pub(super) unsafe fn list<'a, T>(pointer: *const T, count: usize) -> Done<&'a [T
     if pointer.is_null() || !pointer.is_aligned() {
         return Err("a list is null or not aligned".to_owned());
     }
-    // SAFETY: not null, aligned; that there are so many is the contract.
+    // SAFETY: not null, aligned; that there are this many is the contract.
     Ok(unsafe { slice::from_raw_parts(pointer, count) })
 }
 
 /// A list of the importer to be written to.
 ///
 /// # Safety
-/// `pointer` has room for `count` initialised elements that nobody else uses during the call.
+/// `pointer` has room for `count` initialised elements that no other code uses during the call.
 pub(super) unsafe fn list_mut<'a, T>(pointer: *mut T, count: usize) -> Done<&'a mut [T]> {
     if count == 0 {
         return Ok(&mut []);
@@ -184,7 +184,7 @@ pub(super) fn folder(uri: &str) -> Option<PathBuf> {
         return Some(PathBuf::from(uri));
     };
     let path = match rest.strip_prefix("//") {
-        // Behind the host, which is empty or this one.
+        // After the host, which is empty or this one.
         Some(rest) => rest.find('/').map_or("", |slash| &rest[slash..]),
         None => rest,
     };

@@ -1,8 +1,8 @@
 //! The functions of FMI 2.0 for co-simulation (Modelica Association, *Functional Mock-up Interface for
 //! Model Exchange and Co-Simulation* 2.0.4, 2022, chapters 2 and 4).
 //!
-//! Names, types and order are those of `fmi2Functions.h`; a component is one that `fmi2Instantiate`
-//! has made and `fmi2FreeInstance` has not freed, and a list has as many elements as the call says.
+//! Names, types and order are those of `fmi2Functions.h`; a component is one that `fmi2Instantiate` has made and
+//! `fmi2FreeInstance` has not freed, and a list has as many elements as the call reports.
 #![allow(missing_docs, non_snake_case, clippy::missing_safety_doc)]
 
 use std::ffi::{c_char, c_int, c_uint, c_void};
@@ -11,8 +11,8 @@ use hoid_io::fmu::FmuStart;
 
 use super::{
     component::{Component, ERROR, Fmi2Logger, Logger, folder, free, list, list_mut, made, with, words},
-    given::Done,
     instance::Instance,
+    values::Done,
 };
 
 /// `fmi2CallbackFunctions`; memory is allocated by Rust.
@@ -260,7 +260,7 @@ getters_and_setters! {
     fmi2GetString, fmi2SetString, *const c_char: text, as_text;
 }
 
-/// Functions that the description says are not served: each answers with an error, whatever it is
+/// Functions that the description states are not served: each answers with an error, whatever it is
 /// given. In the calling conventions of C the caller clears its own arguments away.
 macro_rules! not_served {
     ($($name:ident),+ $(,)?) => {$(

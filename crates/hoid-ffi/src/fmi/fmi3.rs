@@ -1,9 +1,8 @@
 //! The functions of FMI 3.0 for co-simulation (Modelica Association, *Functional Mock-up Interface
 //! Specification* 3.0.1, 2023, chapters 2 and 4).
 //!
-//! Names, types and order are those of `fmi3FunctionTypes.h`; an instance is one that
-//! `fmi3InstantiateCoSimulation` has made and `fmi3FreeInstance` has not freed, and a list has as many
-//! elements as the call says.
+//! Names, types and order are those of `fmi3FunctionTypes.h`; an instance is one that `fmi3InstantiateCoSimulation` has
+//! made and `fmi3FreeInstance` has not freed, and a list has as many elements as the call reports.
 #![allow(missing_docs, non_snake_case, clippy::missing_safety_doc)]
 
 use std::{

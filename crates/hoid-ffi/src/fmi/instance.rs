@@ -9,8 +9,8 @@ use std::{ffi::CString, fs, path::Path};
 use hoid_io::fmu::{FMU_SETTINGS, FmuKind, FmuSettings, FmuStart, FmuVariable, Role};
 
 use super::{
-    given::{Done, Given},
     model::Model,
+    values::{Done, VariableValues},
 };
 
 /// Share of the sample time by which a time may be off.
@@ -32,7 +32,7 @@ pub(super) struct Instance {
     pub(super) settings: FmuSettings,
     pub(super) variables: Vec<FmuVariable>,
     pub(super) values: Vec<FmuStart>,
-    /// Texts as C wants them, by value reference; empty for what is no text.
+    /// Texts as C strings, by value reference; empty for values that are not texts.
     texts: Vec<CString>,
     first_output: usize,
     pub(super) phase: Phase,
@@ -146,10 +146,10 @@ impl Instance {
         Ok(())
     }
 
-    /// The experiment begins at this time, s.
+    /// The experiment starts at this time, s.
     pub fn begins_at(&mut self, start_s: f64) -> Done {
         if !start_s.is_finite() {
-            return Err(format!("the experiment begins at {start_s} s, expected a finite time"));
+            return Err(format!("the experiment starts at {start_s} s, expected a finite time"));
         }
         if self.phase != Phase::Setup {
             return Err("the experiment runs already".to_owned());
@@ -158,9 +158,9 @@ impl Instance {
         Ok(())
     }
 
-    /// What stands for the parameters and inputs.
-    fn given(&self) -> Given<'_> {
-        Given {
+    /// Values of the parameters and inputs.
+    fn given(&self) -> VariableValues<'_> {
+        VariableValues {
             variables: &self.variables,
             values: &self.values,
         }
@@ -177,7 +177,7 @@ impl Instance {
 
     /// Goes from a time on by a step, both in s.
     pub fn step(&mut self, t_s: f64, step_s: f64) -> Done {
-        let given = Given {
+        let given = VariableValues {
             variables: &self.variables,
             values: &self.values,
         };
@@ -193,7 +193,7 @@ impl Instance {
             ));
         }
         if !(t_s >= self.end_s - OFF * ts && t_s.is_finite()) {
-            return Err(format!("the step begins at {t_s} s, expected {} s", self.end_s));
+            return Err(format!("the step starts at {t_s} s, expected {} s", self.end_s));
         }
         self.end_s = t_s + step_s;
         let time_of = |k: u64| self.start_s + k as f64 * ts;
@@ -201,7 +201,7 @@ impl Instance {
             model.take(&given, time_of(self.k));
             self.k += 1;
         }
-        // What a model says of its next sample is not said before its time.
+        // Information of a model about its next sample is not reported before its time.
         if model.speaks_at_once() || time_of(self.k) <= self.end_s + OFF * ts {
             self.values.splice(self.first_output.., model.outputs());
         }

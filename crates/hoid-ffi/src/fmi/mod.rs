@@ -1,23 +1,23 @@
 //! Functional mock-up units: the tracker, and the operator of a scenario, for simulators.
 //!
-//! The shared library is that of the C ABI; `hoid fmu` packs it with a description. What a unit has
-//! is said by [`hoid_io::fmu`]; here is what it does.
+//! The shared library is the one of the C ABI; `hoid fmu` packs it with a description. What a unit
+//! has is reported by [`hoid_io::fmu`]; here is its effect.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `instance` | an instance: its values, its phases, when a sample is due |
 //! | `given` | parameters and inputs, by their names |
 //! | `model` | what takes samples: tracker and operator |
-//! | `operator` | the operator of a scenario, of the reference text or of the family |
+//! | `operator` | the operator of a scenario, of the thesis or of the family |
 //! | `component` | handles, statuses and messages of both interfaces |
-//! | `state` | its state, to go back to it or to go on elsewhere |
+//! | `state` | its state, to go back to it or to continue elsewhere |
 //! | `fmi2`, `fmi3` | the functions of FMI 2.0 and 3.0 |
 
 mod component;
 pub mod fmi2;
 pub mod fmi3;
-mod given;
 mod instance;
 mod model;
 mod operator;
 pub mod state;
+mod values;

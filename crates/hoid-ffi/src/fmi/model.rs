@@ -1,12 +1,12 @@
-//! What takes the samples of a unit.
+//! The recursion or operator of a unit.
 
 use hoid_io::fmu::{DETERMINED, FmuKind, FmuSettings, FmuStart};
 use hoid_track::Sample;
 use serde_json::{Map, Value};
 
 use super::{
-    given::{Done, Given},
     operator::OperatorModel,
+    values::{Done, VariableValues},
 };
 use crate::{
     packed::{as_bytes, as_numbers},
@@ -14,13 +14,13 @@ use crate::{
     session::Session,
 };
 
-/// What a unit is made of.
+/// Components of a unit.
 pub(super) enum Model {
     Tracker(Box<TrackerModel>),
     Operator(Box<OperatorModel>),
 }
 
-/// A tracker, and the changes that it has told.
+/// A tracker, and the changes that it has reported.
 pub(super) struct TrackerModel {
     session: Session,
     with_excitation: bool,
@@ -30,15 +30,15 @@ pub(super) struct TrackerModel {
 }
 
 impl Model {
-    /// Of the parameters, from a time in s on.
-    pub fn new(settings: &FmuSettings, given: &Given<'_>, start_s: f64) -> Done<Self> {
+    /// For the parameters, from a time in s on.
+    pub fn new(settings: &FmuSettings, given: &VariableValues<'_>, start_s: f64) -> Done<Self> {
         Ok(match settings.kind()? {
             FmuKind::Tracker => Self::Tracker(Box::new(TrackerModel::new(settings, given)?)),
             FmuKind::Operator => Self::Operator(Box::new(OperatorModel::new(settings, given, start_s)?)),
         })
     }
 
-    /// Numbers beside the recursion, and its bytes. It does not change.
+    /// Numbers next to the recursion, and its bytes. It does not change.
     pub fn saved(&mut self) -> (Vec<f64>, Vec<u8>) {
         match self {
             Self::Tracker(tracker) => {
@@ -52,7 +52,7 @@ impl Model {
     /// The model of the same parameters that [`Model::saved`] was asked of.
     pub fn restored(
         settings: &FmuSettings,
-        given: &Given<'_>,
+        given: &VariableValues<'_>,
         start_s: f64,
         beside: &[f64],
         bytes: &[u8],
@@ -89,13 +89,13 @@ impl Model {
         }
     }
 
-    /// True where the outputs are of the sample that was taken, not of the next one.
+    /// True if the outputs are of the sample that was taken, not of the next one.
     pub fn speaks_at_once(&self) -> bool {
         matches!(self, Self::Tracker(_))
     }
 
     /// Takes the sample at a time in s.
-    pub fn take(&mut self, given: &Given<'_>, t_s: f64) {
+    pub fn take(&mut self, given: &VariableValues<'_>, t_s: f64) {
         match self {
             Self::Tracker(tracker) => tracker.take(given, t_s),
             Self::Operator(operator) => operator.take(given.real("e")),
@@ -125,7 +125,7 @@ impl Model {
 }
 
 impl TrackerModel {
-    fn new(settings: &FmuSettings, given: &Given<'_>) -> Done<Self> {
+    fn new(settings: &FmuSettings, given: &VariableValues<'_>) -> Done<Self> {
         let text = given.text("options");
         let mut options: Map<String, Value> = serde_json::from_str(if text.is_empty() { "{}" } else { text })
             .map_err(|error| format!("options: no object in JSON ({error})"))?;
@@ -135,7 +135,7 @@ impl TrackerModel {
         }
         let prior = given.text("prior");
         let of_unit = prior == "fit";
-        // Methods that begin with the record have no prior.
+        // Methods that start with the record have no prior.
         if !of_unit && !["", "population"].contains(&prior) {
             options.insert("prior".to_owned(), prior.into());
         }
@@ -157,7 +157,7 @@ impl TrackerModel {
         })
     }
 
-    fn take(&mut self, given: &Given<'_>, t_s: f64) {
+    fn take(&mut self, given: &VariableValues<'_>, t_s: f64) {
         let reference = given.real("f_t");
         let sample = Sample {
             e: given.real("e"),

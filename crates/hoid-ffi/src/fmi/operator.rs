@@ -1,9 +1,9 @@
-//! The operator of a scenario, of the reference text or of the family, as a unit has it.
+//! The operator of a scenario, of the thesis or of the family, as a unit has it.
 
 use hoid_io::{AnyScenario, fmu::FmuSettings, parse_any_scenario};
 use hoid_sim::{FamilyOperatorRun, FamilySimulator, OperatorRun, RunSeed, Simulator};
 
-use super::given::{Done, Given};
+use super::values::{Done, VariableValues};
 
 /// An operator that is at work.
 pub(super) struct OperatorModel {
@@ -17,7 +17,7 @@ enum Run {
 }
 
 impl OperatorModel {
-    pub fn new(settings: &FmuSettings, given: &Given<'_>, start_s: f64) -> Done<Self> {
+    pub fn new(settings: &FmuSettings, given: &VariableValues<'_>, start_s: f64) -> Done<Self> {
         let text = settings.scenario.as_deref();
         let text = text.ok_or("the unit has no scenario; make it by hoid fmu --operator SCENARIO")?;
         let seed = RunSeed {
@@ -78,7 +78,7 @@ impl OperatorModel {
         }
     }
 
-    /// False where the numbers are of another operator.
+    /// False if the numbers are of another operator.
     pub fn restore(&mut self, saved: &[f64]) -> bool {
         match &mut self.run {
             Run::Reference(run) => run.restore(saved),

@@ -1,10 +1,9 @@
-//! The state of an instance, to go back to it or to go on elsewhere with the same digits (FMI 2.0.4, section
-//! 2.1.8; FMI 3.0.1, section 2.2.10).
+//! The state of an instance, to go back to it or to continue elsewhere with the same digits (FMI 2.0.4, section 2.1.8;
+//! FMI 3.0.1, section 2.2.10).
 //!
-//! A state in the hands of an importer is what it is serialised to (`packed`). The
-//! description is the token of the unit, where the instance is in its experiment and the values of all
-//! variables; the bytes are those of the tracker, or the numbers of the operator. Numbers of 64 bits stand in
-//! the description by their bits, for JSON has no NaN.
+//! A state in the hands of an importer is what it is serialised to (`packed`). The description is the token of the
+//! unit, where the instance is in its experiment and the values of all variables; the bytes are those of the tracker,
+//! or the numbers of the operator. Numbers of 64 bits are in the description by their bits, for JSON has no NaN.
 
 #![allow(missing_docs, non_snake_case, clippy::missing_safety_doc)]
 
@@ -15,9 +14,9 @@ use serde_json::{Value, json};
 
 use super::{
     component::{Component, list, list_mut, with},
-    given::{Done, Given},
     instance::{Instance, Phase},
     model::Model,
+    values::{Done, VariableValues},
 };
 use crate::packed::{opened, packed};
 
@@ -80,7 +79,7 @@ impl Instance {
             beside => {
                 let beside = beside.as_array().ok_or_else(wrong)?;
                 let beside: Vec<f64> = beside.iter().map(number).collect::<Done<_>>()?;
-                let given = Given {
+                let given = VariableValues {
                     variables: &self.variables,
                     values: &values,
                 };
@@ -243,7 +242,7 @@ macro_rules! states {
             let read = |_: &mut Instance| {
                 // SAFETY: by the contract of the interface.
                 let bytes = unsafe { list(bytes, size) }?;
-                opened(MAGIC, bytes).map_err(|_| "the bytes are no state, or were changed or cut".to_owned())?;
+                opened(MAGIC, bytes).map_err(|_| "the bytes are not a state, or were changed or cut".to_owned())?;
                 // SAFETY: by the contract of the interface.
                 unsafe { hand_over(bytes.to_vec(), state) }
             };

@@ -37,7 +37,7 @@ pub fn library(name: &str) -> PathBuf {
     let built = [deps.join(name), deps.parent().unwrap().join(name)];
     let age = |path: &PathBuf| fs::metadata(path).and_then(|m| m.modified()).ok();
     let newest = built.into_iter().filter(|path| age(path).is_some()).max_by_key(age);
-    newest.unwrap_or_else(|| panic!("{name} was not built beside {}", tests.display()))
+    newest.unwrap_or_else(|| panic!("{name} was not built next to {}", tests.display()))
 }
 
 pub fn shared_library() -> PathBuf {
@@ -48,7 +48,7 @@ pub fn shared_library() -> PathBuf {
     ))
 }
 
-/// A compiler that is here; its absence is told.
+/// A compiler that is here; its absence is reported.
 pub fn compiler(name: &str) -> Option<String> {
     let there = Command::new(name).arg("--version").stdout(Stdio::null()).status();
     if there.is_ok_and(|status| status.success()) {
@@ -91,7 +91,7 @@ pub fn run(program: &Path, arguments: &[&str], input: &str) -> Output {
         .unwrap();
     let mut to = child.stdin.take().unwrap();
     let input = input.to_owned();
-    // A pipe that nobody reads any more is no fault of ours.
+    // A pipe that no one reads any more is not a fault of ours.
     let writer = std::thread::spawn(move || drop(to.write_all(input.as_bytes())));
     let output = child.wait_with_output().unwrap();
     writer.join().unwrap();

@@ -1,4 +1,4 @@
-//! Inputs beside e: `w_i = (B_i/F_i) q^-nk_i x_i`, each with its own polynomials.
+//! Further inputs: `w_i = (B_i/F_i) q^-nk_i x_i`, each with its own polynomials.
 //!
 //! Theta is that of the first input, then `b_0 .. f_1 ..` of each further one. The columns of psi
 //! are those of the first input with the signals of the other: `(D/(C F_i)) x_i(t - nk_i - j)` and
@@ -32,7 +32,7 @@ impl InputOrders {
     }
 }
 
-/// An input beside e: its orders, and its values in each record.
+/// A further input: its orders, and its values in each record.
 #[derive(Debug, Clone)]
 pub(crate) struct FurtherInput<'a> {
     pub orders: InputOrders,

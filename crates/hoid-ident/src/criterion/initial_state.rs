@@ -1,8 +1,8 @@
-//! What is assumed about the time before a record, and which residuals can be had under it.
+//! Assumptions about the time before a record, and which residuals can be had under it.
 
 use hoid_model::Orders;
 
-/// What is assumed about the time before a record.
+/// Assumptions about the time before a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum InitialState {
     /// Input, output and innovations were zero.

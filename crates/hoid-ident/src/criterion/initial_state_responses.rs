@@ -1,18 +1,17 @@
 //! Initial states of a record, eliminated exactly.
 //!
-//! What a record does not say about its own past enters the residuals linearly: the nf past values
-//! of w through the free responses of `1/F` (as `-(D/C) h`, h the impulse response of `1/F`), the
-//! nc past innovations through those of `1/C`. With G the matrix of these responses and `G = Q R`,
-//! the states of least squares are `x = -R^-1 Q' eps_0` and the residuals `eps = (I - Q Q') eps_0`.
-//! The responses die away, so that Q is short beside the record. Source: G. H. Golub and V.
-//! Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432.
+//! The unknown past of a record enters the residuals linearly: the nf past values of w through the free responses of
+//! `1/F` (as `-(D/C) h`, h the impulse response of `1/F`), the nc past innovations through those of `1/C`. With G the
+//! matrix of these responses and `G = Q R`, the states of least squares are `x = -R^-1 Q' eps_0` and the residuals
+//! `eps = (I - Q Q') eps_0`. The responses die away, so that Q is short compared with the record. Source: G. H. Golub
+//! and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432.
 //!
 //! With a stationary past ([`crate::criterion::stationary_noise`]) the states of the noise model
 //! have a known covariance `sigma^2 L L'`: they are `L z` with z of variance sigma^2, and z counts
 //! as further residuals. G then has the rows `[I; G L]` for them.
 //!
-//! A level of u, the constant that is no response to e, enters as linearly, through `-(D/C) 1`, and is
-//! eliminated with the states. It does not die away: its basis vector is as long as the record.
+//! A level of u, the constant that is not a response to e, enters as linearly, through `-(D/C) 1`, and is eliminated
+//! with the states. It does not die away: its basis vector is as long as the record.
 
 use hoid_core::filter::{SecondOrder, divide_in_place};
 
@@ -40,8 +39,8 @@ pub(crate) struct InitialStateResponses {
     prior_rows: usize,
 }
 
-/// What the past of a record may have been.
-pub(crate) struct Past<'a> {
+/// Possible past of a record.
+pub(crate) struct InitialHistory<'a> {
     pub c: &'a [f64],
     /// The polynomial that whitens v together with C.
     pub d: &'a [f64],
@@ -49,10 +48,10 @@ pub(crate) struct Past<'a> {
     pub f: &'a [&'a [f64]],
     /// Samples from the first value of w to the first residual.
     pub lead: usize,
-    /// The past of the noise when it was stationary; else nothing is known of it.
+    /// The past of the noise when it was stationary; else nothing is known about it.
     pub noise: Option<&'a StationaryNoise>,
-    /// Square roots of the weights of the residuals, from the first residual on; none where all
-    /// count the same.
+    /// Square roots of the weights of the residuals, from the first residual on; none if all count
+    /// the same.
     pub weights: Option<&'a [f64]>,
     /// Whether u has a level.
     pub level: bool,
@@ -64,8 +63,8 @@ impl InitialStateResponses {
     ///
     /// Any free response of 1/F is a combination of its impulse response `h` started at the first
     /// nf samples (that basis stays independent even where f_nf = 0).
-    pub fn of(past: &Past<'_>, rows: usize) -> Self {
-        let Past { c, d, f, lead, .. } = *past;
+    pub fn of(past: &InitialHistory<'_>, rows: usize) -> Self {
+        let InitialHistory { c, d, f, lead, .. } = *past;
         let mut columns: Vec<Vec<f64>> = Vec::new();
         let mut responses_of_inputs = Vec::with_capacity(f.len());
         let mut of_inputs = Vec::new();
@@ -200,7 +199,7 @@ impl InitialStateResponses {
         z
     }
 
-    /// True when nothing of the responses is left at the end of so many rows.
+    /// True when nothing of the responses is left at the end of a given number of rows.
     pub fn have_died(&self, rows: usize) -> bool {
         /// A response below this share of its size has died away.
         const DEAD: f64 = 1e-15;

@@ -1,4 +1,4 @@
-//! What a search and a fit need of the criterion: feasible theta, sum of squares, descent
+//! Requirements of a search and a fit on the criterion: feasible theta, sum of squares, descent
 //! `psi' eps` and `psi' psi`, also for some polynomials alone, and the residuals themselves.
 
 use std::ops::Range;

@@ -39,17 +39,17 @@
 //!
 //! **Weights** multiply the squared residuals; they serve the robust loss.
 //!
-//! **A long record** passes span by span behind its first part ([`pass`]), so that a fit needs no
-//! memory beside the record.
+//! **A long record** passes span by span after its first part ([`pass`]), so that a fit needs little memory in addition
+//! to the record.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `prediction_error` | the criterion: records, orders, which residuals count |
 //! | `initial_state` | what is assumed about the time before a record |
 //! | `polynomials` | A, B, C, D and F as parts of theta |
 //! | `further` | inputs beside e |
 //! | `signals`, `whitening` | the signals of a record at one theta |
-//! | `initial_state_responses` | what a record does not say about its past, eliminated exactly |
+//! | `initial_state_responses` | what a record does not report about its past, eliminated exactly |
 //! | `stationary_noise` | the noise before the record, when it was stationary |
 //! | `pass` | a pass over a record; a long one span by span |
 //! | `normal_equations` | products of the residuals and the columns of psi |

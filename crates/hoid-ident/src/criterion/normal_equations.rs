@@ -108,7 +108,7 @@ impl Criterion<'_> {
         add_products(states, &columns, &weighted(eps), total);
     }
 
-    /// What the penalty on the stationary past adds to the descent.
+    /// Contribution of the penalty on the stationary past to the descent.
     pub(super) fn add_penalty(&self, states: &EliminatedStates, total: &mut Linearisation) {
         let Some(noise) = &states.noise else { return };
         let o = &self.orders;

@@ -1,13 +1,11 @@
 //! A pass over a record at one theta; a long record is passed span by span.
 //!
-//! What the normal equations need of a record are sums over time, and every signal in them is the
-//! output of a filter that goes forward: the first part of the record (32 768 samples) is passed as
-//! any record, the rest in spans that stay in the memory near the processor, each with the last
-//! samples of the span before in front of it. Nothing then grows with the record, and a sample
-//! costs the same in a long one.
+//! Requirements of the normal equations on a record are sums over time, and every signal in them is the output of a
+//! filter that goes forward: the first part of the record (32 768 samples) is passed as any record, the rest in spans
+//! that stay in the memory near the processor, each with the last samples of the span before in front of it. Nothing
+//! then grows with the record, and a sample costs the same in a long one.
 //!
-//! The initial states act on the beginning alone. Their responses must have died away within the
-//! head
+//! The initial states act on the start alone. Their responses must have died away within the head
 //! ([`InitialStateResponses::have_died`](crate::criterion::initial_state_responses::InitialStateResponses::have_died));
 //! where a pole is so near the circle that they have not, the record is passed whole. So it is with
 //! weights, of which there is one a sample, with further inputs, and with a stationary past, whose
@@ -98,7 +96,7 @@ impl Criterion<'_> {
         Some(states)
     }
 
-    /// The signals of the next span, behind their last samples, which stand in front.
+    /// The signals of the next span, after their last samples, which are in front.
     fn next_span(
         &self,
         parts: &Polynomials<'_>,

@@ -10,7 +10,7 @@ use crate::linalg::products::variance;
 pub(crate) struct Data<'a> {
     pub e: &'a [f64],
     pub u: &'a [f64],
-    /// Whether u has a constant that is no response to e, an unknown as the initial states are.
+    /// Whether u has a constant that is not a response to e, an unknown as the initial states are.
     pub level: bool,
 }
 
@@ -36,7 +36,7 @@ pub(crate) struct Criterion<'a> {
     /// [`first_residual`](super::first_residual).
     pub first: usize,
     /// Square roots of the weights of the residuals of each record, from the first residual on;
-    /// none where all count the same.
+    /// none if all count the same.
     pub weights: Option<&'a [Vec<f64>]>,
     /// Inputs beside e, each with its own B, F and nk; their coefficients follow those of
     /// [`Self::orders`] in theta.

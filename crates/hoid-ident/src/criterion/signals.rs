@@ -7,7 +7,7 @@ use hoid_core::filter::divide;
 
 use super::{
     initial_state::InitialState,
-    initial_state_responses::{InitialStateResponses, Past},
+    initial_state_responses::{InitialHistory, InitialStateResponses},
     polynomials::{Block, Polynomials},
     prediction_error::{Criterion, Data},
     stationary_noise::StationaryNoise,
@@ -65,7 +65,7 @@ impl Criterion<'_> {
             let poles: Vec<&[f64]> = std::iter::once(parts.f)
                 .chain(self.further_polynomials(theta).map(|(_, f)| f))
                 .collect();
-            let past = Past {
+            let past = InitialHistory {
                 c: parts.c,
                 d: parts.d,
                 f: &poles,
@@ -86,7 +86,7 @@ impl Criterion<'_> {
         states
     }
 
-    /// `w = B s` and `v = A u - w` of these samples, the first of which stands at `from` in the
+    /// `w = B s` and `v = A u - w` of these samples, the first of which is at `from` in the
     /// workspace.
     pub(super) fn response(
         &self,

@@ -3,7 +3,7 @@ use hoid_model::Orders;
 use super::{
     Criterion, Data, InitialState, Workspace, first_residual,
     further::{FurtherInput, InputOrders},
-    initial_state_responses::{InitialStateResponses, Past},
+    initial_state_responses::{InitialHistory, InitialStateResponses},
     polynomials::{Block, Polynomials},
     signals::EliminatedStates,
 };
@@ -186,7 +186,7 @@ fn estimated_states_leave_nothing_to_gain() {
         let c = criterion(orders, vec![data], InitialState::Estimate);
         let eps = c.residuals_of(&theta, 0, &mut Workspace::default());
         let parts = Polynomials::split(&orders, &theta);
-        let past = Past {
+        let past = InitialHistory {
             c: parts.c,
             d: parts.d,
             f: &[parts.f],
@@ -340,7 +340,7 @@ fn a_later_first_residual_leaves_the_gradient_exact() {
     assert!((slope + 2.0 * exact.descent[7]).abs() < 1e-6 * slope.abs());
 }
 
-/// Adds the first record with a head of this length; none where it has to pass whole.
+/// Adds the first record with a head of this length; none if it has to pass whole.
 fn add_in_spans(
     c: &Criterion<'_>,
     theta: &[f64],
@@ -391,7 +391,7 @@ fn long_records_pass_span_by_span_to_the_same_sums() {
                 for (a, b) in residuals.iter().zip(c.residuals_of(&theta, 0, &mut ws)) {
                     assert!((a - b).abs() < 1e-12, "{initial:?} {orders}: {a} and {b}");
                 }
-                // Each product beside the size that it can have.
+                // Each product next to the size that it can have.
                 let size = |i: usize| whole.gram[i * p + i].sqrt();
                 for i in 0..p {
                     let scale = size(i) * whole.sum_of_squares.sqrt();

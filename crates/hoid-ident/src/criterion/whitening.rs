@@ -32,7 +32,7 @@ pub(super) fn whiten(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize
     whiten_on(c, d, x, y, from);
 }
 
-/// `y = (D/C) x` from index `from` on; what stands before is what has gone into the filter and come
+/// `y = (D/C) x` from index `from` on; anything before is what has gone into the filter and come
 /// out of it so far.
 pub(super) fn whiten_on(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize) {
     match *d {

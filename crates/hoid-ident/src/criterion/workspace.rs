@@ -30,7 +30,7 @@ thread_local! {
 }
 
 /// A workspace for one fit, kept for the next on the same thread: getting fresh pages for each fit
-/// costs a quarter of a study's time. What is in it is written before it is read.
+/// costs a quarter of a study's time. Contents of it is written before it is read.
 #[derive(Debug, Default)]
 pub(crate) struct Borrowed(Workspace);
 

@@ -20,13 +20,12 @@
 //! **Coordinates that count** are determined by the data and owe less than a quarter to the prior
 //! in each method: a resonance above the lines is the prior in one method and not in the other.
 //!
-//! The gain is compared as `ln |Y|` in the middle of the band of manual control. Gain and lead
-//! time, or gain and lag, make up for each other along a curve, K T_L nearly constant, and what lies
-//! apart on a curve is not apart for it: a straight line through one of them would say so.
+//! The gain is compared as `ln |Y|` in the middle of the band of manual control. Gain and lead time, or gain and lag,
+//! make up for each other along a curve, K T_L nearly constant, and what lies apart on a curve is not apart for it: a
+//! straight line through one of them would report it.
 //!
-//! T is chi-square with as many degrees of freedom. Of several pairs the smallest probability counts,
-//! times their number (Bonferroni): a test at 1 % doubts one person in a hundred at most whose
-//! operator is of the form.
+//! T is chi-square with as many degrees of freedom. For several pairs the smallest probability counts, times their
+//! number (Bonferroni): a test at 1 % doubts one person in a hundred at most whose operator is of the form.
 
 use hoid_model::{FamilyOperator, operator_family::Coordinate};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -45,7 +44,7 @@ pub enum AgreementMethod {
 }
 
 impl AgreementMethod {
-    /// As it stands in a sentence.
+    /// As it is in a sentence.
     pub fn words(self) -> &'static str {
         match self {
             Self::PredictionError => "the prediction error fit",
@@ -115,7 +114,7 @@ impl Agreement {
     }
 }
 
-/// What a method found.
+/// Result of a method.
 #[derive(Debug, Clone)]
 pub(super) struct Side {
     pub method: AgreementMethod,
@@ -170,7 +169,7 @@ pub(super) fn with_level(operator: &FamilyOperator) -> Vec<f64> {
 }
 
 /// The tests of all pairs over the coordinates that count; `bias` belongs to the prediction error
-/// fit. `None` where there are no coordinates or no two methods with errors.
+/// fit. `None` if there are no coordinates or no two methods with errors.
 pub(super) fn agreement(
     all: &[Coordinate],
     sides: &[Side],
@@ -290,7 +289,7 @@ mod tests {
     #[test]
     fn the_covariance_of_a_side_is_that_of_small_steps() {
         let operator = |x: &[f64]| FamilyOperator::new(Form::LeadLag, true, x).unwrap();
-        // Of three directions, one of them the gain.
+        // For three directions, one of them the gain.
         let directions = [
             [0.2, 0.05, 0.01, 0.1, 0.0, 0.004],
             [0.0, -0.08, 0.03, 0.0, 0.2, 0.01],

@@ -2,7 +2,7 @@
 //!
 //! In a closed loop the direct prediction error method needs a noise model that is rich enough and
 //! no knowledge of the loop (L. Ljung, *System Identification*, 1999, section 13.4). An ARX model
-//! of high order has that, is one linear regression, and its response stands for the describing
+//! of high order has that, is one linear regression, and its response represents the describing
 //! function where no periodic excitation was recorded: for the starts of all forms.
 
 use hoid_model::{Complex64, Record, Structure};
@@ -16,8 +16,8 @@ const POLES: usize = 16;
 const FEWEST: usize = 4;
 /// Most coefficients of B.
 const MOST_GAINS: usize = 60;
-/// Most of them where u is predicted so well that there may be no noise, and how well that is: at high rates a long delay
-/// has more samples than that.
+/// Their largest number if u is predicted so well that there may be no noise, and the threshold of that: at high rates
+/// a long delay has more samples than that.
 const MOST_WITHOUT_NOISE: usize = 200;
 const PROMISING: f64 = 1e-3;
 /// Frequencies of the response, rad/s, evenly over their logarithm.
@@ -36,16 +36,16 @@ pub(super) struct ArxResponse {
 }
 
 impl ArxResponse {
-    /// Of all records together: a smooth record determines fewer coefficients.
+    /// For all records together: a smooth record determines fewer coefficients.
     ///
     /// # Errors
-    /// Those of the regression with the fewest coefficients.
+    /// The errors of the regression with the fewest coefficients.
     pub fn of(records: &[Record]) -> Result<Self, IdentError> {
         regressed(records, false, MOST_GAINS)
     }
 
     /// The same where there is hardly any noise, to as many coefficients of B as there may be: u without noise leaves
-    /// those of A open, and B is to be as long as the delay. `None` where there is more.
+    /// those of A open, and B is to be as long as the delay. `None` if there is more.
     pub fn without_noise(records: &[Record]) -> Option<Self> {
         let found = regressed(records, true, MOST_GAINS).ok()?;
         if found.innovations < NONE {

@@ -1,5 +1,5 @@
-//! From the searches of the forms that count to the result: operators with their errors, averaged over
-//! forms; for the form in front what the methods say of each other; and the verdict.
+//! From the searches of the forms that count to the result: operators with their errors, averaged over forms; for the
+//! best form what the methods report about each other; and the verdict.
 //!
 //! The order matters: both methods are compared with their own errors, and only then does their
 //! difference become a part of the errors of the operator (`Covariances::add_bias`).
@@ -14,10 +14,10 @@ use super::{
     channels::{ChannelFit, with_responses},
     choice::FormFigures,
     covariances::response_errors,
+    diagnostics::{DiagnosticInputs, LARGEST_RESPONSE_ERROR, findings},
     estimated::{Errors, Estimated, in_form, operator_of},
     instrumental::{Instrumental, InstrumentalFit},
     joint::{Lines, with_lines},
-    judgement::{Judged, LARGEST_RESPONSE_ERROR, findings},
     line_fit::LineFit,
     lines::LineData,
     prediction::Prediction,
@@ -28,16 +28,16 @@ use super::{
 use crate::{
     IdentError, SearchOptions,
     criterion::{Criterion, Workspace},
-    frequency::DescribingFunction,
-    grey_box::parametrisation::Parametrisation,
-    judgement::{
+    diagnostics::{
         constancy::{Constancy, Direction, physical_blocks},
         residuals::ResidualMeasures,
     },
+    frequency::DescribingFunction,
+    grey_box::parametrisation::Parametrisation,
     optimize::minimise,
 };
 
-/// What the lines of the excitation gave for a form.
+/// Result of the lines of the excitation for a form.
 pub(super) struct AtLines<'d> {
     pub describing: Option<&'d DescribingFunction>,
     /// The lines of several inputs, where there are such.
@@ -49,20 +49,20 @@ pub(super) struct AtLines<'d> {
     pub why_none: Option<String>,
 }
 
-/// The search of a form that counts beside the one in front.
-pub(super) struct Beside<'a> {
+/// The search of a form that counts next to the one in front.
+pub(super) struct OtherForm<'a> {
     pub fit: PredictionFit<'a>,
     pub lines: Option<LineFit>,
     pub weight: f64,
 }
 
-/// The search of the form in front, and what its result is made from beside it.
+/// The search of the best form, and what its result is made from next to it.
 pub(super) struct Chosen<'p, 'a> {
     pub fit: PredictionFit<'a>,
     pub weight: f64,
     pub lines: AtLines<'p>,
     /// The other forms that count.
-    pub beside: Vec<Beside<'a>>,
+    pub others: Vec<OtherForm<'a>>,
     /// All forms that were compared.
     pub forms: Vec<FormFigures>,
     pub prediction: &'p Prediction<'a>,
@@ -72,17 +72,17 @@ pub(super) struct Chosen<'p, 'a> {
     pub records: &'p [Record],
     /// Channel of the recorded excitation.
     pub excitation: Option<&'p str>,
-    /// Variation of a person's gain from one run to the next, as a part of it; zero where there is no noise, of no person.
+    /// Variation of a person's gain from one run to the next, as a part of it; zero if there is no noise, of no person.
     pub run_to_run: f64,
     /// Highest order of the noise models that the estimate is held against.
     pub highest_order: usize,
 }
 
 impl<'a> Chosen<'_, 'a> {
-    /// All that is said of the person.
+    /// All that is informed of the person.
     ///
     /// # Errors
-    /// Those of the model.
+    /// The errors of the model.
     pub fn result(self, workspace: &mut Workspace) -> Result<FamilyFit, IdentError> {
         let (fit, layout) = (&self.fit, self.fit.layout());
         let separate = if self.prediction.individual.is_empty() {
@@ -121,7 +121,7 @@ impl<'a> Chosen<'_, 'a> {
             add_bias(&mut errors, found, self.lines.fit.as_ref(), separate, (&others, unseen));
         }
         let mut weighed = vec![in_form(found, &errors, self.weight, separate)?];
-        for other in &self.beside {
+        for other in &self.others {
             let form = self.weighed(other, separate, workspace)?;
             if form.operators.first().is_some_and(knows_the_response) {
                 weighed.push(form);
@@ -140,7 +140,7 @@ impl<'a> Chosen<'_, 'a> {
         let residuals = residuals(fit, workspace);
         let of_delay = layout.delays().first().copied().unwrap_or(0);
         let all_parameters: Vec<_> = operators.iter().flat_map(|o| o.parameters.clone()).collect();
-        let verdict = Verdict::of(findings(&Judged {
+        let verdict = Verdict::of(findings(&DiagnosticInputs {
             termination: fit.minimum.termination,
             delay: (found.eta()[of_delay], layout.limits()[of_delay]),
             parameters: &all_parameters,
@@ -200,7 +200,7 @@ impl<'a> Chosen<'_, 'a> {
         })
     }
 
-    /// The fit with the lines beside it, where there are lines, noise, and one operator of all records.
+    /// The fit with the lines next to it, where there are lines, noise, and one operator of all records.
     fn joint(
         &self,
         fit: &PredictionFit<'a>,
@@ -244,7 +244,7 @@ impl<'a> Chosen<'_, 'a> {
         Some(found.and_then(|method| method.fit(&auxiliary, workspace)))
     }
 
-    /// Scales the weights of what is left to one; the figures of all forms, with these weights.
+    /// Normalises the remaining weights; the figures of all forms, with these weights.
     fn with_weights_of(&self, weighed: &mut [WeighedForm]) -> Vec<FormFigures> {
         let total: f64 = weighed.iter().map(|form| form.weight).sum();
         weighed.iter_mut().for_each(|form| form.weight /= total);
@@ -261,8 +261,13 @@ impl<'a> Chosen<'_, 'a> {
         figures.collect()
     }
 
-    /// Another form with its errors, made as those of the form in front.
-    fn weighed(&self, of: &Beside<'a>, separate: usize, workspace: &mut Workspace) -> Result<WeighedForm, IdentError> {
+    /// Another form with its errors, made as those of the best form.
+    fn weighed(
+        &self,
+        of: &OtherForm<'a>,
+        separate: usize,
+        workspace: &mut Workspace,
+    ) -> Result<WeighedForm, IdentError> {
         let joint = self.joint(&of.fit, of.lines.as_ref(), separate, workspace);
         let found = joint.as_ref().unwrap_or(&of.fit);
         let mut errors = Errors::of(found, self.run_to_run, workspace);
@@ -275,10 +280,9 @@ impl<'a> Chosen<'_, 'a> {
     }
 }
 
-/// What the fit may be off by becomes a part of its errors: its difference to the fit at the
-/// lines, and, for what the lines leave to the prior or without lines, its differences to fits
-/// with other noise models ([`super::sensitivity`]). `unseen` is false where there is little noise, and little of what no
-/// noise model shows.
+/// The bias of the fit is included in its errors: its difference to the fit at the lines, and, for what the lines leave
+/// to the prior or without lines, its differences to fits with other noise models ([`super::sensitivity`]). `unseen` is
+/// false if there is little noise, and little of what no noise model shows.
 fn add_bias(
     errors: &mut Errors,
     fit: &PredictionFit<'_>,
@@ -297,26 +301,26 @@ fn add_bias(
             covariances.add_bias(fit, &lines.elements());
             if owes.contains(&true) {
                 for other in others {
-                    covariances.add_besides(fit, other, 1.0, |place| owes.get(place) == Some(&true));
+                    covariances.add_extra_variance(fit, other, 1.0, |place| owes.get(place) == Some(&true));
                 }
             }
         }
         _ => {
             for other in others {
                 covariances.add_bias(fit, other);
-                covariances.add_besides(fit, other, MORE_WITHOUT_LINES, |_| true);
+                covariances.add_extra_variance(fit, other, MORE_WITHOUT_LINES, |_| true);
             }
             let elements = fit.layout().elements.iter().enumerate().filter(|_| unseen);
             for (place, (coordinate, _)) in elements {
                 let unseen = UNSEEN_WITHOUT_LINES.iter().find(|(of, _)| of == coordinate);
-                covariances.besides[place] += unseen.map_or(0.0, |(_, deviation)| deviation * deviation);
+                covariances.extra_variance[place] += unseen.map_or(0.0, |(_, deviation)| deviation * deviation);
             }
         }
     }
     covariances.widen(fit, &mut errors.profiles);
 }
 
-/// All methods beside each other, over the coordinates whose parameters are determined and owe
+/// All methods next to each other, over the coordinates whose parameters are determined and owe
 /// little to the prior; `None` for fewer than two with errors.
 fn agreement_of(
     fit: &PredictionFit<'_>,
@@ -466,8 +470,8 @@ fn coherent_share(describing: &DescribingFunction) -> Option<f64> {
     all.filter(|all| !all.is_empty()).map(|all| mean(&all))
 }
 
-/// Whether a form beside the one in front knows the response: one whose parameters make up for each other, the data
-/// leave as open as if they were fewer, and their errors say nothing.
+/// Whether a form next to the one in front knows the response: one whose parameters make up for each other, the data
+/// leave as open as if they were fewer, and their errors carry no information.
 fn knows_the_response(of: &OperatorInForm) -> bool {
     let errors = response_errors(&of.operator, of.covariance.as_deref());
     errors.is_some_and(|all| all.iter().sum::<f64>() < LARGEST_RESPONSE_ERROR * all.len() as f64)

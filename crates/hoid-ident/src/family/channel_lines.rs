@@ -9,7 +9,7 @@
 //! (M. M. van Paassen and M. Mulder, *Identification of Human Operator Control Behaviour in Multiple-Loop Tracking Tasks*,
 //! IFAC MMS 1998). Forms are fitted to all lines together, so that nothing is interpolated, by least squares with
 //!
-//! `var n = |u_k - sum_i Y_i x_ik|^2` over the runs, and beside the lines, as [`super::lines`] weighs them.
+//! `var n = |u_k - sum_i Y_i x_ik|^2` over the runs, and at the bins next to the lines, as [`super::lines`] weighs them.
 //!
 //! The remnant in e, which makes the ratio of two noisy numbers, is averaged over the runs before it is divided by.
 
@@ -31,7 +31,7 @@ use super::{
 use crate::{
     SearchOptions,
     criterion::Workspace,
-    frequency::{Excitation, LineSearch, USUAL_EXCITATIONS, Window, greatest_common_divisor},
+    frequency::{COMMON_EXCITATIONS, Excitation, LineSearch, Window, greatest_common_divisor},
     grey_box::{objective::Penalty, parametrisation::Parametrisation},
     linalg::least_squares::solve_symmetric,
     optimize::{Linearisation, Minimum, Objective, minimise},
@@ -68,8 +68,8 @@ struct Line {
     omega_rad_s: f64,
     /// Over the coefficient of the exciting signal, of each run.
     runs: Vec<Coefficients>,
-    /// The same of the bins beside the line.
-    beside: Vec<Vec<Coefficients>>,
+    /// The same for the bins next to the line.
+    neighbours: Vec<Vec<Coefficients>>,
     /// Of the means over the runs.
     variance: f64,
 }
@@ -85,16 +85,16 @@ pub(super) struct ChannelLines {
 }
 
 impl ChannelLines {
-    /// The lines of these records: of the channels, and of the excitation that is named or has a usual name. `None` where
+    /// The lines of these records: of the channels, and of the excitation that is named or has a common name. `None` where
     /// nothing has lines of its own.
     pub fn of(
         records: &[Record],
         channels: &[String],
         (excitation, period_s): (Option<&str>, Option<f64>),
     ) -> Option<Self> {
-        let usual = USUAL_EXCITATIONS.into_iter().filter(|_| excitation.is_none());
+        let common = COMMON_EXCITATIONS.into_iter().filter(|_| excitation.is_none());
         let mut exciters: Vec<String> = channels.to_vec();
-        for name in excitation.into_iter().chain(usual) {
+        for name in excitation.into_iter().chain(common) {
             let is_signal = records[0].channels().take(2).any(|signal| signal.name == name);
             if !is_signal && !exciters.iter().any(|known| known == name) {
                 exciters.push(name.to_owned());
@@ -185,30 +185,30 @@ impl ChannelLines {
                         u: u[bin] / excites[at],
                         inputs: inputs.iter().map(|x| x[bin] / excites[at]).collect(),
                     };
-                    let mut beside: Vec<usize> = (1..u.len()).filter(|bin| !is_line(*bin)).collect();
-                    beside.sort_by_key(|bin| bin.abs_diff(at));
-                    beside.truncate(NEIGHBOURS);
-                    let beside = beside.into_iter().map(over).collect();
+                    let mut neighbours: Vec<usize> = (1..u.len()).filter(|bin| !is_line(*bin)).collect();
+                    neighbours.sort_by_key(|bin| bin.abs_diff(at));
+                    neighbours.truncate(NEIGHBOURS);
+                    let neighbours = neighbours.into_iter().map(over).collect();
                     let omega = std::f64::consts::TAU * line as f64 / span_s;
-                    self.put(exciter, omega, over(at), beside);
+                    self.put(exciter, omega, over(at), neighbours);
                 }
             }
         }
         Some(())
     }
 
-    fn put(&mut self, exciter: usize, omega_rad_s: f64, run: Coefficients, beside: Vec<Coefficients>) {
+    fn put(&mut self, exciter: usize, omega_rad_s: f64, run: Coefficients, neighbours: Vec<Coefficients>) {
         let known = |line: &&mut Line| line.exciter == exciter && (line.omega_rad_s / omega_rad_s - 1.0).abs() < 1e-4;
         match self.lines.iter_mut().find(known) {
             Some(line) => {
                 line.runs.push(run);
-                line.beside.push(beside);
+                line.neighbours.push(neighbours);
             }
             None => self.lines.push(Line {
                 exciter,
                 omega_rad_s,
                 runs: vec![run],
-                beside: vec![beside],
+                neighbours: vec![neighbours],
                 variance: f64::NAN,
             }),
         }
@@ -226,20 +226,20 @@ impl ChannelLines {
             let power = |bins: &Vec<Coefficients>| {
                 bins.iter().map(|bin| bin.left(&h).norm_sqr()).sum::<f64>() / bins.len().max(1) as f64
             };
-            let beside = line.beside.iter().map(power).sum::<f64>() / (n * n);
-            (of_runs, beside)
+            let neighbours = line.neighbours.iter().map(power).sum::<f64>() / (n * n);
+            (of_runs, neighbours)
         };
         let all: Vec<(Option<f64>, f64)> = self.lines.iter().map(of).collect();
         let mut ratios: Vec<f64> = (all.iter())
-            .filter_map(|(of_runs, beside)| Some((*of_runs)? / beside))
+            .filter_map(|(of_runs, neighbours)| Some((*of_runs)? / neighbours))
             .filter(|r| r.is_finite())
             .collect();
         let excess = match upper_median(&mut ratios) {
             Some(median) if self.runs >= FEWEST_RUNS => median.max(1.0),
             _ => 1.0,
         };
-        for (line, (of_runs, beside)) in self.lines.iter_mut().zip(all) {
-            line.variance = moderated(line.runs.len(), of_runs, beside, excess);
+        for (line, (of_runs, neighbours)) in self.lines.iter_mut().zip(all) {
+            line.variance = moderated(line.runs.len(), of_runs, neighbours, excess);
         }
     }
 }
@@ -249,7 +249,7 @@ impl ChannelLines {
 pub(super) struct ChannelCriterion {
     lines: Arc<ChannelLines>,
     layout: FamilyLayout,
-    /// Which of the inputs beside the error each channel of the layout is.
+    /// Which of the further inputs each channel of the layout is.
     places: Vec<usize>,
     /// How far ahead each of them is taken, s.
     leads_s: Vec<f64>,
@@ -295,7 +295,7 @@ impl ChannelMinimum {
 /// A channel with its form, as a fit at the lines has it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct InForm {
-    /// Which of the inputs beside the error.
+    /// Which of the further inputs.
     pub index: usize,
     pub form: Form,
     pub lead_s: f64,
@@ -363,7 +363,7 @@ impl AtChannelLines<'_> {
         Arc::new(lines)
     }
 
-    /// The responses of a fit of these forms to the error and to so many inputs beside it.
+    /// The responses of a fit of these forms to the error and to this number of further inputs.
     fn responses(
         &self,
         (form, channels): (Form, &[InForm]),
@@ -442,7 +442,7 @@ impl ChannelCriterion {
     fn grid(&self) -> Vec<Vec<f64>> {
         let (form, muscles) = (self.layout.form, self.layout.neuromuscular);
         let of_operator = &self.limits[..self.layout.operator_elements()];
-        let mut grid = coordinates::start_grid(form, muscles, of_operator, Grid::Usual);
+        let mut grid = coordinates::start_grid(form, muscles, of_operator, Grid::Default);
         for channel in &self.layout.channels {
             let coordinates = channel.form.coordinates(muscles);
             let mut whole = vec![(0.0, 0.0); coordinates.len()];
@@ -450,7 +450,7 @@ impl ChannelCriterion {
             own.iter()
                 .zip(&channel.limits)
                 .for_each(|(&i, limit)| whole[i] = *limit);
-            let all = coordinates::start_grid(channel.form, muscles, &whole, Grid::Usual);
+            let all = coordinates::start_grid(channel.form, muscles, &whole, Grid::Default);
             let mut points: Vec<Vec<f64>> = (all.iter()).map(|x| own.iter().map(|&i| x[i]).collect()).collect();
             points.dedup();
             grid = grid
@@ -587,7 +587,7 @@ impl Objective for ChannelCriterion {
     }
 }
 
-/// Whether every input beside the error has lines of its own, and something else has lines too: then no form is needed
+/// Whether every further input has lines of its own, and something else has lines too: then no form is needed
 /// to tell the responses apart.
 pub(super) fn tells_apart(lines: Option<&ChannelLines>, channels: &[String]) -> bool {
     lines.is_some_and(|lines| {

@@ -1,4 +1,4 @@
-//! What a person sees or feels besides the error: a target with its future, the output of the machine, its motion.
+//! Further inputs of a person, in addition to the error: a target with its future, the output of the machine, its motion.
 //!
 //! `u = Y e + sum_i Y_i x_i + (C/D) eps`: a human is a multichannel controller (D. T. McRuer and H. R. Jex, *IEEE
 //! Trans. Human Factors in Electronics* 8 (1967) 231-249, section II; M. Mulder et al., *IEEE Trans. Human-Machine
@@ -32,7 +32,7 @@ use super::{
     estimated::Errors,
     intersample::Intersample,
     layout::ChannelInLayout,
-    parameter::{Known, Parameter},
+    parameter::{CoordinateEstimate, Parameter},
     prediction::{NoiseOrders, Prediction},
     prediction_fit::PredictionFit,
     prior::OperatorPrior,
@@ -67,7 +67,7 @@ const POINTS: usize = 24;
 /// Longest delay of a channel, s, behind what is shown first.
 const LONGEST_DELAY_S: f64 = 0.8;
 
-/// What a channel beside the error is to the person.
+/// Role of a further input for the person.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ChannelRole {
@@ -76,7 +76,7 @@ pub enum ChannelRole {
     Feedforward,
     /// Motion of the machine that they feel.
     Motion,
-    /// The output of the machine that they see beside the error.
+    /// The output of the machine, which they see in addition to the error.
     Output,
 }
 
@@ -86,7 +86,7 @@ hoid_model::named_choice!(ChannelRole, "role of a channel", 3, {
     Output => "output",
 });
 
-/// A channel beside the error, as it is asked for.
+/// A further input, as requested.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeenChannel {
     /// Name of the channel in the records.
@@ -159,7 +159,7 @@ impl FromStr for SeenChannel {
     }
 }
 
-/// What was found of a channel beside the error.
+/// Results of a further input.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ChannelFit {
     /// Name of the channel.
@@ -673,7 +673,7 @@ impl<'s> Seen<'s> {
                 let prior = OperatorPrior::population().of_muscles();
                 let points = &responses[k + 1];
                 let criterion = ResponseCriterion::new(form, neuromuscular, points, &prior, range, sampling);
-                let Ok(found) = criterion.fit_from_grid(search, Grid::Usual) else {
+                let Ok(found) = criterion.fit_from_grid(search, Grid::Default) else {
                     continue;
                 };
                 let limits = coordinates::limits(form, neuromuscular, range, sampling.0);
@@ -699,7 +699,7 @@ impl<'s> Seen<'s> {
         Ok(all)
     }
 
-    /// The forms of the channels by prediction error, beside this form of the operator from these coordinates: leaves in
+    /// The forms of the channels by prediction error, with this form of the operator from these coordinates: leaves in
     /// the prediction those that have a response, and returns what was compared.
     ///
     /// # Errors
@@ -773,7 +773,7 @@ impl<'s> Seen<'s> {
     }
 }
 
-/// A channel beside the error in one form: what a prediction needs of it.
+/// A further input in one form, for a prediction.
 #[derive(Debug, Clone)]
 pub(super) struct Channel<'a> {
     /// Which of the channels that were asked for.
@@ -818,7 +818,7 @@ pub(super) fn with_responses(
         };
         let covariance = errors.covariances.as_ref().map(of);
         let limits: Vec<(f64, f64)> = places.iter().map(|&i| layout.limits()[i]).collect();
-        let known = Known {
+        let known = CoordinateEstimate {
             operator: &operator,
             covariance: covariance.as_deref(),
             prior_share: &vec![0.0; places.len()],
@@ -856,7 +856,7 @@ pub(super) fn with_responses(
     Ok(compared)
 }
 
-/// u of a record without the responses to channels beside the error, from rest.
+/// u of a record without the responses to the further inputs, from rest.
 ///
 /// # Errors
 /// [`IdentError`] for a record without one of them.
@@ -905,7 +905,7 @@ mod tests {
     };
 
     use super::*;
-    use crate::{family::FamilyEstimator, judgement::other_inputs};
+    use crate::{diagnostics::other_inputs, family::FamilyEstimator};
 
     const TS: f64 = 0.02;
 
@@ -936,8 +936,8 @@ mod tests {
         let ts = SampleTime::new(TS).unwrap();
         let n = 4000;
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let own = operator.hold(ts).unwrap();
-        let of_target = target.map(|target| target.hold(ts).unwrap());
+        let own = operator.zoh(ts).unwrap();
+        let of_target = target.map(|target| target.zoh(ts).unwrap());
         let shown: Vec<f64> = (0..n + preview)
             .map(|k| sines(&[3, 7, 13, 19, 31, 43, 61], k as f64 * TS))
             .collect();
@@ -1049,7 +1049,8 @@ mod tests {
         let one_input = one.fit(std::slice::from_ref(&record)).unwrap();
         let said = other_inputs::of_family(&one, &one_input, std::slice::from_ref(&record));
         assert!(
-            said.iter().any(|f| f.kind == "other-input" && f.words.contains("to r")),
+            said.iter()
+                .any(|f| f.kind == "other-input" && f.message.contains("to r")),
             "{said:?}"
         );
         let one = one_input;

@@ -1,14 +1,14 @@
-//! Which forms the data leave, and which of them stands in front.
+//! Forms that the data do not refute, and the best of them.
 //!
 //! Each form has Akaike's criterion, `chi^2 + 2 p` at the lines of an excitation, or `n ln V/kappa + 2 p` of the
-//! prediction error, kappa the inflation of variances; with little noise Schwarz's ([`super::comparison`]). Estimates are averaged over forms by their weights
-//! ([`super::mixture`]); parameters have the names of the form in front, the simplest within 2 of the least
-//! (K. P. Burnham and D. R. Anderson, *Model Selection and Multimodel Inference*, 2002, section 2.6: no evidence
-//! against it).
+//! prediction error, kappa the inflation of variances; with little noise Schwarz's ([`super::comparison`]). Estimates
+//! are averaged over forms by their weights ([`super::mixture`]); parameters have the names of the best form, the
+//! simplest within 2 of the least (K. P. Burnham and D. R. Anderson, *Model Selection and Multimodel Inference*, 2002,
+//! section 2.6: no evidence against it).
 
 use hoid_model::Form;
 
-/// What a form is judged by.
+/// Criterion for a form.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FormFigures {
     /// The form.
@@ -18,7 +18,7 @@ pub struct FormFigures {
     /// Akaike's criterion: `chi^2 + 2 p` at the lines, or `n ln V/kappa + 2 p`; with little noise Schwarz's, `ln n` in
     /// place of 2.
     pub criterion: Option<f64>,
-    /// Weight in what is averaged over forms; zero for a form that the data cannot determine, or refute.
+    /// Weight in averages over forms; zero for a form that the data cannot determine, or refute.
     pub weight: f64,
     /// chi^2 at the lines of held-out runs, each by the fit to the others, summed over runs.
     pub held_out: Option<f64>,
@@ -26,24 +26,25 @@ pub struct FormFigures {
     pub chi_squared: Option<f64>,
     /// Its degrees of freedom.
     pub degrees_of_freedom: Option<usize>,
-    /// True when the prediction error search converged off the border of what is sought.
+    /// True when the prediction error search converged off the border of the search range.
     pub converged: bool,
 }
 
-/// Difference of Akaike's criterion that is no evidence.
+/// Difference of Akaike's criterion that is not evidence.
 const NO_EVIDENCE: f64 = 2.0;
 /// Weight below which a form is left out: its part in a mean is less than its error.
 const LEAST_WEIGHT: f64 = 0.02;
-/// Most forms that are averaged.
+/// Largest number of forms that are averaged.
 const MOST_FORMS: usize = 4;
 
-/// The form in front and the weight of each, from their criteria, simplest form first; `None` for a form that
-/// does not count. No form for no criterion.
+/// The best form and the weight of each, from their criteria, simplest form first; `None` for a form that does not
+/// count. No form for no criterion.
 pub(super) fn weigh(criteria: &[Option<f64>]) -> Option<(usize, Vec<f64>)> {
     let least = criteria.iter().flatten().copied().min_by(f64::total_cmp)?;
     let front = criteria
         .iter()
         .position(|c| c.is_some_and(|c| c - least <= NO_EVIDENCE))?;
+    // Akaike weights, exp(-Delta/2) (Burnham and Anderson 2002, section 2.9).
     let mut weights: Vec<f64> = (criteria.iter())
         .map(|c| c.map_or(0.0, |c| (0.5 * (least - c)).exp()))
         .collect();

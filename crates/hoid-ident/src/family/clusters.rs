@@ -36,7 +36,7 @@ pub(super) fn quantile(clusters: usize) -> f64 {
     StudentsT::new(0.0, 1.0, freedom(clusters)).map_or(1.96, |t| t.inverse_cdf(0.975))
 }
 
-/// What the clusters are.
+/// Definition of the clusters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum ClusterKind {
     /// Each record is one.
@@ -74,6 +74,7 @@ impl Clusters {
             let psi = of_theta.jacobian(&mapped.theta, 0, workspace);
             let positions = criterion.layout.positions(record);
             let n = residuals.len();
+            // Blocks longer than the memory of loop and noise have nearly independent scores.
             let wanted = match kind {
                 ClusterKind::Runs => 1,
                 ClusterKind::Blocks => BLOCKS.div_ceil(records).min(n / shortest.max(1)).max(1),
@@ -90,6 +91,7 @@ impl Clusters {
                         gram[j * q + i] = gram[i * q + j];
                     }
                 }
+                // Chain rule: psi_eta = psi_theta dtheta/deta, summed into the elements of eta that the record uses.
                 let (mut g, mut big) = (vec![0.0; p], vec![0.0; p * p]);
                 for (column, &place) in mapped.columns.iter().zip(positions) {
                     g[place] += dot(column, &scores);

@@ -1,4 +1,4 @@
-//! What the forms that were tried are worth: what [`super::choice`] weighs them by.
+//! Reliability of the forms that were tried: what [`super::choice`] weighs them by.
 //!
 //! Where an excitation was recorded, forms are compared at its lines; else by their prediction
 //! errors, all in units of one inflation kappa, so that a form does not look well by its own large
@@ -11,32 +11,32 @@ use hoid_numerics::statistics::upper_median;
 use super::{
     choice::{FormFigures, weigh},
     covariances::{self, Covariances},
-    judgement::MOST_DAMPED,
+    diagnostics::MOST_DAMPED,
     line_fit::LineFit,
     prediction::Prediction,
     prediction_fit::PredictionFit,
 };
 use crate::IdentError;
 
-/// Difference of criteria of two forms that are one.
+/// Difference of criteria at which two forms count as equal.
 const THE_SAME: f64 = 0.05;
 /// Sums of squares over another, without noise, that are no worse.
 const NO_BETTER: f64 = 1.1;
 /// Standard errors from zero of a gain that is known.
 const LEAST_ERRORS: f64 = 2.0;
 
-/// A form with what was found of it.
+/// A form with the findings of it.
 pub(super) struct Tried<'a> {
     pub form: Form,
     pub lines: Option<LineFit>,
     pub fit: Result<PredictionFit<'a>, IdentError>,
 }
 
-/// What all forms are worth, and which of them stands in front.
+/// Reliability of all forms, and which of them is in front.
 pub(super) struct Comparison {
-    /// Place of the form in front; `None` where none could be fitted.
+    /// Place of the best form; `None` if none could be fitted.
     pub front: Option<usize>,
-    /// Of each form, in their order.
+    /// For each form, in their order.
     pub figures: Vec<FormFigures>,
 }
 
@@ -102,8 +102,8 @@ fn retain(counting: &mut [Option<f64>], is_good: impl Fn(usize) -> bool) {
     }
 }
 
-/// True where a combination of parameters is open, or the gain is not told from zero: the other parameters of the
-/// form are then shares of nothing, and a form with fewer of them says the same.
+/// True if a combination of parameters is open, or the gain is not distinguished from zero: the other parameters of the
+/// form are then shares of nothing, and a form with fewer of them states the same.
 fn is_open(fit: &PredictionFit<'_>) -> bool {
     let p = fit.parameters();
     let known = |covariances: Covariances| {
@@ -118,7 +118,7 @@ fn is_open(fit: &PredictionFit<'_>) -> bool {
     fit.ridge > 0.0 || !covariances::covariances(fit).is_some_and(known)
 }
 
-/// True where the neuromuscular poles have become two lags, by prediction error or at the lines.
+/// True if the neuromuscular poles have become two lags, by prediction error or at the lines.
 fn has_lost_its_muscles(tried: &Tried<'_>) -> bool {
     let lags = |operator: &FamilyOperator| operator.neuromuscular().is_some_and(|(_, zeta)| zeta > MOST_DAMPED);
     let of_fit = tried
@@ -140,7 +140,7 @@ fn common_inflation(tried: &[Tried<'_>]) -> f64 {
 fn criteria(tried: &[Tried<'_>], prediction: &Prediction<'_>) -> Vec<Option<f64>> {
     let little_noise = prediction.little_noise.is_some();
     let inflation = if little_noise {
-        // That of others is their misfit.
+        // The value for others is their misfit.
         let fits = tried.iter().filter_map(|t| t.fit.as_ref().ok());
         let least = fits.min_by(|a, b| a.loss.total_cmp(&b.loss));
         least.map_or(1.0, |fit| fit.inflation)

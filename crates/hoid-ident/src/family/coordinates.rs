@@ -1,4 +1,4 @@
-//! Within what the coordinates of an operator are sought.
+//! Within what the coordinates of an operator are searched for.
 
 use hoid_model::{
     SampleTime,
@@ -13,7 +13,7 @@ pub(super) const LAG_RATE: (f64, f64) = (1e-3, 30.0);
 const LARGEST_DROOP: f64 = 10.0;
 /// Bounds of the damping ratio: nearly undamped below, two separate lags above.
 const DAMPING: (f64, f64) = (0.02, 5.0);
-/// Lowest neuromuscular frequency, rad/s: below, it is no muscle that is seen.
+/// Lowest neuromuscular frequency, rad/s: below, it is not a muscle that is seen.
 const LOWEST_FREQUENCY: f64 = 2.0;
 /// Largest omega_nm as a part of pi/Ts.
 const HIGHEST_FREQUENCY: f64 = 0.95;
@@ -41,8 +41,8 @@ pub(crate) fn limits(
 /// How near to each other the points are from which searches start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Grid {
-    /// For people: the prior holds their neuromuscular system near to what is usual.
-    Usual,
+    /// For people: the prior holds their neuromuscular system near to the default.
+    Default,
     /// For a response that is known exactly, of whom it may be.
     Dense,
 }
@@ -100,7 +100,7 @@ mod tests {
         for form in Form::ALL {
             for neuromuscular in [true, false] {
                 let limits = limits(form, neuromuscular, (0.05, 0.6), SampleTime::HUNDREDTH);
-                let grid = start_grid(form, neuromuscular, &limits, Grid::Usual);
+                let grid = start_grid(form, neuromuscular, &limits, Grid::Default);
                 assert!(!grid.is_empty());
                 for start in grid {
                     assert_eq!(start.len(), limits.len());

@@ -39,9 +39,9 @@ pub(super) const BAND_RAD_S: [f64; 5] = [0.7, 1.3, 2.4, 4.3, 8.0];
 pub(super) struct Covariances {
     pub clustered: Vec<f64>,
     pub model_based: Vec<f64>,
-    /// Variances that single elements have besides. They are no part of the covariance: the
+    /// Variances that single elements have in addition. They are not a part of the covariance: the
     /// response is known better than they are, since the elements err together.
-    pub besides: Vec<f64>,
+    pub extra_variance: Vec<f64>,
 }
 
 impl Covariances {
@@ -55,15 +55,15 @@ impl Covariances {
     /// Adds the bias that another estimate shows: `d d'`, d the difference to it.
     ///
     /// The prediction error fit is biased where its noise model is wrong, by an amount that no
-    /// scatter shows; an estimate that does not rest on that noise model tells of it. What errors
-    /// are made of is then the mean squared error, variance and squared bias, with d for the bias:
-    /// all of it, and not the `d d'/3` of a truth that may lie anywhere between the two, since the
-    /// bias is on one side. Elements at a bound stay as they are.
+    /// scatter shows; an estimate that does not rest on that noise model reports it. The
+    /// errors are then built from the mean squared error, variance plus squared bias, with d for the bias: all of
+    /// it, and not the `d d'/3` of a truth that may lie anywhere between the two, since the bias is
+    /// on one side. Elements at a bound stay as they are.
     ///
     /// Errors are to first order, and the other estimate may be far along a ridge of the criterion,
     /// as a gain and a lag that grow together are: `J d`, J the gradient of the response, is then no
     /// difference of responses. There the [difference](responding) that explains that of the
-    /// responses stands in place of d.
+    /// responses is in place of d.
     pub fn add_bias(&mut self, fit: &PredictionFit<'_>, other: &[f64]) {
         let p = fit.parameters();
         let mut difference = vec![0.0; p];
@@ -82,21 +82,28 @@ impl Covariances {
     }
 
     /// Adds `weight d^2` to the variances of single elements, of those that it counts for.
-    pub fn add_besides(&mut self, fit: &PredictionFit<'_>, other: &[f64], weight: f64, counts: impl Fn(usize) -> bool) {
+    pub fn add_extra_variance(
+        &mut self,
+        fit: &PredictionFit<'_>,
+        other: &[f64],
+        weight: f64,
+        counts: impl Fn(usize) -> bool,
+    ) {
         for (place, d) in differences(fit, other) {
             if counts(place) {
-                self.besides[place] += weight * d * d;
+                self.extra_variance[place] += weight * d * d;
             }
         }
     }
 
-    /// Intervals by profile likelihood know of kappa alone: where variances are larger, their ends
-    /// move out in the ratio of the standard errors.
+    /// Intervals by profile likelihood include kappa alone: if variances are larger, their ends are
+    /// moved out in the ratio of the standard errors.
     pub fn widen(&self, fit: &PredictionFit<'_>, profiles: &mut [Option<(f64, f64)>]) {
         let p = fit.parameters();
         for (i, profile) in profiles.iter_mut().enumerate() {
             let Some((low, high)) = profile else { continue };
-            let ratio = (self.clustered[i * p + i] + self.besides[i]) / (fit.inflation * self.model_based[i * p + i]);
+            let ratio =
+                (self.clustered[i * p + i] + self.extra_variance[i]) / (fit.inflation * self.model_based[i * p + i]);
             if ratio.is_finite() && ratio > 1.0 {
                 let (x, (least, most)) = (fit.eta()[i], fit.criterion.limits[i]);
                 *low = (x - (x - *low) * ratio.sqrt()).max(least);
@@ -127,13 +134,14 @@ fn differences(fit: &PredictionFit<'_>, other: &[f64]) -> Vec<(usize, f64)> {
         .collect()
 }
 
-/// By how much `J d` may exceed the difference of two responses before it stands for none.
+/// Amount by which `J d` may exceed the difference of two responses before it does not correspond
+/// to any.
 const MOST_OVERSTATED: f64 = 2.0;
 /// Part of its diagonal that makes `J' J` regular.
 const RIDGE: f64 = 1e-9;
 
-/// The least squares solution of `J d = H - H_other` over the band of manual control and an octave beside it,
-/// relative to |H|; `None` where the differences of the elements explain it, or elements belong to single records.
+/// The least squares solution of `J d = H - H_other` over the band of manual control and an octave next to it, relative
+/// to |H|; `None` if the differences of the elements explain it, or elements belong to single records.
 fn responding(fit: &PredictionFit<'_>, other: &[f64], differences: &[(usize, f64)]) -> Option<Vec<(usize, f64)>> {
     let layout = fit.layout();
     let places = &layout.positions(0)[..layout.coordinates()];
@@ -176,7 +184,7 @@ fn explaining(here: &FamilyOperator, there: &FamilyOperator, coordinates: &[usiz
     solve_symmetric(&total.gram, &total.descent)
 }
 
-/// Inverse of `G + P` by rows, over all elements that were sought.
+/// Inverse of `G + P` by rows, over all elements that were searched for.
 ///
 /// Where one rests at its bound, as `1/T_I = 0`, the others would look better known than they are
 /// if it were held there: the truth may lie off the bound, and a lead and a gain move with it.
@@ -193,7 +201,7 @@ fn inverse(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
     Some(inverse)
 }
 
-/// True where the data and the prior determine all parameters.
+/// True if the data and the prior determine all parameters.
 pub(super) fn is_regular(fit: &PredictionFit<'_>) -> bool {
     inverse(fit).is_some()
 }
@@ -231,14 +239,14 @@ pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
     Some(Covariances {
         clustered,
         model_based,
-        besides: vec![0.0; p],
+        extra_variance: vec![0.0; p],
     })
 }
 
 /// Adds `factor H^-1 L H^-1`.
 fn add_lines_part(covariance: &mut [f64], factor: f64, fit: &PredictionFit<'_>, inverse: &[f64]) {
     let p = fit.parameters();
-    let l = fit.criterion.beside_at(fit.eta(), &mut Workspace::default()).gram;
+    let l = fit.criterion.additional_at(fit.eta(), &mut Workspace::default()).gram;
     let (inverse, l) = (
         DMatrix::from_row_slice(p, p, inverse),
         DMatrix::from_row_slice(p, p, &l),

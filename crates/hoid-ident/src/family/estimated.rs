@@ -1,11 +1,11 @@
-//! The operator of a record with its errors, out of eta and what is known of it.
+//! The operator of a record with its errors, out of eta and the prior knowledge of it.
 
 use hoid_model::{FamilyOperator, NotConvertible, PolynomialModel, Structure, operator_family::Coordinate};
 
 use super::{
     clusters::{ClusterKind, quantile},
     covariances::{self, Covariances},
-    parameter::{Known, Parameter},
+    parameter::{CoordinateEstimate, Parameter},
     prediction_fit::PredictionFit,
     profile::profile_interval,
     result::{OperatorInForm, OperatorOfRecord, WeighedForm, title},
@@ -19,13 +19,13 @@ use crate::{
 
 /// How well eta is known.
 pub(super) struct Errors {
-    /// `None` where the information is singular.
+    /// `None` if the information is singular.
     pub covariances: Option<Covariances>,
     /// Intervals by profile likelihood, where there are such.
     pub profiles: Vec<Option<(f64, f64)>>,
     /// Quantile of Student's distribution for 95 %.
     quantile: f64,
-    /// What the gain of the person varies by beyond the runs, as a part of it.
+    /// Variation of the gain of the person beyond the runs, as a part of it.
     pub run_to_run: f64,
 }
 
@@ -65,8 +65,8 @@ impl Errors {
     }
 }
 
-/// Intervals by profile likelihood of the elements whose interval reaches the end of what is
-/// sought: there the criterion is no parabola.
+/// Intervals by profile likelihood of the elements whose interval reaches the end of the search
+/// range: there the criterion is not a parabola.
 fn profiles(
     fit: &PredictionFit<'_>,
     covariances: Option<&Covariances>,
@@ -112,15 +112,15 @@ impl Estimated {
         let covariances = errors.covariances.as_ref();
         let covariance = covariances.map(|c| part(&c.clustered));
         let model_based = covariances.map(|c| part(&c.model_based));
-        // Of single parameters: with what they are uncertain by besides.
+        // Errors of single parameters, with their additional uncertainty.
         let of_parameters = covariances.zip(covariance.clone()).map(|(c, mut of_all)| {
             for (i, &place) in places.iter().enumerate() {
-                of_all[i * places.len() + i] += c.besides[place];
+                of_all[i * places.len() + i] += c.extra_variance[place];
             }
             of_all
         });
         let limits: Vec<(f64, f64)> = places.iter().map(|&i| layout.limits()[i]).collect();
-        let known = Known {
+        let known = CoordinateEstimate {
             operator: &operator,
             covariance: of_parameters.as_deref(),
             prior_share: &places
@@ -154,7 +154,7 @@ fn prior_share(fit: &PredictionFit<'_>, model_based: Option<&[f64]>, places: &[u
     let precision = penalty.curvature(fit.eta()) / fit.innovation_variance;
     let variance = c[i * places.len() + i];
     let ((low, high), x) = (fit.criterion.limits[place], fit.eta()[place]);
-    // At a bound nothing is known of it but the bound.
+    // At a bound nothing is known about it but the bound.
     if variance > 0.0 && low < x && x < high {
         (variance * precision).min(1.0)
     } else {
@@ -219,7 +219,7 @@ pub(super) fn operator_of(
     })
 }
 
-/// What has the name of a parameter in each of the forms, averaged.
+/// Average over the forms of the parameter with the same name.
 fn averaged(own: &Parameter, weighed: &[WeighedForm], record: usize, clusters: usize) -> Option<Parameter> {
     let each = weighed.iter().filter_map(|form| {
         let mut all = form.of(record)?.parameters.iter();

@@ -7,7 +7,7 @@ use hoid_model::{Detrend, Form, Record, Structure};
 
 use super::{
     arx_response::ArxResponse,
-    assembly::{AtLines, Beside, Chosen},
+    assembly::{AtLines, Chosen, OtherForm},
     channel_lines::{AtChannelLines, ChannelLines, InForm},
     channels::{ChannelFit, Seen, SeenChannel},
     comparison::{Comparison, Tried},
@@ -36,7 +36,7 @@ const MOST_NOISE_PAIRS: usize = 60;
 /// Why nothing is fitted to the lines where there is little noise.
 const TOO_LITTLE_NOISE: &str = "there is less noise than leakage";
 
-/// Where the searches of a form begin.
+/// Where the searches of a form start.
 struct Start {
     form: Form,
     /// The fit at the lines.
@@ -45,12 +45,12 @@ struct Start {
     coordinates: Vec<Vec<f64>>,
 }
 
-/// Where the searches of all forms begin.
+/// Starts of the searches of all forms.
 struct Begun<'a> {
     prediction: Prediction<'a>,
     starts: Vec<Start>,
     noise: NoiseOrders,
-    /// The channels beside the error, as they were compared.
+    /// The further inputs, with the forms that were compared.
     channels: Vec<ChannelFit>,
     channel_lines: Option<Arc<ChannelLines>>,
     /// The channels with a response, at the lines.
@@ -64,7 +64,7 @@ impl FamilyEstimator {
     ///
     /// # Errors
     /// [`IdentError`] for records or options without meaning, and where no form could be fitted.
-    /// What makes a result doubtful is part of it ([`FamilyFit::verdict`]).
+    /// Findings that make a result doubtful is part of it ([`FamilyFit::verdict`]).
     pub fn fit(&self, records: &[Record]) -> Result<FamilyFit, IdentError> {
         let described = self.excitation.as_ref().map(|channel| {
             let options = DescriptionOptions {
@@ -74,16 +74,16 @@ impl FamilyEstimator {
             };
             describe_runs(records, &options).map(|found| found.function)
         });
-        self.fit_beside(records, described)
+        self.fit_with_response(records, described)
     }
 
     /// As [`FamilyEstimator::fit`], with a describing function that was made elsewhere, or the
-    /// reason why there is none: of other spans of the same runs, or with an offset that is no
+    /// reason why there is none: of other spans of the same runs, or with an offset that is not a
     /// whole number of samples.
     ///
     /// # Errors
     /// As [`FamilyEstimator::fit`].
-    pub fn fit_beside(
+    pub fn fit_with_response(
         &self,
         records: &[Record],
         describing: Option<Result<DescribingFunction, IdentError>>,
@@ -129,9 +129,9 @@ impl FamilyEstimator {
         let weight = figures[front].weight;
         let Tried { lines, fit, .. } = tried.remove(front);
         let weights = figures.iter().enumerate().filter(|(i, _)| *i != front);
-        let beside = tried.into_iter().zip(weights).filter(|(_, (_, f))| f.weight > 0.0);
-        let beside = beside.map(|(tried, (_, figures))| {
-            Ok(Beside {
+        let others = tried.into_iter().zip(weights).filter(|(_, (_, f))| f.weight > 0.0);
+        let others = others.map(|(tried, (_, figures))| {
+            Ok(OtherForm {
                 fit: tried.fit?,
                 lines: tried.lines,
                 weight: figures.weight,
@@ -147,7 +147,7 @@ impl FamilyEstimator {
                 fit: lines,
                 why_none: no_lines,
             },
-            beside: beside.collect::<Result<_, IdentError>>()?,
+            others: others.collect::<Result<_, IdentError>>()?,
             forms: figures,
             prediction: &prediction,
             channels,
@@ -196,7 +196,7 @@ impl FamilyEstimator {
         }
     }
 
-    /// Where the searches of all forms begin: their starts, the orders of the noise, the channels beside the error that have
+    /// Starts of the searches of all forms: their starts, the orders of the noise, the further inputs that have
     /// a response.
     fn begin<'a>(
         &self,
@@ -233,7 +233,7 @@ impl FamilyEstimator {
         };
         let mut starts = Vec::new();
         for &form in &forms {
-            starts.push(self.start(form, lines.as_ref(), (&response, Grid::Usual), &prediction)?);
+            starts.push(self.start(form, lines.as_ref(), (&response, Grid::Default), &prediction)?);
         }
         let (mut channels, mut in_form) = (Vec::new(), Vec::new());
         if let Some(lines) = &channel_lines {
@@ -293,7 +293,7 @@ impl FamilyEstimator {
             return Err(IdentError::BadOption {
                 option: "the forms of the operator".to_owned(),
                 found: self.forms.iter().map(|f| f.name()).collect::<Vec<_>>().join(", "),
-                expected: "a form that is no pure derivative without neuromuscular dynamics: gain, lag or lead-lag"
+                expected: "a form that is not a pure derivative without neuromuscular dynamics: gain, lag or lead-lag"
                     .to_owned(),
             });
         }
@@ -335,7 +335,7 @@ impl FamilyEstimator {
     }
 
     /// Where there is little noise: the records over the course of the error that they show, with a level where one was
-    /// taken out, and the starts where output errors end. `None` where there is more.
+    /// taken out, and the starts where output errors end. `None` if there is more.
     fn with_little_noise<'a>(
         &self,
         smooth: &Prediction<'_>,

@@ -7,17 +7,16 @@
 //!
 //! `g(x) = Z' eps(x) + sum_i w_i g_i'(x) (m_i - g_i(x))`,  `eps(x) = D (u - Y(x) e)`,  `Z = D dY/dx xi`,
 //!
-//! with xi the part of e that follows the excitation ([`crate::iv`]), D the autoregression of what Y
-//! leaves of u, and the second term the prior. Z and D belong to an auxiliary operator; for given Z
-//! and D, Newton's step is `(Z' Psi + P)^-1 g`, `Psi = D dY/dx e`, halved until `g' (Z'Z + P)^-1 g`
-//! falls; a coordinate that it drives out of what is sought goes to its bound.
+//! with xi the part of e that follows the excitation ([`crate::iv`]), D the autoregression of the part of u that Y
+//! leaves unexplained, and the second term the prior. Z and D belong to an auxiliary operator; for given Z and D,
+//! Newton's step is `(Z' Psi + P)^-1 g`, `Psi = D dY/dx e`, halved until `g' (Z'Z + P)^-1 g` falls; a coordinate that
+//! it drives out of the search range goes to its bound.
 //!
-//! **The auxiliary operator** is that of the fit at the lines, and where its instruments lead to no
-//! zero that of the prediction error fit, or the middle of both. RIV-BJ as it is usually written takes
-//! the last estimate: where the lines end below the neuromuscular resonance, estimates from two sets
-//! of instruments answer each other without end, each the other's auxiliary operator (with four
-//! in ten virtual people). Any auxiliary operator gives a consistent estimate, and the instruments of
-//! one that is held are the optimal ones but for its own error.
+//! **The auxiliary operator** is that of the fit at the lines, and where its instruments lead to no zero that of the
+//! prediction error fit, or the middle of both. RIV-BJ as it is usually written takes the last estimate: where the
+//! lines end below the neuromuscular resonance, estimates from two sets of instruments answer each other without end,
+//! each the other's auxiliary operator (with four in ten virtual people). Any auxiliary operator gives a consistent
+//! estimate, and the instruments of one that is held are the optimal ones except for its own error.
 //!
 //! Free polynomials have more to lose: their poles are not known, as the lag lies below the lines and
 //! the resonance above, and run to the unit circle. Here the prior keeps them.
@@ -27,9 +26,9 @@
 //! samples with the prediction error fit, but nothing of e that follows the remnant.
 //!
 //! **Errors.** x less its truth is `A^-1 Z' eps`, `A = Z' Psi + P`, to first order: the covariance is
-//! `kappa sigma^2 A^-1 Z'Z A^-T` with the kappa of the prediction error fit, and what the prior leaves
-//! open. Where most of e is the person's own remnant, instruments are weak and the first order is
-//! short: with virtual people, one in 24 had gain and lead five standard errors off.
+//! `kappa sigma^2 A^-1 Z'Z A^-T` with the kappa of the prediction error fit, and the part of the prior. Where most of e
+//! is the person's own remnant, instruments are weak and the first order is short: with virtual people, one in 24 had
+//! gain and lead five standard errors off.
 
 use std::ops::Range;
 
@@ -61,7 +60,7 @@ const HALVINGS: usize = 6;
 pub struct InstrumentalFit {
     /// The operator.
     pub operator: FamilyOperator,
-    /// Covariance of its coordinates by rows: by runs or blocks, with what the prior leaves open.
+    /// Covariance of its coordinates by rows: by runs or blocks, with the part of the prior.
     pub covariance: Option<Vec<f64>>,
     /// Order of the autoregression D.
     pub noise_order: usize,
@@ -98,10 +97,10 @@ struct Zero {
     steps: usize,
 }
 
-/// What the iteration needs at each of its points.
+/// Data of the iteration at each of its points.
 pub(super) struct Instrumental<'p, 'a> {
     prediction: &'p Prediction<'a>,
-    /// Of the prediction error fit: its prior, weighed as there, its limits, its clusters.
+    /// For the prediction error fit: its prior, weighed as there, its limits, its clusters.
     fit: &'p PredictionFit<'a>,
     inputs: Vec<NoiseFreeInput>,
     order: usize,
@@ -109,7 +108,7 @@ pub(super) struct Instrumental<'p, 'a> {
 
 impl<'p, 'a> Instrumental<'p, 'a> {
     /// # Errors
-    /// Those of the channel: it is missing, constant, or a signal of the loop.
+    /// The errors of the channel: it is missing, constant, or a signal of the loop.
     pub fn new(
         prediction: &'p Prediction<'a>,
         fit: &'p PredictionFit<'a>,
@@ -166,7 +165,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         &self.fit.criterion.limits[..self.fit.layout().coordinates()]
     }
 
-    /// D for what the operator leaves of u.
+    /// D for the part of u that the operator leaves unexplained.
     fn noise(&self, x: &[f64], workspace: &mut Workspace) -> Result<Vec<f64>, IdentError> {
         let layout = self.fit.layout();
         let left = self
@@ -245,7 +244,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         Ok(Held { z, d, products })
     }
 
-    /// `eps` and `Psi` of all records; `None` where there is no model.
+    /// `eps` and `Psi` of all records; `None` if there is no model.
     fn equation(&self, x: &[f64], d: &[f64], workspace: &mut Workspace) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
         let eta = [x, d].concat();
         let (mut eps, mut psi) = (Vec::new(), vec![Vec::new(); x.len()]);
@@ -357,7 +356,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         }
     }
 
-    /// `kappa sigma^2 A^-1 Z'Z A^-T`, and what the prior leaves open; zero at bounds.
+    /// `kappa sigma^2 A^-1 Z'Z A^-T`, and the part of the prior; zero at bounds.
     fn covariance(&self, x: &[f64], a: &DMatrix<f64>, products: &[f64], variance: f64) -> Option<Vec<f64>> {
         let p = x.len();
         let scale = variance * self.fit.inflation;
@@ -439,8 +438,8 @@ mod tests {
 
     #[test]
     fn the_truth_lies_within_its_errors() {
-        // Medians, as the first of these people has weak instruments (see above). That of twelve
-        // values of chi^2 has a standard error of 0.32 (1/(2 f sqrt(12)), f = 0.45 the density there).
+        // Medians, as the first of these people has weak instruments (see above). The value for twelve values of chi^2
+        // has a standard error of 0.32 (1/(2 f sqrt(12)), f = 0.45 the density there).
         let mut squares = [Vec::new(), Vec::new()];
         for number in 0..12 {
             let (person, records) = person(number);
@@ -506,8 +505,8 @@ mod tests {
         let (_, z) = method.equation(&minimum, &d, &mut workspace).unwrap();
         let products = z.iter().flat_map(|a| z.iter().map(move |b| dot(a, b))).collect();
         let of_held = method.held(&minimum, &mut workspace).unwrap();
-        // The autoregression of what is left of u is that of the fit but for what the prior moves,
-        // the instruments Psi but for the states before the record.
+        // The autoregression of the remainder of u is that of the fit except for what the prior
+        // moves, the instruments Psi except for the states before the record.
         for (own, of_fit) in of_held.d.iter().zip(&d) {
             assert!((own - of_fit).abs() < 2e-3, "{:?} {d:?}", of_held.d);
         }

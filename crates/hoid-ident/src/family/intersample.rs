@@ -1,10 +1,10 @@
-//! What the error does between its samples, which no sample says and the delay depends on.
+//! Intersample behaviour of the error, which no sample shows and the delay depends on.
 //!
 //! | name | the error | response of the samples to the operator's | tau_e |
 //! |---|---|---|---|
 //! | `zoh` | is held: a simulation or a display of the same rate | `sin(x)/x e^{-jx}` | as simulated |
 //! | `foh` | runs straight: logged from what is faster or continuous | `(sin(x)/x)^2` | Ts/2 longer |
-//! | `auto` | is smooth, and the delay is that of a held one | `(sin(x)/x)^2 e^{-jx}` | as behind a hold |
+//! | `auto` | is smooth, and the delay is that of a held one | `(sin(x)/x)^2 e^{-jx}` | as after a hold |
 //!
 //! with `x = omega Ts/2` (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, 1997, sections 3.2 and 3.4).
 //! `foh` and `auto` are one model with two names of its delay, so that no data decide between them. `zoh` differs from
@@ -13,7 +13,7 @@
 
 use hoid_model::{Complex64, FamilyOperator, ModelError, SampleTime, named_choice, operator_family::HeldFamily};
 
-/// What the error does between its samples.
+/// Intersample behaviour of the error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Intersample {
@@ -33,7 +33,7 @@ named_choice!(Intersample, "course between samples", 3, {
 });
 
 impl Intersample {
-    /// What the course of the error does to a sinusoid.
+    /// Response of the intersample behaviour of the error to a sinusoid.
     pub(super) fn response(self, omega_rad_s: f64, sample_time: SampleTime) -> Complex64 {
         let half = 0.5 * omega_rad_s * sample_time.s();
         let sinc = if half.abs() < 1e-8 { 1.0 } else { half.sin() / half };
@@ -72,8 +72,8 @@ impl Intersample {
         match (self, sample) {
             (Self::Auto, Some(sample)) => operator.interpolate_within(sample, sample_time),
             (Self::Auto, None) => operator.interpolate(sample_time),
-            (Self::Zoh, Some(sample)) => operator.hold_within(sample, sample_time),
-            (Self::Zoh, None) => operator.hold(sample_time),
+            (Self::Zoh, Some(sample)) => operator.zoh_within(sample, sample_time),
+            (Self::Zoh, None) => operator.zoh(sample_time),
             (Self::Foh, _) => {
                 let mut earlier = operator.coordinates().to_vec();
                 if let Some(delay) = earlier.last_mut() {

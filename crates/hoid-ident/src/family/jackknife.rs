@@ -1,4 +1,4 @@
-//! Covariances from what an estimate is without each of several parts, and from a prior.
+//! Covariances from the estimates without each of several parts, and from a prior.
 //!
 //! **The jackknife** over n estimates `x_(i)`, each without one part of the data, is
 //! `(n-1)/n sum (x_(i) - mean)(x_(i) - mean)'` (B. Efron and C. Stein, *Annals of Statistics* 9

@@ -1,10 +1,10 @@
-//! The prediction error fit with the lines of the excitation as measurements of the response beside it.
+//! The prediction error fit with the lines of the excitation as measurements of the response next to it.
 //!
 //! In a closed loop the prediction error fit is biased by as much as its noise model is wrong; the fit at the lines is
 //! not, and has larger errors. With H_P and H_L their responses, V_P and V_L the variances of these, the difference
-//! `d = (H_L - H_P)/H_P` has the variance `V_L - V_P` where nothing is wrong, for what is efficient is not correlated with
-//! it (J. A. Hausman, *Econometrica* 46 (1978) 1251-1271). If a bias of variance `tau^2` is in it besides, the part of d to
-//! go by is the one that leaves the least mean square,
+//! `d = (H_L - H_P)/H_P` has the variance `V_L - V_P` if nothing is wrong, for what is efficient is not correlated with
+//! it (J. A. Hausman, *Econometrica* 46 (1978) 1251-1271). If a bias of variance `tau^2` is in it besides, the part of
+//! d to go by is the one that leaves the least mean square,
 //!
 //! `s = tau^2/(tau^2 + V_L - V_P)`, `tau^2 = max(0, D - (V_L - V_P))`, so that `s = max(0, 1 - 1/q)`,
 //! `q = mean of |d|^2/(V_L - V_P)`
@@ -17,7 +17,8 @@
 //!
 //! `sum eps^2 + kappa sigma^2 w chi^2`, `w = s/(1 - s) V_L/V_P`:
 //!
-//! where one coordinate is left, its minimum is at s of the way. What the lines do not tell is left to the samples.
+//! with one coordinate, its minimum is at the share s of the way. What the lines do not determine is left to the
+//! samples.
 
 use std::{borrow::Cow, sync::Arc};
 
@@ -34,16 +35,16 @@ use super::{
     prior::OperatorPrior,
     response_fit::{MeasuredResponse, ResponseCriterion},
 };
-use crate::{criterion::Workspace, grey_box::objective::Beside, optimize::Objective};
+use crate::{criterion::Workspace, grey_box::objective::AdditionalTerm, optimize::Objective};
 
 /// Part of V_L that `V_L - V_P` is at least: both are estimates.
 const LEAST_DIFFERENCE: f64 = 0.25;
-/// Runs from which on their scatter tells the variances of the lines: what one run differs by may be chance.
+/// Runs from which on their scatter reports the variances of the lines: what one run differs by may be chance.
 const FEWEST_RUNS: usize = 3;
 /// Largest part of the way to the lines.
 const LARGEST_SHARE: f64 = 0.9;
 
-/// The lines that stand beside the samples.
+/// The lines that are used with the samples.
 pub(super) enum Lines<'d> {
     /// The response to the error.
     Response(LineData<'d>),
@@ -90,7 +91,7 @@ impl Lines<'_> {
     }
 }
 
-/// The fit with the lines beside it; `None` where both agree, or it has no end.
+/// The fit with the lines next to it; `None` where both agree, or it has no end.
 pub(super) fn with_lines<'a>(
     prediction: &Prediction<'a>,
     fit: &PredictionFit<'a>,
@@ -105,7 +106,7 @@ pub(super) fn with_lines<'a>(
     let excess = lines.reduced_chi_squared().unwrap_or(1.0).max(1.0);
     let weight = weight(fit, lines, excess)?;
     let mut criterion = fit.criterion.clone();
-    criterion.beside = Some(Beside {
+    criterion.additional = Some(AdditionalTerm {
         criterion: measured.criterion(layout, excess, prediction.delay_range_s),
         elements: layout.noise_begins(),
         weight: weight * fit.innovation_variance * fit.inflation,
@@ -116,7 +117,7 @@ pub(super) fn with_lines<'a>(
     Some(found)
 }
 
-/// w; `None` where it is zero, or a variance is not known.
+/// w; `None` if it is zero, or a variance is not known.
 fn weight(fit: &PredictionFit<'_>, lines: &LineFit, excess: f64) -> Option<f64> {
     let operator = fit.layout().operator(fit.eta(), 0).ok()?;
     let own = Covariances::of_operator(&covariances(fit)?.clustered, fit.layout(), 0);
@@ -214,7 +215,7 @@ mod tests {
             (0.0, 1.0),
             (ts, Intersample::Auto),
         );
-        criterion.beside = Some(Beside {
+        criterion.additional = Some(AdditionalTerm {
             criterion: Arc::new(measured),
             elements: 5,
             weight: 0.3,
@@ -222,7 +223,7 @@ mod tests {
         let eta = [&TRUTH[..4], &[0.2837, -0.9, 0.1]].concat();
         let mut workspace = Workspace::default();
         let at = criterion.linearise(&eta, &mut workspace);
-        let beside = criterion.beside_at(&eta, &mut workspace);
+        let beside = criterion.additional_at(&eta, &mut workspace);
         assert!(beside.sum_of_squares > 0.0 && beside.sum_of_squares < at.sum_of_squares);
         assert_eq!((beside.descent[5], beside.descent[6]), (0.0, 0.0));
         for i in 0..eta.len() {

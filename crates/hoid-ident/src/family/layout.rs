@@ -1,4 +1,4 @@
-//! Where the coordinates of an operator and the coefficients of its noise model stand in eta.
+//! Where the coordinates of an operator and the coefficients of its noise model are in eta.
 //!
 //! `eta = [coordinates.., of channels.., c_1 .. c_nc, d_1 .. d_nd]`: those of the operator first, then
 //! those of what is seen besides the error, then those of the noise `v = (C/D) eps`. A coordinate that
@@ -27,7 +27,7 @@ pub(super) struct FamilyLayout {
     pub nc: usize,
     pub nd: usize,
     pub sample_time: SampleTime,
-    /// What the error does between its samples.
+    /// Intersample behaviour of the error.
     pub intersample: Intersample,
     /// Place in eta of each slot, for each record.
     positions: Vec<Vec<usize>>,

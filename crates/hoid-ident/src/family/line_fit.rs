@@ -40,7 +40,7 @@ pub struct LineFit {
 }
 
 impl LineFit {
-    /// chi^2 per degree of freedom; `None` where there is none.
+    /// chi^2 per degree of freedom; `None` if there is none.
     pub fn reduced_chi_squared(&self) -> Option<f64> {
         (self.degrees_of_freedom > 0).then(|| self.chi_squared / self.degrees_of_freedom as f64)
     }
@@ -108,6 +108,7 @@ pub(super) fn line_fit(
     let runs = lines.runs();
     let (mut others, mut held_out) = (Vec::new(), Vec::new());
     if runs >= 3 {
+        // The fits without one run serve twice: as held-out predictions, and as replications of the jackknife.
         for run in 0..runs {
             let points = lines.without(run);
             let Some(without) = criterion.with_points(&points).fit_from(&found.coordinates, search) else {
@@ -124,6 +125,7 @@ pub(super) fn line_fit(
         .flatten();
     let by_lines = criterion.covariance(&found);
     let covariance = by_lines.clone().map(|by_lines| match by_runs {
+        // The prior is the same in all replications, so that their scatter lacks its part.
         Some(mut covariance) => {
             add_open_part(&mut covariance, 1.0, &criterion.penalty, &found.coordinates, &by_lines);
             covariance

@@ -3,7 +3,7 @@
 //!
 //! The scatter of n runs gives the variance of a line with 2(n - 1) degrees of freedom, and the
 //! smallest of few such variances would decide the fit. The relative variances `r_j = v_j/|H_j|^2`
-//! are drawn towards those of the remnant beside the line, which rest on many bins:
+//! are drawn towards those of the remnant next to the line, which rest on many bins:
 //! `r_j <- (nu r_j + nu_0 c b_j)/(nu + nu_0)`, `nu = 2(n - 1)`, b_j from the remnant and c the
 //! median of `r_j/b_j`, what runs differ by beyond their remnant (moderated variances; G. K. Smyth,
 //! *Statistical Applications in Genetics and Molecular Biology* 3 (2004), article 3).
@@ -16,7 +16,7 @@ use crate::frequency::DescribingFunction;
 
 /// Degrees of freedom nu_0 of what a variance is drawn towards.
 const PRIOR_FREEDOM: f64 = 8.0;
-/// Runs from which on their scatter has a say in c.
+/// Runs from which on their scatter determines c.
 pub(super) const FEWEST_RUNS: usize = 3;
 
 /// A variance by the scatter of so many runs, drawn towards that of the remnant beside the line.
@@ -66,7 +66,7 @@ impl<'d> LineData<'d> {
         self.describing.runs.len()
     }
 
-    /// The points of all runs but one; their variances are those of so many runs.
+    /// The points of all runs but one; their variances are those of a given number of runs.
     pub fn without(&self, run: usize) -> Vec<MeasuredResponse> {
         let n = self.runs() as f64;
         let fewer = |(point, line): (&MeasuredResponse, &crate::frequency::Line)| MeasuredResponse {

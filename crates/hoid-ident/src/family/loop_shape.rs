@@ -2,8 +2,8 @@
 //! is stable.
 //!
 //! `L = Y Y_c`, Y the sampled response of what was estimated, Y_c exact. With the covariance of real and imaginary part
-//! of `dL/L = dY/Y` at a frequency, a crossing of `|L| = 1` and the phase there move as [`super::open_loop`] says, and
-//! one of the negative real axis by `d omega = -Im(dL/L)/Im(d ln L/d omega)`, so that the gain margin moves by
+//! of `dL/L = dY/Y` at a frequency, a crossing of `|L| = 1` and the phase there move as [`super::open_loop`] states,
+//! and one of the negative real axis by `d omega = -Im(dL/L)/Im(d ln L/d omega)`, so that the gain margin moves by
 //! `-(20/ln 10) (Re(dL/L) + Re(d ln L/d omega) d omega)` dB.
 //!
 //! A closed loop that is not stable becomes stable only when L moves over -1 at some frequency. How many standard errors
@@ -20,33 +20,33 @@ use hoid_model::{
 
 use super::open_loop::{Crossover, followed_margin_deg};
 
-/// Where crossings are looked for, rad/s.
+/// Where crossings are searched for, rad/s.
 const RANGE_RAD_S: (f64, f64) = (0.05, 60.0);
-/// Largest phase margin that is believed of a person, deg.
+/// Largest phase margin that is trusted of a person, deg.
 const FARTHEST_MARGIN_DEG: f64 = 120.0;
 /// Quantile of 95 % of chi-squared with two degrees of freedom.
 const CHI_SQUARED: f64 = 5.991_464_547_107_979;
-/// Points at which the distance from -1 is looked for.
+/// Points at which the distance from -1 is searched for.
 const POINTS: usize = 400;
 
-/// What is known of an operator at a frequency: its sampled response, and the covariance of real and imaginary part
+/// Known properties of an operator at a frequency: its sampled response, and the covariance of real and imaginary part
 /// of its relative change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KnownResponse {
     /// Y.
     pub value: Complex64,
-    /// Covariance of `dY/Y`; `None` where none is known.
+    /// Covariance of `dY/Y`; `None` if none is known.
     pub relative: Option<[[f64; 2]; 2]>,
 }
 
-/// Everything that an open loop says without being asked for one crossing.
+/// Everything that an open loop shows without being asked for one crossing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoopShape {
     /// All frequencies in rad/s at which `|L| = 1`, the lowest first, each with its phase margin in deg.
     pub crossovers: Vec<(Estimate, Estimate)>,
     /// The frequency in rad/s at which L crosses the negative real axis nearest to -1, with the gain margin in dB.
     pub gain_margin: Option<(Estimate, Estimate)>,
-    /// Closed-loop poles in the right half plane; `None` where that cannot be told.
+    /// Closed-loop poles in the right half plane; `None` if that cannot be determined.
     pub unstable_poles: Option<usize>,
     /// Least chi-squared of a loop at the limit of stability; `None` without a covariance.
     distance: Option<f64>,
@@ -55,7 +55,7 @@ pub struct LoopShape {
 }
 
 impl LoopShape {
-    /// Of an operator and its controlled element.
+    /// For an operator and its controlled element.
     pub fn of(
         operator: impl Fn(f64) -> KnownResponse,
         element: &ContinuousTransferFunction,
@@ -113,14 +113,14 @@ impl LoopShape {
         self.crossovers.iter().copied().min_by(nearest)
     }
 
-    /// True where the closed loop is stable; `None` where that cannot be told.
+    /// True if the closed loop is stable; `None` if that cannot be determined.
     pub fn is_stable(&self) -> Option<bool> {
         self.unstable_poles.map(|count| count == 0)
     }
 
-    /// What the loop says against who is said to have held it: a record that stays bounded was made in a stable loop,
-    /// which has a crossover and no phase margin below zero, and a person's has none above 120 deg. `reach_deg` is half
-    /// of the 95 % interval of the margin at the lowest crossover. `None` where nothing is against it.
+    /// Evidence of the loop against the assumed operator: a record that stays bounded was made in a stable loop, which
+    /// has a crossover and no phase margin below zero, and a person's has none above 120 deg. `reach_deg` is half of
+    /// the 95 % interval of the margin at the lowest crossover. `None` if nothing is against it.
     pub fn doubt(&self, reach_deg: f64) -> Option<Finding> {
         let remedy = "check the controlled element, the signs and units of e and u and the time between them";
         let (Some((crossover, _)), Some(margin)) = (self.crossovers.first(), self.followed_deg) else {
@@ -142,7 +142,7 @@ impl LoopShape {
         if self.is_stable() != Some(false) {
             return None;
         }
-        let at = self.in_words();
+        let at = self.as_text();
         Some(if self.distance.is_some_and(|distance| distance < CHI_SQUARED) {
             Finding::note(
                 "unstable-loop",
@@ -162,7 +162,7 @@ impl LoopShape {
     }
 
     /// Every crossover with its margin.
-    fn in_words(&self) -> String {
+    fn as_text(&self) -> String {
         let each = self.crossovers.iter();
         let each =
             each.map(|(omega, margin)| format!("{:.1} rad/s, phase margin {:.0} deg", omega.value, margin.value));
@@ -196,7 +196,7 @@ fn distance_from_the_limit(
 mod tests {
     use super::*;
 
-    /// 2.5/s behind a gain with a neuromuscular resonance at 9 rad/s: |L| is one at three frequencies.
+    /// 2.5/s after a gain with a neuromuscular resonance at 9 rad/s: |L| is one at three frequencies.
     fn resonant(omega: f64) -> Complex64 {
         let s = Complex64::new(0.0, omega);
         Complex64::from_polar(1.0, -0.15 * omega) * 81.0 / (s * s + s + 81.0)
@@ -226,7 +226,11 @@ mod tests {
             (doubt.kind, doubt.severity),
             ("unstable-loop", hoid_model::Severity::Doubt)
         );
-        assert!(doubt.words.contains("is not stable (gain one at"), "{}", doubt.words);
+        assert!(
+            doubt.message.contains("is not stable (gain one at"),
+            "{}",
+            doubt.message
+        );
         // Large errors: it may be stable.
         let note = shape(resonant, Some(0.3)).doubt(1.0).unwrap();
         assert_eq!(note.severity, hoid_model::Severity::Note);

@@ -1,14 +1,14 @@
-//! Recordings with little noise, or none: simulations, and what anybody tries first.
+//! Recordings with little noise, or none: simulations, and what anyone tries first.
 //!
-//! The frequency response from which searches begin is off by more than such noise, so that an autoregression of what it
-//! leaves of u would model the operator in place of the noise. Where a form leaves little, all of them are searched by
-//! output error first, `u = c + Y e + v` with v taken for white and without a prior (L. Ljung, *System Identification*,
-//! 1999, section 8.4: it is consistent in a closed loop where v vanishes): its end is near the truth, and from there the
-//! noise is modelled. Without any noise it is the truth, to the digits of the data, also of what the error does between
-//! its samples ([`Intersample`]).
+//! The frequency response from which searches start is off by more than such noise, so that an autoregression of what
+//! it leaves of u would model the operator in place of the noise. Where a form leaves little, all of them are searched
+//! by output error first, `u = c + Y e + v` with v taken for white and without a prior (L. Ljung, *System
+//! Identification*, 1999, section 8.4: it is consistent in a closed loop where v vanishes): its end is near the truth,
+//! and from there the noise is modelled. Without any noise it is the truth, to the digits of the data, also of what the
+//! error does between its samples ([`Intersample`]).
 //!
-//! **Level.** The means that were taken out of e and u are those of a steady state, and a record is none: what a response
-//! owes to the time before its first sample stays in u as a constant. Where a mean was taken out, c is an unknown of each
+//! **Level.** The means that were taken out of e and u are those of a steady state, and a record is none: the effect of
+//! the time before its first sample stays in u as a constant. Where a mean was taken out, c is an unknown of each
 //! record, eliminated with the initial states ([`crate::criterion::Data::level`]).
 
 use hoid_model::Form;
@@ -24,13 +24,13 @@ use crate::{SearchOptions, criterion::Workspace, optimize::Objective};
 const LARGEST_AT_START: f64 = 0.05;
 /// Share that the best of them may leave where the noise is little: of a person's u no operator explains so much.
 const LITTLE: f64 = 5e-3;
-/// Share below which what is left is rounding, which no search is to go on for.
+/// Share below which the residual is rounding, which no search is to continue for.
 const ROUNDING: f64 = 1e-25;
 /// Points of a grid from which a form is searched that has not been found without noise, and how often: the second time
-/// beside the best that the first has found.
+/// next to the best that the first has found.
 const MORE_STARTS: usize = 4;
 const ROUNDS: usize = 2;
-/// Share that one course of the error leaves over that of another which decides. Of an error that is continuous the
+/// Share that one course of the error leaves over that of another which decides. For an error that is continuous the
 /// model of a hold misses `x^2/6` and that of straight lines `x^2/3`: a quarter of the squares, and neither is right.
 const DECIDES: f64 = 0.02;
 /// Share over the least one from which on a form may not have been found.
@@ -49,7 +49,7 @@ pub(super) struct End {
     share: f64,
 }
 
-/// What was found of all forms where there is little noise.
+/// Findings about all forms where there is little noise.
 #[derive(Debug, Clone)]
 pub(super) struct LittleNoise {
     /// The end of each form; `None` where its search came to none.
@@ -61,8 +61,8 @@ pub(super) struct LittleNoise {
 }
 
 impl LittleNoise {
-    /// The search of all forms; `None` where there is more noise. Where an ARX model of high order finds hardly any, `clean`,
-    /// the starts may be far off.
+    /// The search of all forms; `None` if there is more noise. Where an ARX model of high order finds hardly any,
+    /// `clean`, the starts may be far off.
     pub fn of(
         prediction: &Prediction<'_>,
         neuromuscular: bool,
@@ -98,7 +98,7 @@ impl LittleNoise {
             };
             // A response without noise is one of a form: where none has been found, not the best of them either.
             let none_is_found = clean && round > 0 && share >= NONE;
-            // Of a rest that is noise nothing is left to be found.
+            // For a rest that is noise nothing is left to be found.
             let beside = (starts[best].0, ends[best].clone()?.coordinates);
             for ((form, _), end) in starts.iter().zip(&mut ends) {
                 let known = end.as_ref().map_or(f64::INFINITY, |end| end.share);
@@ -135,8 +135,8 @@ impl LittleNoise {
         }
     }
 
-    /// The course of the error that fits better, of a smooth one and a held one that were both searched, and whether that
-    /// settles what the error does.
+    /// The intersample behaviour with the better fit, of a smooth and a held error that were both searched, and whether
+    /// the difference is decisive.
     pub fn course(smooth: &Self, held: &Self) -> (Intersample, bool) {
         match held.share.max(ROUNDING) / smooth.share.max(ROUNDING) {
             ratio if ratio < DECIDES => (Intersample::Zoh, true),
@@ -196,7 +196,7 @@ impl Search<'_, '_> {
         let (prediction, neuromuscular) = (self.prediction, self.neuromuscular);
         let criterion = prediction.criterion((form, neuromuscular), (0, 0));
         let limits = coordinates::limits(form, neuromuscular, prediction.delay_range_s, prediction.sample_time);
-        let mut grid = coordinates::start_grid(form, neuromuscular, &limits, Grid::Usual);
+        let mut grid = coordinates::start_grid(form, neuromuscular, &limits, Grid::Default);
         // The last coordinates of all forms are these.
         let tail = 1 + if neuromuscular { 2 } else { 0 };
         let of_other = &beside.1[beside.1.len() - tail..];
@@ -246,8 +246,8 @@ mod tests {
         FamilyOperator::new(Form::Lead, true, &X).unwrap()
     }
 
-    /// 25 s at 40 Hz of an error that is not zero in the mean, with this much white noise, begun away from rest and with a
-    /// level of u.
+    /// 25 s at 40 Hz of an error that is not zero in the mean, with this much white noise, started away from rest and
+    /// with a level of u.
     fn record(model: &HeldFamily, noise: f64) -> Record {
         let mut state = 7_u64;
         let mut uniform = move || {
@@ -293,13 +293,13 @@ mod tests {
     #[test]
     fn an_operator_without_noise_is_found_with_its_level_and_its_course() {
         let ts = SampleTime::new(0.025).unwrap();
-        let held = fitted(record(&truth().hold(ts).unwrap(), 0.0));
+        let held = fitted(record(&truth().zoh(ts).unwrap(), 0.0));
         assert!(worst(&held, 0.243) < 1e-10);
         assert_eq!(
             (held.intersample, held.delay_if_straight_s(0)),
             (Intersample::Zoh, None)
         );
-        // Straight lines, of a delay that is half a sample longer than this model says.
+        // Straight lines, of a delay that is half a sample longer than this model shows.
         let straight = fitted(record(&truth().interpolate(ts).unwrap(), 0.0));
         assert!(worst(&straight, 0.243 + 0.0125) < 1e-10);
         assert_eq!(
@@ -317,7 +317,7 @@ mod tests {
     #[test]
     fn a_little_noise_is_modelled_and_says_no_more_than_it_can() {
         let ts = SampleTime::new(0.025).unwrap();
-        let fit = fitted(record(&truth().hold(ts).unwrap(), 1e-3));
+        let fit = fitted(record(&truth().zoh(ts).unwrap(), 1e-3));
         let c = fit.operator(0).covariance.clone().unwrap();
         for (i, (x, t)) in fit.operator(0).operator.coordinates().iter().zip(X).enumerate() {
             let error = c[i * 6].sqrt();

@@ -24,7 +24,7 @@ const FAR: f64 = 50.0;
 /// Probability in each tail.
 const TAIL: f64 = 0.025;
 
-/// What a form says of a quantity.
+/// Statement of a form about a quantity.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Component {
     /// Weight of the form.
@@ -35,7 +35,7 @@ pub(super) struct Component {
     pub interval: Option<(f64, f64)>,
 }
 
-/// What all of them say.
+/// Report of all of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Mixture {
     pub estimate: Estimate,
@@ -43,7 +43,7 @@ pub(super) struct Mixture {
 }
 
 impl Mixture {
-    /// Of these forms; `None` for none. Errors rest on so many clusters.
+    /// For these forms; `None` for none. Errors rest on this number of clusters.
     pub fn of(components: &[Component], clusters: usize) -> Option<Self> {
         let total: f64 = components.iter().map(|c| c.weight).sum();
         if let [only] = components {
@@ -76,7 +76,7 @@ impl Mixture {
 /// Weight, estimate and interval of a form.
 type Part = (f64, f64, (f64, f64));
 
-/// The interval of the mixture; `None` where a form has none.
+/// The interval of the mixture; `None` if a form has none.
 fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f64, f64)> {
     let student = StudentsT::new(0.0, 1.0, freedom(clusters)).ok()?;
     let quantile = quantile(clusters);

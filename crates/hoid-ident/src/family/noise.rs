@@ -2,9 +2,9 @@
 //!
 //! `v(t) = -d_1 v(t-1) - ... - d_nd v(t-nd) + eps(t)` by least squares over all records together,
 //! from sample nd on in each (the covariance method), for all orders from the same products. The
-//! order is that of Akaike's criterion `n ln V + 2 nd`: the remnant of people is no autoregression
-//! of any order, and the order that predicts best is what the operator's bias depends on (R.
-//! Shibata, *Annals of Statistics* 8 (1980) 147-164).
+//! order is that of Akaike's criterion `n ln V + 2 nd`: the remnant of people is not an
+//! autoregression of any order, and the order that predicts best is what the operator's bias
+//! depends on (R. Shibata, *Annals of Statistics* 8 (1980) 147-164).
 
 use crate::linalg::{gram::Gram, least_squares::solve_symmetric};
 
@@ -64,8 +64,8 @@ impl NoiseProducts {
         })
     }
 
-    /// The autoregression of this order, or of the highest below it that there is, with zeros for what it lacks: a smooth v
-    /// without noise is foretold by fewer coefficients to rounding.
+    /// The autoregression of this order, or of the highest below it that there is, with zeros for what it lacks: a
+    /// smooth v without noise is predicted by fewer coefficients to rounding.
     pub fn fit_up_to(&self, order: usize) -> Option<Autoregression> {
         let mut found = (0..=order).rev().find_map(|order| self.fit(order))?;
         found.d.resize(order, 0.0);
@@ -107,6 +107,7 @@ pub(super) fn hannan_rissanen(series: &[Vec<f64>], (nc, nd): (usize, usize), lon
     }
     let (gram, right) = products.system(0..q, q);
     let mut found = solve_symmetric(&gram, &right)?;
+    // c_k rho^k moves all roots of C by the factor rho.
     for _ in 0..MOST_DRAWN {
         if hoid_core::stability::roots_inside(&found[..nc], LARGEST_ROOT) {
             return Some(found);

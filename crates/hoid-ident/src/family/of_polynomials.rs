@@ -1,19 +1,20 @@
-//! The operator of the family that polynomials stand for: `q^-nk B/F` (or `B/A`) back to K, T_L,
+//! The operator of the family that polynomials represent: `q^-nk B/F` (or `B/A`) back to K, T_L,
 //! T_I, omega_nm, zeta_nm and tau_e.
 //!
-//! The poles say which is the lag and which are the neuromuscular system ([`super::pole_reading`]).
+//! The poles show which is the lag and which are the neuromuscular system
+//! ([`super::pole_reading`]).
 //!
 //! The exact model of an operator ([`FamilyOperator::hold`]) has fewer parameters than B has
-//! coefficients, so that estimated polynomials lie beside it. The operator is the one whose exact
+//! coefficients, so that estimated polynomials lie next to it. The operator is the one whose exact
 //! model M(x) is nearest to the response H of the polynomials over the band of manual control,
 //!
 //! `min_x sum_j |H(omega_j) - M(omega_j, x)|^2 / |H(omega_j)|^2`,
 //!
-//! which gives an operator back from its own exact model. Its covariance follows from that of
-//! theta to first order, `dx = (J'J)^-1 J' dH`, J the derivatives of M over |H| (the implicit
-//! function theorem without the second derivative, which vanishes where M meets H). What the fit
-//! leaves, [`FamilyConversion::mismatch`], says how far the polynomials are from the form; where it
-//! is large they have none.
+//! which gives an operator back from its own exact model. Its covariance follows from that of theta
+//! to first order, `dx = (J'J)^-1 J' dH`, J the derivatives of M over |H| (the implicit function
+//! theorem without the second derivative, which vanishes where M meets H). What the fit leaves,
+//! [`FamilyConversion::mismatch`], states how far the polynomials are from the form; where it is
+//! large they have none.
 
 use hoid_model::{
     Complex64, FamilyOperator, Form, NotConvertible, PolynomialModel, SampleTime,
@@ -53,7 +54,7 @@ const LATER: [f64; 6] = [0.02, 0.5, 0.98, 2.5, 5.0, 10.0];
 /// Lead times from which searches start, s.
 const LEADS_S: [f64; 3] = [0.1, 0.5, 2.0];
 
-/// An operator of the family that stands for polynomials.
+/// An operator of the family that represents polynomials.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FamilyConversion {
     /// The operator.
@@ -77,7 +78,7 @@ impl FamilyConversion {
 }
 
 impl Fit {
-    /// The operator of the family that the polynomials of this fit stand for, of this form or, for
+    /// The operator of the family that the polynomials of this fit represent, of this form or, for
     /// `None`, of the form that is nearest.
     ///
     /// # Errors
@@ -87,7 +88,7 @@ impl Fit {
     }
 }
 
-/// The operator of the family that polynomials stand for, of this form or, for `None`, of the
+/// The operator of the family that polynomials represent, of this form or, for `None`, of the
 /// simplest form that is met exactly, else of the one that is nearest. `covariance` is that of
 /// theta, by rows.
 ///
@@ -234,7 +235,7 @@ impl<'a> Nearest<'a> {
         let ts = sample_time.s();
         let reach = (nk as f64 + 2.0 * LATER[LATER.len() - 1]) * ts;
         let mut limits = coordinates::limits(form, neuromuscular, (0.0, reach), sample_time);
-        // The poles are known: they move by what B has to say of them and no further.
+        // The poles are known: they move by what B has to report about them and no further.
         for (limit, coordinate) in limits.iter_mut().zip(form.coordinates(neuromuscular)) {
             match coordinate {
                 Coordinate::LagRate | Coordinate::LogOmega | Coordinate::LogZeta => {
@@ -293,7 +294,7 @@ impl<'a> Nearest<'a> {
     /// Responses of the exact model with their derivatives along the coordinates.
     fn responses(&self, x: &[f64]) -> Option<Vec<(Complex64, Vec<Complex64>)>> {
         let operator = FamilyOperator::new(self.form, self.reading.neuromuscular.is_some(), x).ok()?;
-        let held = operator.hold(self.sample_time).ok()?;
+        let held = operator.zoh(self.sample_time).ok()?;
         let of = |point: &Point| response(&held, point.omega_rad_s * self.sample_time.s(), x.len());
         Some(self.points.iter().map(of).collect())
     }
@@ -414,7 +415,7 @@ mod tests {
     }
 
     fn exact(operator: &FamilyOperator) -> PolynomialModel {
-        let held = operator.hold(ts()).unwrap();
+        let held = operator.zoh(ts()).unwrap();
         polynomials(held.nk, &held.b, &held.f)
     }
 
@@ -451,7 +452,7 @@ mod tests {
         assert_eq!(found.real_poles.len(), 1);
         assert_eq!(found.real_poles[0].role, PoleRole::Lag);
         assert!((found.real_poles[0].rate - 0.12).abs() < 1e-6);
-        // An overdamped neuromuscular system: three real poles, of which a lead of .6 s beside a
+        // An overdamped neuromuscular system: three real poles, of which a lead of .6 s next to a
         // slow lag leaves one reading. Any reading has the same response: the first that is exact.
         let x = [5.0, 0.6, 0.12, 11.0_f64.ln(), 1.3_f64.ln(), 0.137];
         let overdamped = FamilyOperator::new(Form::LeadLag, true, &x).unwrap();
@@ -464,7 +465,7 @@ mod tests {
 
     #[test]
     fn errors_are_those_of_the_coefficients() {
-        // Each coefficient moved by a small step: the coordinates move as dx/dtheta says.
+        // Each coefficient moved by a small step: the coordinates move as dx/dtheta reports.
         let operator = FamilyOperator::new(Form::LeadLag, true, &LEAD_LAG).unwrap();
         let model = exact(&operator);
         let n = model.theta().len();

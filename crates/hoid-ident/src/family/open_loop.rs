@@ -21,7 +21,7 @@ use super::{
     mixture::{Component, Mixture, widened},
 };
 
-/// Where crossovers are looked for, rad/s.
+/// Where crossovers are searched for, rad/s.
 const RANGE_RAD_S: (f64, f64) = (0.05, 60.0);
 /// Quantile of the normal distribution for 95 %.
 const NORMAL: f64 = 1.959_963_984_540_054;
@@ -39,7 +39,7 @@ pub struct LoopMeasures {
     pub phase_margin_deg: Estimate,
     /// Its interval of 95 %.
     pub phase_margin_interval: Option<(f64, f64)>,
-    /// What one per cent of the gain moves both by, times 100: `d/d ln K`.
+    /// Effect of one per cent of gain on both, times 100: `d/d ln K`.
     by_gain: [f64; 2],
     /// Standard errors of both as those of the person, whose gain varies from run to run.
     pub of_person: [Option<f64>; 2],
@@ -58,7 +58,7 @@ impl LoopMeasures {
         }
     }
 
-    /// With Student's intervals of errors that rest on so many clusters.
+    /// With Student's intervals of errors that rest on this number of clusters.
     pub(super) fn of_few(self, clusters: usize) -> Self {
         Self {
             crossover_interval: reaching(self.crossover_rad_s, quantile(clusters)),
@@ -67,7 +67,7 @@ impl LoopMeasures {
         }
     }
 
-    /// With what the gain of the person varies by beyond these runs, as a part of it.
+    /// With the variation of the gain of the person by beyond these runs, as a part of it.
     pub(super) fn with_run_to_run(self, share: f64) -> Self {
         let both = [self.crossover_rad_s, self.phase_margin_deg];
         let wider = |k: usize| {
@@ -129,7 +129,7 @@ impl LoopMeasures {
     }
 }
 
-/// So many standard errors to both sides.
+/// A given number of standard errors to both sides.
 fn reaching(of: Estimate, quantile: f64) -> Option<(f64, f64)> {
     let reach = quantile * of.standard_error?;
     Some((of.value - reach, of.value + reach))
@@ -194,7 +194,7 @@ impl Crossover {
 pub fn followed_margin_deg(open_loop: impl Fn(f64) -> Complex64, crossover_rad_s: f64) -> f64 {
     let at = |i: usize| RANGE_RAD_S.0 * (crossover_rad_s / RANGE_RAD_S.0).powf(i as f64 / POINTS as f64);
     let mut last = open_loop(RANGE_RAD_S.0.min(crossover_rad_s));
-    // A double integrator begins at -180 deg, on either side of the cut.
+    // A double integrator starts at -180 deg, on either side of the cut.
     let mut phase = last.arg();
     if phase > FRAC_PI_3 {
         phase -= TAU;

@@ -1,5 +1,5 @@
-//! What may be chosen of the operator of a person: the fields of [`FamilyEstimator`], and the names under which
-//! texts set them. An option is declared here and nowhere else.
+//! Options of the operator of a person: the fields of [`FamilyEstimator`], and the names under which texts set them. An
+//! option is declared here and nowhere else.
 
 use hoid_model::{Detrend, Form, operator_family::Coordinate};
 
@@ -13,21 +13,21 @@ use crate::{
 
 /// Highest order of the noise model.
 pub const HIGHEST_NOISE_ORDER: usize = 24;
-/// Highest nd that is searched beside an nc: an ARMA model needs few.
+/// Highest nd that is searched next to an nc: an ARMA model needs few.
 const HIGHEST_BESIDE_NC: usize = 8;
 
-/// What is to be estimated of a person, and how.
+/// Quantities to be estimated of a person, and how.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FamilyEstimator {
     /// The forms to choose from; one alone is fitted without a choice. Default all that are proper.
     pub forms: Vec<Form>,
     /// With the neuromuscular part. Default true.
     pub neuromuscular: bool,
-    /// What is known before the data. Default [`OperatorPrior::population`].
+    /// Prior knowledge before the data. Default [`OperatorPrior::population`].
     pub prior: OperatorPrior,
     /// Shortest and longest delay tau_e in s. Default 0.02 to 0.8.
     pub delay_range_s: (f64, f64),
-    /// What the error does between its samples. Default [`Intersample::Auto`].
+    /// Intersample behaviour of the error. Default [`Intersample::Auto`].
     pub intersample: Intersample,
     /// Orders nc of the noise model to choose from. Default 0.
     pub nc: std::ops::RangeInclusive<usize>,
@@ -41,11 +41,11 @@ pub struct FamilyEstimator {
     pub period_s: Option<f64>,
     /// Coordinates that each record has for itself; all others are common to the records.
     pub individual: Vec<Coordinate>,
-    /// What the gain of a person varies by from one run to the next, as a part of it: it stands in
-    /// the error bars of fewer than five records, whose blocks cannot show it. Default 0.06: between
-    /// 4 and 9 % in repeated runs of three people, each left out in turn.
+    /// Variation of the gain of a person from one run to the next, as a part of it: it is in the
+    /// error bars of fewer than five records, whose blocks cannot show it. Default 0.06: between 4
+    /// and 9 % in repeated runs of three people, each left out in turn.
     pub run_to_run: f64,
-    /// What is taken out of e and u of each record beforehand: an operator with a lag integrates an
+    /// Trend removed from e and u of each record beforehand: an operator with a lag integrates an
     /// offset. Default their mean.
     pub detrend: Detrend,
     /// Initial states of each record. Default: estimated.
@@ -80,8 +80,7 @@ impl Default for FamilyEstimator {
 }
 
 impl FamilyEstimator {
-    /// With orders nc and nd of the noise that are named; an nd that is not is searched, beside an nc from 0 to
-    /// 8.
+    /// With orders nc and nd of the noise that are named; an nd that is not is searched, next to an nc from 0 to 8.
     ///
     /// # Errors
     /// [`IdentError::BadOption`] for another order, and for one that is too high.
@@ -94,7 +93,7 @@ impl FamilyEstimator {
             };
             if !matches!(name.as_str(), "nc" | "nd") {
                 return Err(refuse(
-                    "the orders nc and nd of the noise alone: the form says the others".to_owned(),
+                    "the orders nc and nd of the noise alone: the form states the others".to_owned(),
                 ));
             }
             if *range.end() > HIGHEST_NOISE_ORDER {
@@ -113,7 +112,7 @@ impl FamilyEstimator {
 
 impl BatchOptions for FamilyEstimator {
     fn options() -> Vec<BatchOption<Self>> {
-        let usual = Self::default();
+        let default = Self::default();
         let mut all = vec![
             shared::noise(|how: &mut Self, _, text| {
                 if text == "arma" {
@@ -124,7 +123,7 @@ impl BatchOptions for FamilyEstimator {
             }),
             shared::change(),
             shared::form(|how: &mut Self, form| how.forms = form.map_or(Form::OF_ERROR.to_vec(), |form| vec![form]))
-                .printed("form", |how, _| Some(how.forms_in_words())),
+                .printed("form", |how, _| Some(how.forms_as_text())),
             shared::neuromuscular(|how: &mut Self| &mut how.neuromuscular)
                 .printed("neuromuscular", |how, _| Some(shared::yes_words(how.neuromuscular))),
             shared::prior("population", |how: &mut Self| &mut how.prior)
@@ -145,7 +144,7 @@ impl BatchOptions for FamilyEstimator {
                 Some(format!("nc={nc}, nd={nd}, by AIC"))
             }),
             shared::delay_range(
-                usual.delay_range_s,
+                default.delay_range_s,
                 |how: &mut Self| &mut how.delay_range_s,
                 |how| how.delay_range_s,
             ),
@@ -154,7 +153,7 @@ impl BatchOptions for FamilyEstimator {
                 Ok(())
             })
             .printed("e between samples", |how, _| Some(how.intersample.name().to_owned())),
-            BatchOption::new(run_to_run(usual.run_to_run), |how: &mut Self, option, text| {
+            BatchOption::new(run_to_run(default.run_to_run), |how: &mut Self, option, text| {
                 how.run_to_run = option.read(text)?;
                 Ok(())
             })
@@ -193,13 +192,13 @@ impl BatchOptions for FamilyEstimator {
                 Ok(())
             }),
         ];
-        all.extend(shared::search(usual.search, |how: &mut Self| &mut how.search));
+        all.extend(shared::search(default.search, |how: &mut Self| &mut how.search));
         all
     }
 }
 
 impl FamilyEstimator {
-    fn forms_in_words(&self) -> String {
+    fn forms_as_text(&self) -> String {
         let names: Vec<&str> = self.forms.iter().map(|form| form.name()).collect();
         match names.as_slice() {
             [only] => (*only).to_owned(),
@@ -219,10 +218,10 @@ fn role() -> Setting {
     Setting::new("role", Kind::Names, help)
 }
 
-fn run_to_run(usual: f64) -> Setting {
+fn run_to_run(default: f64) -> Setting {
     let help =
         "What a person's gain varies by from run to run, as a part of it: in the error bars of fewer than five records";
     Setting::new("run_to_run", Kind::Number, help)
-        .default(&usual.to_string())
+        .default(&default.to_string())
         .bounds(Bounds::AtLeast(0.0))
 }

@@ -5,10 +5,10 @@
 //! is long, `1/T_I` has a symmetric error and T_I has none. Intervals are made in the coordinates
 //! and carried over; one that reaches `1/T_I = 0` is open above in T_I and in K.
 //!
-//! **Determined** is what the data say: less than half of the variance before the data is left of
-//! it ([`Parameter::prior_share`]), it does not rest at a bound of what is sought, and its interval
-//! excludes zero; for omega_nm and zeta_nm, whose prior has a scale, that it is known within a
-//! factor of two.
+//! **Determined** means determined by the data: less than half of the variance before the data is
+//! left of it ([`Parameter::prior_share`]), it does not rest at a bound of the search range, and
+//! its interval excludes zero; for omega_nm and zeta_nm, whose prior has a scale, that it is known
+//! within a factor of two.
 
 use hoid_model::{
     FamilyOperator, Form,
@@ -20,7 +20,7 @@ use super::mixture::{Component, Mixture, widened};
 
 /// Weight of the forms that have a parameter, below which it is not determined.
 const LEAST_WEIGHT: f64 = 0.5;
-/// Largest part of the prior's variance in what is determined.
+/// Largest part of the prior's variance in the determined parameters.
 const LARGEST_PRIOR_SHARE: f64 = 0.5;
 /// Largest standard error of a logarithm that is determined.
 const LARGEST_LOG_ERROR: f64 = 0.35;
@@ -35,17 +35,17 @@ pub struct Parameter {
     pub unit: hoid_model::interned::Name,
     /// Its value; infinite for T_I of a pure integration.
     pub value: f64,
-    /// Standard error, to first order, of the operator of these runs; `None` where there is none.
+    /// Standard error, to first order, of the operator of these runs; `None` if there is none.
     pub standard_error: Option<f64>,
-    /// That of the person, whose gain varies from one run to the next.
+    /// The value for the person, whose gain varies from one run to the next.
     pub standard_error_person: Option<f64>,
     /// Interval of 95 %; an end that is open is infinite.
     pub interval: Option<(f64, f64)>,
     /// Variance after the data over that before; 0 without a prior.
     pub prior_share: f64,
-    /// True where the data determine it.
+    /// True if the data determine it.
     pub determined: bool,
-    /// The forms whose estimates it is the mean of; empty where it is that of one form alone.
+    /// The forms over which the estimate is averaged; empty for a single form.
     pub averaged_over: Vec<Form>,
 }
 
@@ -69,7 +69,7 @@ impl Parameter {
         }
     }
 
-    /// The mean over forms of what has this name in each, with their weights, the form in front first.
+    /// The mean over forms of what has this name in each, with their weights, the best form first.
     pub(super) fn averaged(each: &[(Form, f64, &Self)], clusters: usize) -> Option<Self> {
         let (_, _, front) = *each.first()?;
         // At a bound it has no error of its own, and no part in the mean of those that have.
@@ -104,7 +104,7 @@ impl Parameter {
             })
             .collect();
         let share = |of: &dyn Fn(&Self) -> f64| each.iter().map(|(_, w, p)| w / total * of(p)).sum::<f64>();
-        // Of one sign, and within the factor that counts for a scale: in the mean as in a form.
+        // For one sign, and within the factor that counts for a scale: in the mean as in a form.
         let one_sign = interval.is_some_and(|(low, high)| low * high > 0.0);
         let known = match estimate.standard_error {
             Some(s) if matches!(front.name.as_str(), "omega_nm" | "zeta_nm") => s < LARGEST_LOG_ERROR * estimate.value,
@@ -124,23 +124,23 @@ impl Parameter {
     }
 }
 
-/// What is known of the coordinates of one operator.
-pub(super) struct Known<'a> {
+/// Known properties of the coordinates of one operator.
+pub(super) struct CoordinateEstimate<'a> {
     pub operator: &'a FamilyOperator,
     pub covariance: Option<&'a [f64]>,
     /// For each coordinate.
     pub prior_share: &'a [f64],
-    /// For each coordinate, what was sought.
+    /// Search range of each coordinate.
     pub limits: &'a [(f64, f64)],
     /// Intervals by profile likelihood, where there are such.
     pub profile: &'a [Option<(f64, f64)>],
     /// Quantile of Student's distribution for 95 %.
     pub quantile: f64,
-    /// What the gain of the person varies by beyond these runs, as a part of it.
+    /// Variation of the gain of the person beyond these runs, as a part of it.
     pub run_to_run: f64,
 }
 
-impl Known<'_> {
+impl CoordinateEstimate<'_> {
     pub fn parameters(&self) -> Vec<Parameter> {
         let made = |named: &NamedParameter| {
             let made = self.parameter(named);
@@ -173,7 +173,7 @@ impl Known<'_> {
         (inside && c[i * x.len() + i] > 0.0).then(|| c[i * x.len() + i].sqrt())
     }
 
-    /// 95 % of a coordinate, within what was sought.
+    /// 95 % of a coordinate, within what was searched for.
     fn interval(&self, i: usize) -> Option<(f64, f64)> {
         let x = self.operator.coordinates()[i];
         if let Some(profile) = self.profile[i] {
@@ -225,7 +225,7 @@ impl Known<'_> {
         let interval = self.interval(i);
         match coordinate {
             Coordinate::LagRate => {
-                // Zero up to the bound of what is sought is a pure integration.
+                // Zero up to the bound of the search range is a pure integration.
                 let end = |rate: f64| {
                     if rate <= self.limits[i].0 {
                         f64::INFINITY
@@ -268,7 +268,7 @@ impl Known<'_> {
             }
             return made;
         }
-        // Of the logarithm: d ln y = dx_g/x_g +- dx_o/x_o.
+        // For the logarithm: d ln y = dx_g/x_g +- dx_o/x_o.
         let variance = c[gain * p + gain] / (x[gain] * x[gain])
             + c[other * p + other] / (x[other] * x[other])
             + 2.0 * sign * c[gain * p + other] / (x[gain] * x[other]);
@@ -338,7 +338,7 @@ mod tests {
         for (i, s) in [0.2, 0.03, error, 0.1, 0.45, 0.01].iter().enumerate() {
             covariance[i * 7] = s * s;
         }
-        Known {
+        CoordinateEstimate {
             operator: &operator,
             covariance: Some(&covariance),
             prior_share: &[0.0, 0.0, 0.0, 0.1, 0.8, 0.05],

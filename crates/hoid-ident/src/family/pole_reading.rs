@@ -1,12 +1,12 @@
 //! Which poles of a discrete model are the lag, and which the neuromuscular system.
 //!
 //! The poles are `s_i = ln z_i / Ts`: a pair of complex poles is the neuromuscular system, the real
-//! one that is left is the lag. Of three real poles each may be the lag; all three readings are
-//! tried by who asks, and what was read is told ([`RealPole`]).
+//! one that is left is the lag. For three real poles each may be the lag; all three readings are
+//! tried by who asks, and what was read is reported ([`RealPole`]).
 
 use hoid_model::{NotConvertible, SampleTime, operator_family::Coordinate, polynomial, polynomial_model::monic};
 
-/// What a real pole was read as.
+/// Interpretation of a real pole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PoleRole {
     /// The lag: `T_I = 1/rate`.
@@ -20,7 +20,7 @@ pub enum PoleRole {
 pub struct RealPole {
     /// Its rate, 1/s.
     pub rate: f64,
-    /// What it is.
+    /// Its definition.
     pub role: PoleRole,
 }
 
@@ -50,7 +50,7 @@ impl Reading {
         all
     }
 
-    /// A coordinate that the poles say; zero for others.
+    /// A coordinate that the poles show; zero for others.
     pub fn coordinate(&self, wanted: Coordinate) -> f64 {
         let (omega, zeta) = self.neuromuscular.unwrap_or((1.0, 1.0));
         match wanted {
@@ -76,7 +76,7 @@ pub(super) fn readings(f: &[f64], sample_time: SampleTime) -> Result<Vec<Reading
     for z in roots {
         if z.norm() >= 1.0 {
             return Err(other(format!(
-                "the pole at |z| = {:.6} is no lag and no neuromuscular pole: it is not stable",
+                "the pole at |z| = {:.6} is not a lag and no neuromuscular pole: it is not stable",
                 z.norm()
             )));
         }

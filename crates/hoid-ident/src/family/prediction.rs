@@ -1,11 +1,11 @@
 //! An operator of the family with its noise model, by prediction error.
 //!
-//! The model is `u = Y e + (C/D) eps` with Y the operator behind a hold, exactly discretised, and
+//! The model is `u = Y e + (C/D) eps` with Y the operator after a hold, exactly discretised, and
 //! the criterion that of the general model ([`crate::criterion`]) in the coordinates of the family.
-//! A prior stands beside the data as `kappa sigma^2 sum_i (g_i - m_i)^2/s_i^2`. Its weight is in
-//! units of the innovation variance sigma^2, and of kappa, by how much the variances of clusters
-//! (runs, or blocks of one) exceed those that white residuals would give: people vary in ways that
-//! no stationary noise holds, so that their samples say less than as many of a simulation (M.
+//! A prior is next to the data as `kappa sigma^2 sum_i (g_i - m_i)^2/s_i^2`. Its weight is in units
+//! of the innovation variance sigma^2, and of kappa, by how much the variances of clusters (runs,
+//! or blocks of one) exceed those that white residuals would give: people vary in ways that no
+//! stationary noise holds, so that their samples show less than as many of a simulation (M.
 //! Ribatet, D. Cooley and A. C. Davison, *Statistica Sinica* 22 (2012) 813-845, the magnitude
 //! adjustment).
 
@@ -35,7 +35,7 @@ use crate::{
     optimize::Minimum,
 };
 
-/// Share of the power of u below which what an operator leaves is no noise, but the digits of a file.
+/// Share of the power of u below which what an operator leaves is not noise, but the digits of a file.
 pub(super) const NONE: f64 = 1e-8;
 /// Share below which one form does not fit better than another: where a search without noise comes to rest is chance.
 pub(super) const EQUAL: f64 = 1e-18;
@@ -44,16 +44,16 @@ const ROUNDS: usize = 3;
 /// Relative change of the weight of the prior that needs no other round.
 const SETTLED: f64 = 0.05;
 
-/// The records, and what all forms have in common.
+/// The records and the common settings of all forms.
 #[derive(Debug, Clone)]
 pub(super) struct Prediction<'a> {
     pub data: Vec<Data<'a>>,
     /// What is seen besides the error.
     pub channels: Vec<Channel<'a>>,
     pub sample_time: SampleTime,
-    /// What the error does between its samples.
+    /// Intersample behaviour of the error.
     pub intersample: Intersample,
-    /// Whether the data show that, or somebody has said it.
+    /// Whether the data show that, or someone has reported it.
     pub course_is_known: bool,
     /// Share of the power of u that an output error leaves, where it is little.
     pub little_noise: Option<f64>,
@@ -109,7 +109,8 @@ impl<'a> Prediction<'a> {
         }
     }
 
-    /// What an operator leaves of u in each record: `v = u - Y e`, the states of Y estimated.
+    /// The part of u that an operator leaves unexplained in each record: `v = u - Y e`, the states
+    /// of Y estimated.
     pub fn unexplained(
         &self,
         form: (Form, bool),
@@ -154,10 +155,11 @@ impl<'a> Prediction<'a> {
         let coefficients = [vec![0.0; noise.0], start_of_noise.d].concat();
         let mut eta = criterion.layout.spread(start, &coefficients);
         let unit = self.penalties(&criterion.layout);
+        // The prior is weighted by kappa sigma^2, which is known only after a fit: a few rounds make both consistent.
         let mut weight = start_of_noise.loss;
         let mut found = None;
         for round in 0..ROUNDS {
-            criterion.penalty = unit.iter().map(|p| p.beside(weight)).collect();
+            criterion.penalty = unit.iter().map(|p| p.weighted(weight)).collect();
             let mut minimum = criterion
                 .search(eta, &self.search, None, workspace)
                 .ok_or(IdentError::NoFiniteLoss)?;
@@ -178,7 +180,7 @@ impl<'a> Prediction<'a> {
     }
 
     /// Where the search ends with another noise model, from the operator of a fit and with its
-    /// weight of the prior; `None` where there is no end.
+    /// weight of the prior; `None` if there is no end.
     pub fn refit(
         &self,
         fit: &PredictionFit<'_>,
@@ -228,12 +230,12 @@ impl<'a> Prediction<'a> {
         self.data.iter().map(of).sum()
     }
 
-    /// Share of the power of u that is left, where it is no noise.
+    /// Share of the power of u that is left, where it is not noise.
     pub fn noise_free(&self) -> Option<f64> {
         self.little_noise.filter(|share| *share < NONE)
     }
 
-    /// Sum of squares below which one form does not fit better than another; zero where there is noise.
+    /// Sum of squares below which one form does not fit better than another; zero if there is noise.
     pub fn equal(&self) -> f64 {
         self.noise_free().map_or(0.0, |_| EQUAL * self.power())
     }
@@ -252,7 +254,8 @@ impl<'a> Prediction<'a> {
     ) -> Result<PredictionFit<'a>, IdentError> {
         let (n, states) = (criterion.residuals(), criterion.states());
         let penalty: f64 = criterion.penalty.iter().map(|p| p.at(&minimum.theta)).sum();
-        let beside = criterion.beside_at(&minimum.theta, workspace).sum_of_squares;
+        let beside = criterion.additional_at(&minimum.theta, workspace).sum_of_squares;
+        // The noise variance comes from the residuals alone, without the prior and without the lines.
         let mut squares = minimum.at.sum_of_squares - penalty - beside;
         if self.noise_free().is_some() {
             squares = squares.max(self.rounding() * n as f64);

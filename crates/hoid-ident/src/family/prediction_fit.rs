@@ -1,4 +1,4 @@
-//! What the prediction error search of one form found.
+//! Result of the prediction error search of one form.
 
 use super::{clusters::Clusters, layout::FamilyLayout};
 use crate::{
@@ -23,7 +23,7 @@ pub(super) struct PredictionFit<'a> {
     /// Part of the diagonal of `G + P` that is added to it: zero, and [`OPEN`] where a combination of parameters
     /// is open. It then has an enormous error, and what does not depend on it has its own.
     pub ridge: f64,
-    /// w of [`super::joint`], zero where the lines are no part of the criterion.
+    /// w of [`super::joint`], zero if the lines are not a part of the criterion.
     pub weight_of_lines: f64,
 }
 
@@ -39,7 +39,7 @@ impl PredictionFit<'_> {
         &self.minimum.theta
     }
 
-    /// What the search minimised: sum of squares with the prior.
+    /// Minimum of the objective: sum of squares with the prior.
     pub fn objective(&self) -> f64 {
         self.minimum.at.sum_of_squares
     }
@@ -89,8 +89,8 @@ impl PredictionFit<'_> {
             .collect()
     }
 
-    /// Elements of eta that were sought, at a bound or off it: what others are uncertain by because
-    /// of one that rests at its bound, where the truth need not be.
+    /// Elements of eta that were searched for, at a bound or off it: what others are uncertain by
+    /// because of one that rests at its bound, where the truth need not be.
     pub fn sought(&self) -> Vec<usize> {
         let limits = &self.criterion.limits;
         (0..limits.len()).filter(|&i| limits[i].0 < limits[i].1).collect()

@@ -1,15 +1,16 @@
-//! What is known of people before they are measured.
+//! Prior knowledge of people before they are measured.
 //!
-//! Some seconds of tracking say little about the neuromuscular system: its resonance lies above the
-//! frequencies at which people are excited. A weak prior keeps its parameters where people's are,
-//! and does nothing where the data speak. A positive parameter x has a log-normal prior,
-//! `ln x ~ N(ln centre, spread)`, so that the spread is relative. In the criterion it stands as one
-//! more measurement of the parameter (a maximum a posteriori estimate; L. Ljung, *System
+//! Some seconds of tracking carry little information about the neuromuscular system: its resonance
+//! lies above the frequencies at which people are excited. A weak prior keeps its parameters where
+//! people's are, and does nothing if the data speak. A positive parameter x has a log-normal prior,
+//! `ln x ~ N(ln centre, spread)`, so that the spread is relative. In the criterion it is one more
+//! measurement of the parameter (a maximum a posteriori estimate; L. Ljung, *System
 //! Identification*, 1999, section 7.4).
 //!
 //! How much of a result is prior is the ratio of its variance after the data to that before
-//! ([`prior share`](super::Parameter::prior_share)): one means that the data said nothing. By how
-//! much the prior moves the estimate follows from it ([`OperatorPrior::pull`]).
+//! ([`prior share`](super::Parameter::prior_share)): one means that the data carried no
+//! information. The amount by which the prior moves the estimate follows from it
+//! ([`OperatorPrior::pull`]).
 
 use std::{fmt, str::FromStr};
 
@@ -21,11 +22,11 @@ use hoid_model::{
 use super::Parameter;
 use crate::{IdentError, grey_box::objective::Penalty};
 
-/// Spread of a parameter that is in all but name fixed: refused, as `--fix` says so openly. What
+/// Spread of a parameter that is in all but name fixed: refused, as `--fix` reports it openly. What
 /// another fit knows better is taken to be known so well.
 const LEAST_SPREAD: f64 = 1e-3;
 
-/// What is known of one parameter.
+/// Known properties of one parameter.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ParameterPrior {
     /// `omega_nm`, `zeta_nm`, `tau_e`, `T_L` or `T_I`.
@@ -38,7 +39,7 @@ pub struct ParameterPrior {
     pub source: String,
 }
 
-/// What is known of the parameters of an operator before the data.
+/// Prior knowledge of the parameters of an operator before the data.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct OperatorPrior {
     entries: Vec<ParameterPrior>,
@@ -123,7 +124,7 @@ impl OperatorPrior {
         Ok(Self { entries })
     }
 
-    /// What another fit found, from name, estimate, and whether it is determined: of the parameters
+    /// Prior from another fit, from name, estimate, and whether it is determined: of the parameters
     /// that can have a prior those that are determined and have an error, `standard error/value`
     /// the spread of the logarithm to first order. It may be that none is left.
     ///
@@ -146,7 +147,7 @@ impl OperatorPrior {
         Self::new(found.into_iter().filter_map(entry).collect())
     }
 
-    /// What is known of the neuromuscular system alone.
+    /// The entries of the neuromuscular system alone.
     pub(super) fn of_muscles(mut self) -> Self {
         self.entries.retain(|entry| {
             matches!(
@@ -157,14 +158,14 @@ impl OperatorPrior {
         self
     }
 
-    /// What is known of each parameter.
+    /// Known properties of each parameter.
     pub fn entries(&self) -> &[ParameterPrior] {
         &self.entries
     }
 
-    /// By how much the prior of a parameter moves the logarithm of its estimate. Two normal measurements
-    /// of x with the shares 1 - w and w of the information have the mean `(1 - w) x_data + w m`, so
-    /// that `x - x_data = w (m - x)/(1 - w)`; other priors stay. `None` where it has none, or nothing else.
+    /// Amount by which the prior of a parameter moves the logarithm of its estimate. Two normal measurements of x with
+    /// the shares 1 - w and w of the information have the mean `(1 - w) x_data + w m`, so that
+    /// `x - x_data = w (m - x)/(1 - w)`; other priors stay. `None` if it has none, or nothing else.
     pub fn pull(&self, parameter: &Parameter) -> Option<f64> {
         let name = parameter.name.split('[').next();
         let entry = self.entries.iter().find(|e| Some(e.parameter.as_str()) == name)?;

@@ -3,8 +3,8 @@
 //! With `S(x) = min over all else of the criterion at coordinate x`, the interval of 95 % is where
 //! `S(x) - S_min <= kappa sigma^2 t^2`, t the quantile, kappa the inflation of variances (D. M.
 //! Bates and D. G. Watts, *Nonlinear Regression Analysis and Its Applications*, 1988, section 6.1).
-//! Near the estimate it is the interval of the standard error; where the criterion is no parabola
-//! (a lag that is nearly an integration) it is the one that holds.
+//! Near the estimate it is the interval of the standard error; where the criterion is not a
+//! parabola (a lag that is nearly an integration) it is the one that holds.
 
 use super::prediction_fit::PredictionFit;
 use crate::{SearchOptions, criterion::Workspace};
@@ -16,7 +16,7 @@ const DOUBLINGS: usize = 8;
 /// The profile need not be known better than the interval.
 const SEARCH: (usize, f64) = (15, 1e-7);
 
-/// The interval of one element of eta, within what is sought; `None` where a search fails.
+/// The interval of one element of eta, within the search range; `None` if a search fails.
 pub(super) fn profile_interval(
     fit: &PredictionFit<'_>,
     place: usize,
@@ -24,6 +24,7 @@ pub(super) fn profile_interval(
     quantile: f64,
     workspace: &mut Workspace,
 ) -> Option<(f64, f64)> {
+    // Rise of the criterion at the ends of the interval: t^2 in units of the inflated innovation variance.
     let level = fit.inflation * fit.innovation_variance * quantile * quantile;
     let least = fit.minimum.at.sum_of_squares;
     let search = SearchOptions {
@@ -41,6 +42,7 @@ pub(super) fn profile_interval(
             held.limits[place] = (at, at);
             eta[place] = at;
             let found = held.search(eta.clone(), &search, None, workspace)?;
+            // The next point starts from the conditional minimum of this one: few iterations, and the same valley.
             eta.copy_from_slice(&found.theta);
             Some(found.at.sum_of_squares - least > level)
         };

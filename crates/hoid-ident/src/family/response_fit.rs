@@ -52,7 +52,7 @@ pub(super) struct ResponseCriterion<'p> {
     pub form: Form,
     pub neuromuscular: bool,
     pub sample_time: SampleTime,
-    /// What the error does between its samples.
+    /// Intersample behaviour of the error.
     pub intersample: Intersample,
     pub points: Cow<'p, [MeasuredResponse]>,
     pub limits: Vec<(f64, f64)>,
@@ -108,7 +108,7 @@ impl<'p> ResponseCriterion<'p> {
     /// # Errors
     /// [`IdentError::NoFiniteLoss`].
     pub fn fit(&self, search: &SearchOptions) -> Result<ResponseMinimum, IdentError> {
-        self.fit_from_grid(search, Grid::Usual)
+        self.fit_from_grid(search, Grid::Default)
     }
 
     /// As [`Self::fit`], from the best points of another grid.
@@ -128,6 +128,8 @@ impl<'p> ResponseCriterion<'p> {
             .collect();
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut best: Option<Minimum> = None;
+        // chi^2 has local minima in delay and poles: the best points of a grid are searched from, each with its best
+        // gain.
         for (_, start) in starts.into_iter().take(searches) {
             let known = best.as_ref().map(|b| b.at.sum_of_squares);
             if let Some(found) = minimise(self, start, search, None, &mut Workspace::default())
@@ -145,7 +147,7 @@ impl<'p> ResponseCriterion<'p> {
     }
 
     /// Covariance of the coordinates where the points have theirs, `information^-1`; zero for those
-    /// at a bound. `None` where it does not exist.
+    /// at a bound. `None` if it does not exist.
     pub fn covariance(&self, minimum: &ResponseMinimum) -> Option<Vec<f64>> {
         let p = minimum.coordinates.len();
         let free = self.inner(&minimum.coordinates);
@@ -222,6 +224,7 @@ impl<'p> ResponseCriterion<'p> {
             cross += (model.conj() * point.response).re / point.variance;
             power += model.norm_sqr() / point.variance;
         }
+        // The response is linear in the gain: weighted least squares in one unknown.
         x[0] = cross / power;
         let value = self.linearise(x, &mut Workspace::default()).sum_of_squares;
         (value.is_finite() && x[0] != 0.0).then_some(value)
@@ -242,6 +245,8 @@ impl Objective for ResponseCriterion<'_> {
         for point in self.points.iter() {
             let hold = self.intersample.response(point.omega_rad_s, self.sample_time);
             let model = operator.response_and_gradient(point.omega_rad_s);
+            // `variance` is E|error|^2 of the complex response, half of it in each part: chi^2 = 2 |error|^2/variance
+            // has two degrees of freedom per line.
             let weight = 2.0 / point.variance;
             let off = point.response - model.value * hold;
             let slopes: Vec<Complex64> = model.gradient.iter().map(|g| g * hold).collect();

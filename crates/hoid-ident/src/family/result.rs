@@ -1,4 +1,4 @@
-//! What a fit of the family found.
+//! Result of a fit of the family.
 
 use std::f64::consts::{LN_10, PI};
 
@@ -28,8 +28,8 @@ use crate::{Fit, IdentError, ResponsePoint, Termination};
 pub struct OperatorOfRecord {
     /// The operator.
     pub operator: FamilyOperator,
-    /// Covariance of its coordinates by rows: clustered, with what the prior leaves open. `None`
-    /// where the information is singular.
+    /// Covariance of its coordinates by rows: clustered, with the part of the prior. `None` if the
+    /// information is singular.
     pub covariance: Option<Vec<f64>>,
     /// The same from the model alone, as if residuals were white and nothing varied.
     pub model_based: Option<Vec<f64>>,
@@ -61,7 +61,7 @@ pub struct OperatorInForm {
     pub parameters: Vec<Parameter>,
 }
 
-/// Whether the form can be told from a Box-Jenkins model of the same orders.
+/// Whether the form can be distinguished from a Box-Jenkins model of the same orders.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FreeModel {
     /// Loss of Box-Jenkins with the orders and the delay of the fit.
@@ -93,11 +93,11 @@ pub struct FamilyFit {
     pub forms: Vec<FormFigures>,
     /// Those that the data leave, over which estimates are averaged: the one in front first.
     pub weighed: Vec<WeighedForm>,
-    /// What was found of the channels beside the error, in the order in which they were asked for.
+    /// Results of the channels beside the error, in the order in which they were requested.
     #[serde(default)]
     pub channels: Vec<ChannelFit>,
-    /// What the gain of the person varies by beyond these runs, as a part of it: standard deviation of their
-    /// mean. Zero where errors are those of the scatter between runs, which hold it.
+    /// Variation of the gain of the person beyond these runs, as a part of it: standard deviation of their mean. Zero
+    /// where errors are those of the scatter between runs, which hold it.
     pub run_to_run: f64,
     /// The fit at the lines of the excitation, of the same form.
     pub lines: Option<LineFit>,
@@ -108,11 +108,11 @@ pub struct FamilyFit {
     pub instrumental: Option<InstrumentalFit>,
     /// Why there is none.
     pub no_instrumental: Option<String>,
-    /// The methods beside each other.
+    /// The methods next to each other.
     pub agreement: Option<Agreement>,
     /// Box-Jenkins of the same orders.
     pub free_model: Option<FreeModel>,
-    /// What the error bars are made from.
+    /// Clusters of the error bars.
     pub cluster_kind: ClusterKind,
     /// How many clusters.
     pub clusters: usize,
@@ -130,22 +130,22 @@ pub struct FamilyFit {
     pub coherent_share: Option<f64>,
     /// How the search ended.
     pub termination: Termination,
-    /// What the error does between its samples, as it was fitted.
+    /// Intersample behaviour of the error, as it was fitted.
     #[serde(default)]
     pub intersample: Intersample,
-    /// Whether the data show that, or it was said; else the delay may be half a sample longer
+    /// Whether the data show that, or it was reported; else the delay may be half a sample longer
     /// ([`FamilyFit::delay_if_straight_s`]).
     #[serde(default)]
     pub course_is_known: bool,
-    /// By how much e was moved when its rate was lowered, for a hold that is longer than the recorded one, s.
+    /// Amount by which e was moved when its rate was lowered, for a hold that is longer than the recorded one, s.
     #[serde(default)]
     pub lead_s: f64,
-    /// Share of the power of u that the operator leaves, where that is no noise.
+    /// Share of the power of u that the operator leaves, where that is not noise.
     #[serde(default)]
     pub noise_free: Option<f64>,
     /// Time between two samples.
     pub sample_time: SampleTime,
-    /// What the result is worth.
+    /// Verdict on the result.
     pub verdict: Verdict,
 }
 
@@ -160,7 +160,7 @@ pub(super) fn title(form: Form, neuromuscular: bool, (nc, nd): (usize, usize)) -
 }
 
 impl FamilyFit {
-    /// Form and noise model in a line; [`Fit::title`] of its polynomials says the same.
+    /// Form and noise model in a line; [`Fit::title`] of its polynomials states the same.
     pub fn title(&self) -> String {
         title(self.form, self.neuromuscular, self.noise_orders)
     }
@@ -191,8 +191,8 @@ impl FamilyFit {
         &self.operators[record.min(self.operators.len() - 1)]
     }
 
-    /// Crossover frequency and phase margin of a record with a controlled element, averaged over the forms; `None`
-    /// where the loop of the form in front has no crossover.
+    /// Crossover frequency and phase margin of a record with a controlled element, averaged over the forms; `None` if
+    /// the loop of the best form has no crossover.
     pub fn loop_measures(&self, record: usize, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let each = self.weighed.iter().map(|form| {
             let of = form.of(record)?;
@@ -204,14 +204,14 @@ impl FamilyFit {
         LoopMeasures::averaged(&each.into_iter().flatten().collect::<Vec<_>>(), self.clusters)
     }
 
-    /// The same by the form in front alone.
+    /// The same by the best form alone.
     pub fn loop_measures_in_front(&self, record: usize, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let of = self.operator(record);
         self.measured(&of.operator, of.covariance.as_deref(), element)
     }
 
     /// Delay tau_e in s of a record if its error runs straight from sample to sample, logged from what is faster or
-    /// continuous: half a sample longer, as it was recorded, where nothing shows or says what it does.
+    /// continuous: half a sample longer, as it was recorded, where nothing shows or reports what it does.
     pub fn delay_if_straight_s(&self, record: usize) -> Option<f64> {
         let of = self.operator(record);
         let averaged = of.parameters.iter().find(|p| p.name == Coordinate::Delay.parameter());
@@ -225,7 +225,7 @@ impl FamilyFit {
         let front = &self.operator(record).operator;
         let point = |&omega: &f64| {
             let middle = front.response(omega);
-            // Of each form ln of its response over that of the form in front, with variances of gain and phase.
+            // For each form ln of its response over that of the best form, with variances of gain and phase.
             let of = |form: &WeighedForm| {
                 let of = form.of(record)?;
                 let found = of.operator.response_and_gradient(omega);
@@ -260,9 +260,9 @@ impl FamilyFit {
         omega_rad_s.iter().map(point).collect()
     }
 
-    /// What the loop of a record with a controlled element says against the result: a record that stays
-    /// bounded was made in a stable loop, which has a crossover and no phase margin below zero, and a person's has
-    /// none above 120 deg. `None` where nothing is against it.
+    /// Finding from the loop of a record with a controlled element: a record that stays bounded was made in a stable
+    /// loop, which has a crossover and no phase margin below zero, and a person's has none above 120 deg. `None` if
+    /// nothing is against it.
     pub fn loop_finding(&self, record: usize, element: &ContinuousTransferFunction) -> Option<Finding> {
         let reach = (self.loop_measures_in_front(record, element))
             .and_then(|found| found.phase_margin_interval)
@@ -270,8 +270,7 @@ impl FamilyFit {
         self.loop_shape(record, element).doubt(reach)
     }
 
-    /// Every crossing of the loop of a record with a controlled element, and whether it is stable, by the form in
-    /// front.
+    /// Every crossing of the loop of a record with a controlled element, and whether it is stable, by the best form.
     pub fn loop_shape(&self, record: usize, element: &ContinuousTransferFunction) -> LoopShape {
         let of = self.operator(record);
         let known = |omega: f64| {

@@ -1,11 +1,11 @@
-//! What a channel says of its own next sample, by a fit that faults cannot carry.
+//! Information of a channel about its own next sample, by a fit that faults cannot carry.
 //!
 //! `x(t) = -a_1 x(t-1) - ... - a_p x(t-p) + eps(t)` by least squares with bounded influence: a row
 //! counts only where neither x(t) nor any of its p past values lies beyond [`FAR`] robust deviations
 //! (the weights of Mallows on the regressors), and, in the rounds that follow, where eps lies within
 //! [`BEYOND`] of its robust scale (R. A. Maronna, R. D. Martin, V. J. Yohai, *Robust Statistics*,
 //! 2006, sections 5.11 and 8.4). A small white part is added to x, of [`FLOOR`] of its deviation: it
-//! keeps the normal equations of a smooth channel regular, and what is smaller is no fault.
+//! keeps the normal equations of a smooth channel regular, and what is smaller is not a fault.
 
 use super::robust::quantile;
 use crate::linalg::{gram::Gram, least_squares::solve_symmetric};
@@ -29,7 +29,7 @@ pub(super) struct Autoregression {
 }
 
 impl Autoregression {
-    /// The fit to a centred channel of this deviation; `None` where it is too short or constant.
+    /// The fit to a centred channel of this deviation; `None` if it is too short or constant.
     pub fn of(x: &[f64], deviation: f64) -> Option<Self> {
         let p = ORDER.min(x.len() / 20);
         if p == 0 || deviation <= 0.0 {

@@ -8,14 +8,13 @@
 //! and e on u alike; P = [`OWN`], L = [`OTHER`] blocks. In a closed loop such a prediction is consistent
 //! whatever the loop is (L. Ljung, *System Identification*, 1999, section 13.4).
 //!
-//! **Exchanged.** A person answers no sooner than after their delay, a tenth of a second and more; a
-//! controlled element answers at once. The gain of a lag j is by how much the loss grows without b_1:
-//! `R = (V_without - V)/V`. Where e answers u late and u answers e at once, `R` of u beyond
-//! [`AT_ONCE`] and [`TIMES`] times that of e, input and output are exchanged. Where neither answers at
-//! once nothing is said.
+//! **Exchanged.** A person answers no sooner than after their delay, a tenth of a second and more; a controlled element
+//! answers at once. The gain of a lag j is by how much the loss grows without b_1: `R = (V_without - V)/V`. Where e
+//! answers u late and u answers e at once, `R` of u beyond [`AT_ONCE`] and [`TIMES`] times that of e, input and output
+//! are exchanged. Where neither answers at once nothing is reported.
 //!
-//! **Sign.** All that a person does with an error begins in its direction: `sum_j b_j` is positive. It
-//! is the wrong sign where the sum lies [`WRONG`] standard errors below zero.
+//! **Sign.** All that a person does with an error starts in its direction: `sum_j b_j` is positive. It is the wrong
+//! sign where the sum lies [`WRONG`] standard errors below zero.
 
 use hoid_model::{FaultKind, Record};
 use hoid_numerics::statistics::mean;
@@ -33,7 +32,7 @@ const AT_ONCE: f64 = 0.1;
 const TIMES: f64 = 20.0;
 /// Standard errors by which the sum of an answer is negative.
 const WRONG: f64 = 4.0;
-/// Blocks below which nothing is said.
+/// Blocks below which nothing is reported.
 const FEWEST: usize = 200;
 
 /// A wrong direction, and its statistic: the ratio of the growths, or standard errors.
@@ -47,8 +46,8 @@ pub(super) fn wrong_direction(record: &Record) -> Option<(FaultKind, f64)> {
     if e.len() < FEWEST {
         return None;
     }
-    let of_output = Answer::of(&u, &e)?;
-    let of_input = Answer::of(&e, &u)?;
+    let of_output = CrossResponse::of(&u, &e)?;
+    let of_input = CrossResponse::of(&e, &u)?;
     if of_output.at_once > AT_ONCE && of_output.at_once > TIMES * of_input.at_once {
         return Some((FaultKind::Exchanged, of_output.at_once / of_input.at_once));
     }
@@ -56,15 +55,15 @@ pub(super) fn wrong_direction(record: &Record) -> Option<(FaultKind, f64)> {
 }
 
 /// How a channel answers another.
-struct Answer {
+struct CrossResponse {
     /// Growth of the loss without the first lag.
     at_once: f64,
     /// Sum of the coefficients in standard errors.
     sum: f64,
 }
 
-impl Answer {
-    /// Of y to x; `None` where the regression is singular.
+impl CrossResponse {
+    /// Of y to x; `None` if the regression is singular.
     fn of(y: &[f64], x: &[f64]) -> Option<Self> {
         let first = OWN.max(OTHER);
         let size = OWN + OTHER + 1;

@@ -1,16 +1,14 @@
 //! Stretches in which a channel does not move: frozen, dropped out, idle.
 //!
-//! A *hold* is a run of equal values. A channel in full precision has none, but where it stays at its
-//! largest or smallest value (a rail, which is another matter): [`FROZEN`] equal samples are frozen. A
-//! channel in steps, or a hand that rests, holds by its nature: there a hold is frozen where it is
-//! longer than [`LONGER`] times the length that nine of ten holds do not exceed, [`RESTING_S`] at
-//! least, and e moves meanwhile by half of its deviation or more. At the [rest](super::rest) of a stick
-//! that is told from the holds there. A hold that the channel jumps to and
+//! A *hold* is a run of equal values. A channel in full precision has none, but where it stays at its largest or
+//! smallest value (a rail, which is another matter): [`FROZEN`] equal samples are frozen. A channel in steps, or a hand
+//! that rests, holds by its nature: there a hold is frozen where it is longer than [`LONGER`] times the length that
+//! nine of ten holds do not exceed, [`RESTING_S`] at least, and e moves meanwhile by half of its deviation or more. At
+//! the [rest](super::rest) of a stick that is distinguished from the holds there. A hold that the channel jumps to and
 //! back from, by more than it moves from one sample to the next in 999 of 1000, is a dropout.
 //!
-//! *Idle* is a stretch of [`IDLE_S`] or more in which e and u stay both within [`QUIET`] of their
-//! deviations, in each half second: before a run begins, or behind its end. Nobody who tracks can do
-//! that: e is never at rest.
+//! *Idle* is a stretch of [`IDLE_S`] or more in which e and u stay both within [`QUIET`] of their deviations, in each
+//! half second: before a run starts, or after its end. No one who tracks can do that: e is never at rest.
 
 use std::ops::Range;
 
@@ -21,13 +19,13 @@ use super::{
 
 /// Equal samples that are frozen, in full precision.
 const FROZEN: usize = 6;
-/// Times the usual hold of a channel in steps.
+/// Times the default hold of a channel in steps.
 const LONGER: f64 = 20.0;
 /// Shortest hold of a channel in steps that is frozen, s.
 const RESTING_S: f64 = 3.0;
 /// Shortest idle stretch, s.
 const IDLE_S: f64 = 1.5;
-/// Time in which the range of an idle channel is looked at, s.
+/// Time in which the range of an idle channel is examined, s.
 const BLOCK_S: f64 = 0.5;
 /// Range of an idle channel, of its deviation.
 const QUIET: f64 = 0.05;
@@ -55,13 +53,13 @@ pub(super) fn frozen(values: &[f64], other: Option<&[f64]>, sample_time_s: f64) 
     let rests = |run: &Range<usize>| rest.is_some_and(|rest| rest.value == values[run.start]);
     let moving = runs.iter().filter(|run| !rests(run));
     let mut lengths: Vec<f64> = moving.map(|run| run.len() as f64).collect();
-    let usual = quantile(&mut lengths, 0.9);
+    let typical = quantile(&mut lengths, 0.9);
     let mut changes: Vec<f64> = values.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     let large = 2.0 * quantile(&mut changes, 0.999);
     let deviation_of_other = other.map(|o| level_and_deviation(o).1);
-    let longest = |usual: f64| ((RESTING_S / sample_time_s) as usize).max((LONGER * usual) as usize);
-    let in_use = if in_steps { longest(usual) } else { FROZEN };
-    let at_rest = rest.map_or(in_use, |rest| longest(rest.usual_samples));
+    let longest = |typical: f64| ((RESTING_S / sample_time_s) as usize).max((LONGER * typical) as usize);
+    let in_use = if in_steps { longest(typical) } else { FROZEN };
+    let at_rest = rest.map_or(in_use, |rest| longest(rest.typical_samples));
     let is_fault = |run: &Range<usize>| -> Option<Hold> {
         if run.len() < FROZEN {
             return None;
@@ -93,7 +91,7 @@ fn range_of(values: &[f64]) -> f64 {
     high - low
 }
 
-/// Stretches in which all channels are idle, beside what is `out` of use.
+/// Stretches in which all channels are idle, next to what is `out` of use.
 pub(super) fn idle(channels: &[&[f64]], out: &[bool], sample_time_s: f64) -> Vec<Range<usize>> {
     let n = channels.first().map_or(0, |c| c.len());
     let block = ((BLOCK_S / sample_time_s).round() as usize).max(5);

@@ -1,4 +1,4 @@
-//! Samples by what stands on both sides of them.
+//! Samples from their neighbours on both sides.
 //!
 //! With the innovations `eps = A x` of the autoregression, the m samples from s on that the others
 //! make most likely minimise `sum eps(t)^2` over all rows that hold one of them (A. J. E. M. Janssen,
@@ -68,7 +68,7 @@ impl Interpolation {
         self.y.len()
     }
 
-    /// By how much the sum of squares falls with m samples.
+    /// Amount by which the sum of squares falls with m samples.
     pub fn fall(&self, m: usize) -> f64 {
         self.y[..m].iter().map(|y| y * y).sum()
     }
@@ -84,7 +84,7 @@ impl Interpolation {
     }
 }
 
-/// The innovations behind a change of the samples from `start` on, at the rows that hold them.
+/// The innovations after a change of the samples from `start` on, at the rows that hold them.
 pub(super) fn apply(ar: &Autoregression, eps: &mut [f64], start: usize, delta: &[f64]) {
     let p = ar.order();
     for (i, change) in delta.iter().enumerate() {

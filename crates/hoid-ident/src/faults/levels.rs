@@ -3,15 +3,15 @@
 //! A *large* change from one sample to the next is beyond [`LARGE`] times the 99 % quantile of all
 //! changes.
 //!
-//! **Wrap.** A channel that is kept within a range of the modulus M leaves it at one end and comes in
-//! at the other: large changes that are all M within that quantile, which taken out leave no large
-//! change. M is 360, 2 pi, 180, pi or 65536 (or one less, or 4096), or what four changes or more
-//! agree in. Of these a pair of changes less than [`BRIDGED_S`](super::limits::BRIDGED_S) apart is a spike; of
-//! a known modulus it is a turn there and back, and unwrapping mends either.
+//! **Wrap.** A channel that is kept within a range of the modulus M leaves it at one end and comes in at the other:
+//! large changes that are all M within that quantile, which taken out leave no large change. M is 360, 2 pi, 180, pi or
+//! 65536 (or one less, or 4096), or what four changes or more agree in. For these a pair of changes less than
+//! [`BRIDGED_S`](super::limits::BRIDGED_S) apart is a spike; of a known modulus it is a turn there and back, and
+//! unwrapping repairs either.
 //!
-//! **Step.** At one large change the median of [`BESIDE_S`] before and behind differ by more than
-//! [`STEPPED`] times the deviation within each of the two, and by four fifths of the change: the
-//! person has not answered it away, as they do with a step of the target.
+//! **Step.** At one large change the median of [`BESIDE_S`] before and after differ by more than [`STEPPED`] times the
+//! deviation within each of the two, and by four fifths of the change: the person has not answered it away, as they do
+//! with a step of the target.
 //!
 //! **Scale.** The deviation from the level in each second, over its median over all seconds, beyond
 //! [`UNITS`], of a stick with a [rest](super::rest) that of the samples away from it: no person grows by that much from one second to the next. Edges are those samples beyond
@@ -25,16 +25,16 @@ use super::{
 };
 
 const LARGE: f64 = 6.0;
-/// Span beside a step, s.
+/// Span next to a step, s.
 const BESIDE_S: f64 = 5.0;
-/// Least step, in deviations beside it.
+/// Least step, in deviations next to it.
 const STEPPED: f64 = 6.0;
-/// Ratio of the deviations of seconds that is another unit.
+/// Ratio of the deviations of seconds above which the unit has changed.
 const UNITS: f64 = 100.0;
 /// Deviations of the rest beyond which a sample belongs to such a stretch.
 const OUTSIDE: f64 = 15.0;
 const MODULI: [f64; 7] = [360.0, 2.0 * PI, 180.0, PI, 65_536.0, 65_535.0, 4096.0];
-/// Changes that agree in a modulus of their own.
+/// Number of changes that must agree in a modulus of their own.
 const AGREE: usize = 4;
 
 /// A channel that wraps around.
@@ -46,7 +46,7 @@ pub(super) struct Wrap {
     pub unwrapped: Vec<f64>,
 }
 
-fn usual_change(values: &[f64]) -> f64 {
+fn typical_change(values: &[f64]) -> f64 {
     quantile(
         &mut values.windows(2).map(|w| (w[1] - w[0]).abs()).collect::<Vec<_>>(),
         0.99,
@@ -55,15 +55,15 @@ fn usual_change(values: &[f64]) -> f64 {
 
 /// The wraps of a channel.
 pub(super) fn wrap(values: &[f64], sample_time_s: f64) -> Option<Wrap> {
-    let usual = usual_change(values);
-    if values.len() < 100 || usual <= 0.0 {
+    let typical = typical_change(values);
+    if values.len() < 100 || typical <= 0.0 {
         return None;
     }
     let jumps: Vec<(usize, f64)> = values
         .windows(2)
         .enumerate()
         .map(|(t, w)| (t + 1, w[1] - w[0]))
-        .filter(|(_, change)| change.abs() > LARGE * usual)
+        .filter(|(_, change)| change.abs() > LARGE * typical)
         .collect();
     if jumps.is_empty() || 20 * jumps.len() > values.len() {
         return None;
@@ -71,7 +71,7 @@ pub(super) fn wrap(values: &[f64], sample_time_s: f64) -> Option<Wrap> {
     let near = |modulus: f64| {
         jumps
             .iter()
-            .all(|(_, change)| (change.abs() - modulus).abs() <= 2.0 * usual)
+            .all(|(_, change)| (change.abs() - modulus).abs() <= 2.0 * typical)
     };
     let known = MODULI.iter().copied().find(|m| near(*m));
     let own = || {
@@ -98,18 +98,18 @@ pub(super) fn wrap(values: &[f64], sample_time_s: f64) -> Option<Wrap> {
     })
 }
 
-/// Steps of the level: the first sample behind each, and by how much.
+/// Steps of the level: the first sample after each, and by how much.
 pub(super) fn steps(values: &[f64], sample_time_s: f64) -> Vec<(usize, f64, f64)> {
     let beside = (BESIDE_S / sample_time_s) as usize;
-    let usual = usual_change(values);
+    let typical = typical_change(values);
     let n = values.len();
-    if beside < 10 || n < 2 * beside || usual <= 0.0 {
+    if beside < 10 || n < 2 * beside || typical <= 0.0 {
         return Vec::new();
     }
     let mut found: Vec<(usize, f64, f64)> = Vec::new();
     for t in beside..n - beside {
         let change = values[t] - values[t - 1];
-        if change.abs() <= LARGE * usual || found.last().is_some_and(|(last, ..)| t - last < beside) {
+        if change.abs() <= LARGE * typical || found.last().is_some_and(|(last, ..)| t - last < beside) {
             continue;
         }
         let (before, one) = level_and_deviation(&values[t - beside..t]);
@@ -141,22 +141,22 @@ pub(super) fn scales(values: &[f64], sample_time_s: f64) -> Vec<(Range<usize>, f
         .copied()
         .filter(|size| rest.is_none() || *size > 0.0)
         .collect();
-    let usual = median(&moved);
-    if usual <= 0.0 {
+    let typical = median(&moved);
+    if typical <= 0.0 {
         return Vec::new();
     }
     let mut all: Vec<(Range<usize>, f64)> = Vec::new();
     for (k, size) in sizes.iter().enumerate() {
-        if *size <= UNITS * usual {
+        if *size <= UNITS * typical {
             continue;
         }
         let rows = k * block..((k + 1) * block).min(n);
         match all.last_mut() {
             Some((last, factor)) if last.end == rows.start => {
                 last.end = rows.end;
-                *factor = factor.max(size / usual);
+                *factor = factor.max(size / typical);
             }
-            _ => all.push((rows, size / usual)),
+            _ => all.push((rows, size / typical)),
         }
     }
     let inside = |t: usize| all.iter().any(|(rows, _)| rows.contains(&t));

@@ -1,14 +1,13 @@
 //! A record that no single sample can carry, for a second opinion on a fit.
 //!
-//! Each sample of e and of u is held to what those on both sides of it say: with the interpolation
-//! error `r(t) = sum_i a_i eps(t+i)/|a|^2`, whose standard deviation is `s = sigma/|a|`, a sample
-//! beyond `c s` is moved to it, `x(t) - r + c s sign(r)` (the filter cleaner of R. D. Martin and D. J.
-//! Thomson, *Proc. IEEE* 70 (1982) 1097-1115, with two sides). The sample that is
-//! farthest off comes first, and the others are looked at anew: an outlier is in the interpolation of
-//! its neighbours, and they would be moved in its place. Whatever a sample is, what it brings
-//! into any filter behind is bounded, in e as in u, and so is its leverage on theta. c = [`HELD`]: of a
-//! normal channel one sample in 16 000 is moved. A fit to this record that is another than that to the
-//! record itself says that few samples carry the fit; where no sample is moved the two are one.
+//! Each sample of e and of u is held to what those on both sides of it: with the interpolation error
+//! `r(t) = sum_i a_i eps(t+i)/|a|^2`, whose standard deviation is `s = sigma/|a|`, a sample beyond `c s` is moved to
+//! it, `x(t) - r + c s sign(r)` (the filter cleaner of R. D. Martin and D. J. Thomson, *Proc. IEEE* 70 (1982)
+//! 1097-1115, with two sides). The sample that is farthest off comes first, and the others are examined again: an
+//! outlier is in the interpolation of its neighbours, and they would be moved in its place. For any sample, its effect
+//! on the filters after it is bounded, in e as in u, and so is its leverage on theta. c = [`HELD`]: of a normal channel
+//! one sample in 16 000 is moved. A fit to this record that is another than that to the record itself shows that few
+//! samples carry the fit; where no sample is moved the two are one.
 
 use std::{cmp::Ordering, collections::BinaryHeap};
 
@@ -23,7 +22,7 @@ use super::{
 /// Deviations of the interpolation error to which a sample is held.
 const HELD: f64 = 4.0;
 
-/// The record with its samples held; `None` where none is moved.
+/// The record with its samples held; `None` if none is moved.
 pub fn resistant(record: &Record) -> Option<Record> {
     let ts = record.sample_time().s();
     let mut moved = false;
@@ -107,7 +106,7 @@ impl PartialEq for Excess {
 
 impl Eq for Excess {}
 
-/// The records with their samples held; `None` where none is moved.
+/// The records with their samples held; `None` if none is moved.
 pub fn held(records: &[Record]) -> Option<Vec<Record>> {
     let all: Vec<Option<Record>> = records.iter().map(resistant).collect();
     all.iter().any(Option::is_some).then(|| {
@@ -139,7 +138,7 @@ mod tests {
             e[1700] += size;
             let whole = resistant(&record(e)).unwrap();
             held.push(whole.input()[1700]);
-            // Its neighbours stay what they are.
+            // Its neighbours stay unchanged.
             let off = |t: usize| (whole.input()[t] - clean[t]).abs();
             let others = (0..clean.len()).filter(|t| *t != 1700 && off(*t) > 0.0).count();
             assert!(others <= 4, "{size}: {others} others moved");

@@ -4,10 +4,9 @@
 //! does a hand that works in pulses and lets go between them. Pilots leave it there in half of the
 //! samples and for seconds at a time. That is how they control, and no fault of the recording.
 //!
-//! The rest is the most frequent value, where it makes [`SHARE`] of the samples or more, is come to
-//! [`VISITS`] times or oftener, and is [`ALONE`] times as frequent as any other: levels of a channel
-//! in steps stand side by side, and a channel that has stopped once has stopped once. In the ends of
-//! its range nothing rests.
+//! The rest is the most frequent value, where it makes [`SHARE`] of the samples or more, is come to [`VISITS`] times or
+//! oftener, and is [`ALONE`] times as frequent as any other: levels of a channel in steps are side by side, and a
+//! channel that has stopped once has stopped once. In the ends of its range nothing rests.
 
 use std::ops::Range;
 
@@ -27,11 +26,11 @@ pub struct Rest {
     /// How often it is come to.
     pub visits: usize,
     /// Samples that nine of ten visits do not exceed.
-    pub usual_samples: f64,
+    pub typical_samples: f64,
 }
 
 impl Rest {
-    /// The rest of a channel; `None` where it has none.
+    /// The rest of a channel; `None` if it has none.
     pub fn of(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_unstable_by(f64::total_cmp);
@@ -55,7 +54,7 @@ impl Rest {
             value,
             share,
             visits,
-            usual_samples: quantile(&mut lengths, 0.9),
+            typical_samples: quantile(&mut lengths, 0.9),
         })
     }
 }
@@ -84,7 +83,7 @@ mod tests {
         let rest = Rest::of(&zone(1.5)).unwrap();
         let at_rest = zone(1.5).iter().filter(|v| **v == 0.0).count();
         assert_eq!((rest.value, rest.share), (0.0, at_rest as f64 / 6000.0));
-        assert!(rest.visits > 50 && rest.usual_samples > 2.0, "{rest:?}");
+        assert!(rest.visits > 50 && rest.typical_samples > 2.0, "{rest:?}");
         let pulses: Vec<f64> = u
             .iter()
             .map(|v| if v.abs() < 4.0 { 0.7 } else { 0.7 + v.signum() })

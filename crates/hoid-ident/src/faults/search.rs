@@ -1,8 +1,8 @@
-//! The order in which faults are looked for, and what becomes of each.
+//! The order in which faults are searched for, and the treatment of each.
 //!
-//! Wraps first, since a channel without them has no jumps; then what lasts: stretches in other units,
-//! idle and frozen ones. Between these, on what is left, spikes and steps: an autoregression of a
-//! record with an idle half is one of neither half.
+//! Wraps first, since a channel without them has no jumps; then what lasts: stretches in other units, idle and frozen
+//! ones. Between these, on the residual, spikes and steps: an autoregression of a record with an idle half is one of
+//! neither half.
 
 use std::ops::Range;
 
@@ -14,12 +14,12 @@ use super::{
     spikes,
 };
 
-/// Samples between longer faults below which no spike is looked for.
+/// Samples between longer faults below which no spike is searched for.
 const FEWEST: usize = 100;
 
 /// A fault by its samples.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Place {
+pub(super) struct FaultSpan {
     pub kind: FaultKind,
     /// e or u by its place; none for both.
     pub channel: Option<usize>,
@@ -30,21 +30,21 @@ pub(super) struct Place {
 
 /// The faults of channels of one record in the order of time, with what is to be done; the channels
 /// are unwrapped, and bridged where that is to be done and not all `cut`.
-pub(super) fn search(values: &mut [Vec<f64>], ts: f64, cut: bool) -> Vec<(Place, FaultAction)> {
+pub(super) fn search(values: &mut [Vec<f64>], ts: f64, cut: bool) -> Vec<(FaultSpan, FaultAction)> {
     let n = values.first().map_or(0, Vec::len);
     let long = |samples: &Range<usize>| samples.len() as f64 * ts > BRIDGED_S * (1.0 + 1e-9);
-    let mended = |samples: &Range<usize>| {
+    let repaired = |samples: &Range<usize>| {
         if cut || long(samples) {
             FaultAction::Cut
         } else {
             FaultAction::Bridged
         }
     };
-    let mut found: Vec<(Place, FaultAction)> = Vec::new();
+    let mut found: Vec<(FaultSpan, FaultAction)> = Vec::new();
     for (channel, values) in values.iter_mut().enumerate() {
         if let Some(wrap) = levels::wrap(values, ts) {
             *values = wrap.unwrapped;
-            let place = Place {
+            let place = FaultSpan {
                 kind: FaultKind::Wrap,
                 channel: Some(channel),
                 samples: wrap.samples,
@@ -56,7 +56,7 @@ pub(super) fn search(values: &mut [Vec<f64>], ts: f64, cut: bool) -> Vec<(Place,
     }
     let mut out = vec![false; n];
     for place in lasting(values, ts) {
-        let action = mended(&place.samples);
+        let action = repaired(&place.samples);
         match (action, place.channel) {
             (FaultAction::Bridged, Some(channel)) => spikes::bridge(&mut values[channel], place.samples.clone()),
             _ => out[place.samples.clone()].fill(true),
@@ -65,11 +65,11 @@ pub(super) fn search(values: &mut [Vec<f64>], ts: f64, cut: bool) -> Vec<(Place,
     }
     for (channel, values) in values.iter_mut().enumerate() {
         let before = values.clone();
-        let mut of_channel: Vec<Place> = Vec::new();
+        let mut of_channel: Vec<FaultSpan> = Vec::new();
         for stretch in stretches(&out) {
             let part = &mut values[stretch.clone()];
             for (at, size, deviations) in levels::steps(part, ts) {
-                let place = Place {
+                let place = FaultSpan {
                     kind: FaultKind::Step,
                     channel: Some(channel),
                     samples: stretch.start + at..stretch.start + at + 1,
@@ -78,7 +78,7 @@ pub(super) fn search(values: &mut [Vec<f64>], ts: f64, cut: bool) -> Vec<(Place,
                 };
                 found.push((place, FaultAction::Cut));
             }
-            of_channel.extend(spikes::find(part, ts).into_iter().map(|spike| Place {
+            of_channel.extend(spikes::find(part, ts).into_iter().map(|spike| FaultSpan {
                 kind: FaultKind::Spike,
                 channel: Some(channel),
                 samples: stretch.start + spike.samples.start..stretch.start + spike.samples.end,
@@ -95,7 +95,7 @@ pub(super) fn search(values: &mut [Vec<f64>], ts: f64, cut: bool) -> Vec<(Place,
             let action = if too_many {
                 FaultAction::Reported
             } else {
-                mended(&place.samples)
+                repaired(&place.samples)
             };
             found.push((place, action));
         }
@@ -105,22 +105,26 @@ pub(super) fn search(values: &mut [Vec<f64>], ts: f64, cut: bool) -> Vec<(Place,
 }
 
 /// Stretches in other units, idle and frozen ones.
-fn lasting(values: &[Vec<f64>], ts: f64) -> Vec<Place> {
-    let mut all: Vec<Place> = Vec::new();
+fn lasting(values: &[Vec<f64>], ts: f64) -> Vec<FaultSpan> {
+    let mut all: Vec<FaultSpan> = Vec::new();
     for (channel, values) in values.iter().enumerate() {
-        all.extend(levels::scales(values, ts).into_iter().map(|(samples, factor)| Place {
-            kind: FaultKind::Scale,
-            channel: Some(channel),
-            samples,
-            size: factor,
-            deviations: None,
-        }));
+        all.extend(
+            levels::scales(values, ts)
+                .into_iter()
+                .map(|(samples, factor)| FaultSpan {
+                    kind: FaultKind::Scale,
+                    channel: Some(channel),
+                    samples,
+                    size: factor,
+                    deviations: None,
+                }),
+        );
     }
     let both: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
     if both.len() > 1 {
         let mut out = vec![false; both[0].len()];
         all.iter().for_each(|place| out[place.samples.clone()].fill(true));
-        all.extend(holds::idle(&both, &out, ts).into_iter().map(|samples| Place {
+        all.extend(holds::idle(&both, &out, ts).into_iter().map(|samples| FaultSpan {
             kind: FaultKind::Idle,
             channel: None,
             size: samples.len() as f64 * ts,
@@ -138,7 +142,7 @@ fn lasting(values: &[Vec<f64>], ts: f64) -> Vec<Place> {
             {
                 continue;
             }
-            all.push(Place {
+            all.push(FaultSpan {
                 kind: if hold.jump.is_some() {
                     FaultKind::Dropout
                 } else {

@@ -1,24 +1,23 @@
-//! A record without what is slow, for a second opinion on a fit.
+//! A record without slow components, for a second opinion on a fit.
 //!
-//! A step or a drift of a sensor is no fault that its neighbours could tell, and a level does not hold
-//! it. The person does not follow it, so that e has power at low frequencies that u does not answer,
-//! and the gain of the fit comes out too low with small error bars. Both channels lose their line and
-//! the cosines `cos(pi k (t + 1/2)/N)`, `k = 1 .. 2 T/`[`PERIOD_S`], so all that is slower than
-//! that period. The two lose it by the same linear operation, so that what leads from e to u stays. A
-//! fit to the rest has lost the information of low frequencies, and differs from the first by chance
-//! with a variance of `var' - var` where nothing is wrong (J. A. Hausman, *Econometrica* 46 (1978)
-//! 1251-1271); where it differs by more, what is slow carries the fit.
+//! A step or a drift of a sensor is not a fault that its neighbours could reveal, and a level does not hold it. The
+//! person does not follow it, so that e has power at low frequencies that u does not answer, and the gain of the fit
+//! results too low with small error bars. Both channels lose their line and the cosines `cos(pi k (t + 1/2)/N)`,
+//! `k = 1 .. 2 T/`[`PERIOD_S`], so all that is slower than that period. The two lose it by the same linear operation,
+//! so that what leads from e to u stays. A fit to the rest has lost the information of low frequencies, and differs
+//! from the first by chance with a variance of `var' - var` if nothing is wrong (J. A. Hausman, *Econometrica* 46
+//! (1978) 1251-1271); where it differs by more, what is slow carries the fit.
 
 use std::f64::consts::PI;
 
 use hoid_model::{Detrend, Record};
 
-/// Of a person what is slower than this is taken out, s.
+/// Components slower than this are removed for a person, s.
 pub const PERIOD_S: f64 = 20.0;
 /// Most cosines, so that the time stays in proportion to a record's length.
 const MOST: usize = 64;
 
-/// The records without what is slower than a period in s; `None` where they are too short for anything slow.
+/// The records without components slower than a period in s; `None` if they are too short for anything slow.
 pub fn without_slow(records: &[Record], period_s: f64) -> Option<Vec<Record>> {
     let count = |r: &Record| ((2.0 * r.len() as f64 * r.sample_time().s() / period_s) as usize).min(MOST);
     records.iter().any(|r| count(r) > 0).then(|| {
@@ -63,7 +62,7 @@ mod tests {
         let gone = |e: &dyn Fn(f64) -> f64| {
             let before = record(8000, e);
             let after = &without_slow(std::slice::from_ref(&before), PERIOD_S).unwrap()[0];
-            // u is .3 e before and behind.
+            // u is .3 e before and after.
             let same = after.input().iter().zip(after.output());
             assert!(same.clone().all(|(e, u)| (0.3 * e - u).abs() < 1e-9));
             root_mean_square(after.input()) / root_mean_square(before.input())

@@ -1,15 +1,15 @@
-//! One or few samples that those before and behind them rule out.
+//! One or few samples that those before and after them rule out.
 //!
-//! Two explanations of a large innovation stand against each other (A. J. Fox, *J. Royal Statistical
-//! Society B* 34 (1972) 350-363; I. Chang, G. C. Tiao and C. Chen, *Technometrics* 30 (1988) 193-204).
-//! A *push* of the person enters the innovations: it moves the channel, which then goes on as it always
-//! does. A *fault* is added to the samples alone: each innovation behind it is off by a coefficient of
-//! A, and the channel goes on as if nothing had been. For m samples from s on,
+//! Two explanations of a large innovation is compared with each other (A. J. Fox, *J. Royal Statistical Society B* 34
+//! (1972) 350-363; I. Chang, G. C. Tiao and C. Chen, *Technometrics* 30 (1988) 193-204). A *push* of the person enters
+//! the innovations: it moves the channel, which then continues as it always does. A *fault* is added to the samples
+//! alone: each innovation after it is off by a coefficient of A, and the channel continues as if nothing had been. For
+//! m samples from s on,
 //!
 //! | explanation | what it leaves of `S = sum eps^2/sigma^2` |
 //! |---|---|
 //! | m pushes | `S` without the m largest terms |
-//! | m faulty samples | `S` behind the [interpolation](super::interpolation) of them |
+//! | m faulty samples | `S` after the [interpolation](super::interpolation) of them |
 //!
 //! Both have m unknowns. The fewest samples are a fault where their interpolation
 //!
@@ -20,14 +20,14 @@
 //! 3. leaves nothing beyond [`CLEAN`] sigma (or a twentieth of S);
 //! 4. moves a sample by more than [`SMALLEST`] of the deviation of the channel, and by two of its steps.
 //!
-//! The first samples of a record are looked at backwards, where they are last: a normal autoregression
-//! is the same in both directions.
+//! The first samples of a record are examined backwards, where they are last: a normal autoregression is the same in
+//! both directions.
 //!
-//! A channel without memory, and the last sample of a record, tell the two apart: there a sample beyond [`WILD`] deviations is a
-//! fault. sigma is the median absolute innovation over 0.6745, of the record or of the second around
-//! the sample, whichever is larger: remnants come and go, and follow u. Found faults are bridged, the
-//! autoregression is fitted again, and the search repeats (C. Chen and L. M. Liu, *J. American
-//! Statistical Association* 88 (1993) 284-297).
+//! A channel without memory, and the last sample of a record, distinguish the two: there a sample beyond [`WILD`]
+//! deviations is a fault. sigma is the median absolute innovation over 0.6745, of the record or of the second around
+//! the sample, whichever is larger: remnants come and go, and follow u. Found faults are bridged, the autoregression is
+//! fitted again, and the search repeats (C. Chen and L. M. Liu, *J. American Statistical Association* 88 (1993)
+//! 284-297).
 
 use std::ops::Range;
 
@@ -43,23 +43,23 @@ const LARGE: f64 = 8.0;
 const BETTER: f64 = 5.0;
 /// The same as a part of the fall.
 const PART: f64 = 0.2;
-/// How many times what faults leave, or what noise would, pushes must leave where it is a small part.
+/// Ratio to the remainder of faults, or of noise, pushes must leave where it is a small part.
 const DECISIVE: f64 = 20.0;
 /// Largest innovation that is left, as sigma.
 const CLEAN: f64 = 5.0;
-/// Innovation that a search begins at, as sigma.
+/// Innovation that a search starts at, as sigma.
 const SEED: f64 = 4.0;
 /// Least change of a sample, of the deviation of the channel.
 const SMALLEST: f64 = 1.5;
-/// Deviations of the channel that nobody moves by in a few samples.
+/// Deviations of the channel that no one moves by in a few samples.
 const WILD: f64 = 20.0;
 const ROUNDS: usize = 4;
 
-/// Samples that are no part of the channel.
+/// Samples that are not a part of the channel.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Spike {
     pub samples: Range<usize>,
-    /// By how much the worst of them is off.
+    /// Amount by which the worst of them is off.
     pub size: f64,
     /// Square root of the fall of the sum of squares.
     pub deviations: f64,
@@ -103,7 +103,7 @@ pub(super) fn find(values: &mut [f64], sample_time_s: f64) -> Vec<Spike> {
     joined(found)
 }
 
-/// Samples that are to be replaced, by what stands around them.
+/// Samples that are to be replaced, by their neighbours.
 pub(super) fn bridge(values: &mut [f64], samples: Range<usize>) {
     let (level, deviation) = level_and_deviation(values);
     let x: Vec<f64> = values.iter().map(|v| v - level).collect();
@@ -207,7 +207,7 @@ impl Search<'_> {
         found
     }
 
-    /// The fault that begins at this sample, and how its samples change.
+    /// The fault that starts at this sample, and how its samples change.
     fn at(&self, x: &[f64], eps: &[f64], start: usize) -> Option<(Spike, Vec<f64>)> {
         let sigma = self.sigma.at(start);
         let all = Interpolation::new(self.ar, eps, start, self.longest);

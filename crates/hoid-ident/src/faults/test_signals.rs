@@ -15,7 +15,7 @@ pub fn autoregressive(n: usize, seed: u64) -> Vec<f64> {
         (one, two) = (v, one);
         v
     };
-    // Behind the start from rest.
+    // After the start from rest.
     for _ in 0..100 {
         next();
     }

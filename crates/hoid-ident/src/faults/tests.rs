@@ -9,7 +9,7 @@ use hoid_sim::{
     people::{Person, Plant, Population, RemnantKind, Task},
 };
 
-use super::{Mended, mend};
+use super::{RepairedRecord, repair};
 
 fn run(condition: Condition, seed: u64) -> Record {
     let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
@@ -27,8 +27,8 @@ fn with(record: &Record, change: impl FnOnce(&mut Vec<f64>, &mut Vec<f64>)) -> R
     Record::new(record.sample_time(), Channel::new("e", "", e), Channel::new("u", "", u)).unwrap()
 }
 
-fn mended(record: &Record) -> Mended {
-    mend(record, FaultHandling::Bridge).unwrap()
+fn repaired(record: &Record) -> RepairedRecord {
+    repair(record, FaultHandling::Bridge).unwrap()
 }
 
 fn kinds(found: &[Fault]) -> Vec<FaultKind> {
@@ -39,7 +39,7 @@ fn kinds(found: &[Fault]) -> Vec<FaultKind> {
 fn clean_runs_have_no_faults_and_stay_as_they_are() {
     for condition in Condition::ALL {
         let record = run(condition, 17);
-        let found = mended(&record);
+        let found = repaired(&record);
         assert!(
             found.faults.is_empty() && found.findings.is_empty(),
             "{condition:?} {:?}",
@@ -54,9 +54,9 @@ fn clean_runs_have_no_faults_and_stay_as_they_are() {
             let person = Person::draw(&population, &task, plant, None, remnant, 40 + k as u64, 0).unwrap();
             let record = person.run(1).unwrap().record;
             assert!(
-                mended(&record).faults.is_empty(),
+                repaired(&record).faults.is_empty(),
                 "{remnant} {plant:?} {:?}",
-                mended(&record).faults
+                repaired(&record).faults
             );
         }
     }
@@ -70,7 +70,7 @@ fn bursts_of_few_samples_are_found_whatever_their_signs() {
             let record = with(&clean, |e, _| {
                 (0..signs.len()).for_each(|k| e[place + k] += 7.0 * signs[k]);
             });
-            let found = mended(&record);
+            let found = repaired(&record);
             assert_eq!(kinds(&found.faults), [FaultKind::Spike], "{signs:?} {place}");
             let fault = &found.faults[0];
             let first = (fault.from_s - record.time_s(place)) / record.sample_time().s();
@@ -86,7 +86,7 @@ fn one_sample_of_the_error_is_found_and_bridged() {
     for (condition, place) in [(Condition::C1, 4000), (Condition::C3, 700), (Condition::C6, 7000)] {
         let clean = run(condition, 5);
         let record = with(&clean, |e, _| e[place] = 30.0);
-        let found = mended(&record);
+        let found = repaired(&record);
         assert_eq!(kinds(&found.faults), [FaultKind::Spike], "{:?}", found.faults);
         let fault = &found.faults[0];
         assert_eq!((fault.channel.as_str(), fault.action), ("e", FaultAction::Bridged));
@@ -94,12 +94,12 @@ fn one_sample_of_the_error_is_found_and_bridged() {
         assert!((fault.size - (30.0 - clean.input()[place])).abs() < 0.1, "{fault}");
         assert!((found.segments[0].input()[place] - clean.input()[place]).abs() < 0.05);
         assert_eq!(found.findings[0].severity, Severity::Note);
-        // Told and not mended.
-        let told = mend(&record, FaultHandling::Report).unwrap();
+        // Reported and not repaired.
+        let told = repair(&record, FaultHandling::Report).unwrap();
         assert_eq!(told.segments[0].input(), record.input());
         assert_eq!(told.findings[0].severity, Severity::Doubt);
-        assert!(mend(&record, FaultHandling::Keep).unwrap().faults.is_empty());
-        let cut = mend(&record, FaultHandling::Cut).unwrap();
+        assert!(repair(&record, FaultHandling::Keep).unwrap().faults.is_empty());
+        let cut = repair(&record, FaultHandling::Cut).unwrap();
         assert_eq!((cut.segments.len(), cut.faults[0].action), (2, FaultAction::Cut));
         assert_eq!(cut.segments[1].time_s(0), record.time_s(place + 1));
     }
@@ -109,7 +109,7 @@ fn one_sample_of_the_error_is_found_and_bridged() {
 fn a_spike_of_the_output_too() {
     let clean = run(Condition::C1, 9);
     let deviation = (clean.output().iter().map(|u| u * u).sum::<f64>() / clean.len() as f64).sqrt();
-    let found = mended(&with(&clean, |_, u| u[3000] += 10.0 * deviation));
+    let found = repaired(&with(&clean, |_, u| u[3000] += 10.0 * deviation));
     assert_eq!(kinds(&found.faults), [FaultKind::Spike], "{:?}", found.faults);
     assert_eq!(found.faults[0].channel, "u");
 }
@@ -121,7 +121,7 @@ fn rest_before_a_run_is_cut() {
         e.splice(0..0, vec![0.0; 1500]);
         u.splice(0..0, vec![0.0; 1500]);
     });
-    let found = mended(&record);
+    let found = repaired(&record);
     assert_eq!(kinds(&found.faults), [FaultKind::Idle], "{:?}", found.faults);
     assert_eq!((found.faults[0].action, found.segments.len()), (FaultAction::Cut, 1));
     assert!((found.segments[0].time_s(0) - 15.0).abs() < 0.1);
@@ -131,13 +131,13 @@ fn rest_before_a_run_is_cut() {
 #[test]
 fn a_frozen_output_other_units_and_a_step_cut_the_record() {
     let clean = run(Condition::C1, 4);
-    let frozen = mended(&with(&clean, |_, u| {
+    let frozen = repaired(&with(&clean, |_, u| {
         let held = u[2000];
         u[2000..2400].fill(held);
     }));
     assert_eq!(kinds(&frozen.faults), [FaultKind::Frozen], "{:?}", frozen.faults);
     assert_eq!((frozen.faults[0].samples, frozen.segments.len()), (400, 2));
-    let scaled = mended(&with(&clean, |e, u| {
+    let scaled = repaired(&with(&clean, |e, u| {
         e[1000..3000].iter_mut().for_each(|v| *v *= 1e6);
         u[1000..3000].iter_mut().for_each(|v| *v *= 1e6);
     }));
@@ -148,7 +148,7 @@ fn a_frozen_output_other_units_and_a_step_cut_the_record() {
     );
     let largest = |r: &Record| r.input().iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     assert!(scaled.segments.iter().all(|r| largest(r) < 100.0));
-    let stepped = mended(&with(&clean, |e, _| e[4000..].iter_mut().for_each(|v| *v += 40.0)));
+    let stepped = repaired(&with(&clean, |e, _| e[4000..].iter_mut().for_each(|v| *v += 40.0)));
     assert_eq!(kinds(&stepped.faults), [FaultKind::Step], "{:?}", stepped.faults);
     assert_eq!(stepped.segments.iter().map(Record::len).sum::<usize>(), clean.len());
 }
@@ -162,14 +162,14 @@ fn time_in_milliseconds_is_not_determined() {
         Channel::new("u", "", clean.output().to_vec()),
     )
     .unwrap();
-    let found = mended(&record);
+    let found = repaired(&record);
     assert_eq!(kinds(&found.faults), [FaultKind::TimeUnit]);
     // A person who waits for 50 samples has not been idle for 500 s.
     let waits = with(&record, |e, u| {
         e[400..450].fill(0.0);
         u[400..450].fill(0.0);
     });
-    assert_eq!(kinds(&mended(&waits).faults), [FaultKind::TimeUnit]);
+    assert_eq!(kinds(&repaired(&waits).faults), [FaultKind::TimeUnit]);
     assert_eq!(found.findings[0].severity, Severity::Undetermined);
 }
 
@@ -185,7 +185,7 @@ fn nothing_usable_is_said() {
             .collect()
     };
     let record = Record::new(ts, Channel::new("e", "", bursts(3)), Channel::new("u", "", bursts(4))).unwrap();
-    let found = mended(&record);
+    let found = repaired(&record);
     assert_eq!(found.findings[0].severity, Severity::Doubt, "{:?}", found.findings);
     assert_eq!(
         found.findings.last().unwrap().severity,
@@ -202,9 +202,9 @@ fn an_output_alone_and_a_record_too_short() {
     let mut u = super::test_signals::autoregressive(3000, 3);
     u[1000] += 50.0;
     let record = Record::of_output(ts, Channel::new("u", "", u)).unwrap();
-    assert_eq!(kinds(&mended(&record).faults), [FaultKind::Spike]);
+    assert_eq!(kinds(&repaired(&record).faults), [FaultKind::Spike]);
     let short = Record::of_output(ts, Channel::new("u", "", vec![1.0, 5.0, 2.0])).unwrap();
-    assert!(mended(&short).faults.is_empty());
+    assert!(repaired(&short).faults.is_empty());
 }
 
 #[test]
@@ -218,8 +218,8 @@ fn exchanged_channels_and_a_wrong_sign() {
     });
     let runs = [Condition::C1, Condition::C2].map(|c| run(c, 8));
     for record in runs.iter().chain(&people) {
-        assert_eq!(kinds(&mended(&exchanged(record)).faults), [FaultKind::Exchanged]);
-        let found = mended(&turned(record));
+        assert_eq!(kinds(&repaired(&exchanged(record)).faults), [FaultKind::Exchanged]);
+        let found = repaired(&turned(record));
         assert_eq!(kinds(&found.faults), [FaultKind::Sign]);
         assert_eq!(found.findings[0].severity, Severity::Doubt);
     }
@@ -231,7 +231,7 @@ fn a_spike_of_the_excitation_is_bridged_and_a_clean_one_is_left_alone() {
         let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
         let record = simulator.run(RunSeed::default(), false).unwrap();
         assert!(record.channel("f_t").is_some());
-        let clean = mend(&record, FaultHandling::Bridge).unwrap();
+        let clean = repair(&record, FaultHandling::Bridge).unwrap();
         assert!(clean.faults.is_empty(), "{condition:?}: {:?}", clean.faults);
         let (input, output, others) = record.clone().into_channels();
         let mut spoilt = Record::new(record.sample_time(), input.unwrap(), output).unwrap();
@@ -241,18 +241,18 @@ fn a_spike_of_the_excitation_is_bridged_and_a_clean_one_is_left_alone() {
             }
             spoilt = spoilt.with_channel(channel).unwrap();
         }
-        let found = mend(&spoilt, FaultHandling::Bridge).unwrap();
+        let found = repair(&spoilt, FaultHandling::Bridge).unwrap();
         assert_eq!((found.faults.len(), found.faults[0].channel.as_str()), (1, "f_t"));
-        let (mended, truth) = (
+        let (repaired, truth) = (
             found.segments[0].channel("f_t").unwrap(),
             record.channel("f_t").unwrap(),
         );
         assert!(
-            (mended[3000] - truth[3000]).abs() < 0.05,
+            (repaired[3000] - truth[3000]).abs() < 0.05,
             "{} {}",
-            mended[3000],
+            repaired[3000],
             truth[3000]
         );
-        assert_eq!(mend(&spoilt, FaultHandling::Report).unwrap().segments[0], spoilt);
+        assert_eq!(repair(&spoilt, FaultHandling::Report).unwrap().segments[0], spoilt);
     }
 }

@@ -16,7 +16,7 @@ use crate::{IdentError, informative_data::common_sample_time};
 /// Amplitude of a line, as a part of the rms of its channel, below which it is rounding.
 const LEAST_LINE: f64 = 1e-12;
 
-/// Bins off the lines from which the remnant at a line is taken.
+/// Bins at non-excited frequencies from which the remnant at a line is taken.
 const NEIGHBOURS: usize = 8;
 
 /// The describing function at one line.
@@ -33,9 +33,9 @@ pub struct Line {
     /// Standard deviation of the ratios of single runs, as the root of the mean square modulus;
     /// `None` for one run.
     pub spread: Option<f64>,
-    /// sigma as the remnant beside the line has it: of `N = U - H E` at the nearest bins off the
-    /// lines, where there is nothing but remnant. It does not hold what differs between runs, and
-    /// exists for one run too.
+    /// sigma as the remnant next to the line has it: of `N = U - H E` at the nearest non-excited
+    /// bins, where there is nothing but remnant. It does not include differences between runs, and
+    /// is defined for a single run as well.
     pub neighbour_error: f64,
     /// Squared coherence, 0 to 1; `None` for one run, where it is always 1.
     pub coherence: Option<f64>,
@@ -83,7 +83,7 @@ impl Line {
     }
 }
 
-/// What one run says by itself.
+/// Summary of one run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunSummary {
     /// Label of its record.
@@ -94,20 +94,20 @@ pub struct RunSummary {
     pub rms_e: f64,
     /// Root mean square of u.
     pub rms_u: f64,
-    /// Share of the variance of u off the lines.
+    /// Share of the variance of u at non-excited frequencies.
     pub off_line_share: f64,
     /// Power of the remnant in u as a part of the variance of u.
     pub noise_ratio: f64,
 }
 
-/// A describing function with what the records say beside it.
+/// A describing function with what the records show next to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DescribingFunction {
     /// The lines, by frequency.
     pub lines: Vec<Line>,
     /// The runs: records or periods.
     pub runs: Vec<RunSummary>,
-    /// Share of the variance of u off the lines, mean over runs.
+    /// Share of the variance of u at non-excited frequencies, mean over runs.
     pub off_line_share: Estimate,
     /// Power of the remnant in u as a part of the variance of u (P_n of eq. 43), mean over runs.
     pub noise_ratio: Estimate,
@@ -137,7 +137,7 @@ struct Run {
 /// [`IdentError::NoRecords`], [`IdentError::MixedSampling`], [`IdentError::NotWholePeriods`],
 /// [`IdentError::LineBeyondNyquist`], [`IdentError::NoExcitation`] for e or u that does not move,
 /// [`IdentError::NoLinePower`] for a line without power, [`IdentError::BadOption`] for a channel
-/// that is not there.
+/// that does not exist.
 pub fn describe(
     records: &[Record],
     excitation: &Excitation,
@@ -371,8 +371,9 @@ fn line(runs: &[Run], harmonic: usize, omega_rad_s: f64, options: &DescribingOpt
     })
 }
 
-/// sigma of a line from the bins beside it: `sigma^2 = sum_i |D_i|^2 S_i / |sum_i b_i|^2` with S_i
-/// the mean of `|U - H E|^2` over the nearest bins of run i off the lines, `b_i = E_i D_i*`.
+/// sigma of a line from the bins next to it: `sigma^2 = sum_i |D_i|^2 S_i / |sum_i b_i|^2` with S_i
+/// the mean of `|U - H E|^2` over the nearest bins of run i at non-excited frequencies,
+/// `b_i = E_i D_i*`.
 fn neighbour_error(runs: &[Run], line: &Line, harmonics: &[usize]) -> f64 {
     let mut squares = 0.0;
     for (run, (_, b)) in runs.iter().zip(&line.ratio.0) {

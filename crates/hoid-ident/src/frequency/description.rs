@@ -5,7 +5,7 @@
 //! |---|---|
 //! | excitation | the channel named; else the first of those that usually hold one in which there are lines |
 //! | lines | those of the options; else found in that channel |
-//! | average | `sum U_i D_i* / sum E_i D_i*` with D of the channel; the mean of `U_i/E_i` where there is none |
+//! | average | `sum U_i D_i* / sum E_i D_i*` with D of the channel; the mean of `U_i/E_i` if there is none |
 //! | runs | records, whatever number of periods they have, where there are three or more; else their periods |
 //! | delay | that of gain, lead and delay through the lines: it unwraps the phase, and the margin is interpolated without it |
 //!
@@ -17,7 +17,7 @@ use hoid_model::{ContinuousTransferFunction, Detrend, Record, Verdict, uncertain
 
 use super::{
     describe::{DescribingFunction, describe},
-    doubts::{Judged, doubts},
+    diagnostics::{DiagnosticInputs, doubts},
     excitation::{Excitation, LineSearch, refuse},
     gain_lead_delay::GainLeadDelayOptions,
     open_loop::DescribingMargins,
@@ -27,15 +27,15 @@ use super::{
 };
 use crate::IdentError;
 
-/// Names of channels that usually hold the excitation, in the order in which they are looked for.
-pub const USUAL_EXCITATIONS: [&str; 8] = ["f_t", "d", "r", "f_d", "target", "disturbance", "reference", "forcing"];
+/// Names of channels that usually hold the excitation, in the order in which they are searched for.
+pub const COMMON_EXCITATIONS: [&str; 8] = ["f_t", "d", "r", "f_d", "target", "disturbance", "reference", "forcing"];
 
 /// Runs from which on their scatter alone gives the errors.
 const RUNS_ENOUGH: usize = 3;
 /// Delays beyond that of a person are what noise makes of the phase.
 const LONGEST_DELAY_S: f64 = 0.6;
 
-/// What is asked for. By default all is found in the records.
+/// The request. By default all is found in the records.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DescriptionOptions {
     /// Channel of the recorded disturbance or target.
@@ -52,11 +52,11 @@ pub struct DescriptionOptions {
     pub to_s: Option<f64>,
     /// `e[k]` belongs to `u[k + offset_samples]`, a whole number or not.
     pub offset_samples: f64,
-    /// What is taken out of e and u of each run beforehand.
+    /// Trend removed from e and u of each run beforehand.
     pub detrend: Detrend,
 }
 
-/// A describing function, and what it is worth.
+/// A describing function, and its reliability.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Description {
     /// Lines, runs, remnant.
@@ -65,13 +65,13 @@ pub struct Description {
     pub excitation: Excitation,
     /// The channel that the average refers to.
     pub channel: Option<String>,
-    /// What counted as a run.
+    /// Definition of a run.
     pub realisation: Realisation,
     /// Delay that is taken out where phases are unwrapped and interpolated, s.
     pub delay_s: f64,
     /// Crossover and margins, with a controlled element.
     pub margins: Option<DescribingMargins>,
-    /// What speaks for and against it.
+    /// Findings for and against it.
     pub verdict: Verdict,
 }
 
@@ -134,7 +134,7 @@ pub fn describe_runs(records: &[Record], options: &DescriptionOptions) -> Result
         .as_ref()
         .map(|element| function.open_loop(element));
     let margins = open_loop.as_ref().map(|l| l.margins_with_delay(delay_s));
-    let judged = Judged {
+    let judged = DiagnosticInputs {
         function: &function,
         excitation: &excitation,
         channel: channel.as_deref(),
@@ -184,7 +184,7 @@ fn excitation_of(record: &Record, options: &DescriptionOptions) -> Result<(Excit
         (Some(_), None) => {
             return refuse(
                 "the lines of the excitation",
-                "no period beside them",
+                "no period next to them",
                 "the period in s, of which they are harmonics",
             );
         }
@@ -197,7 +197,7 @@ fn excitation_of(record: &Record, options: &DescriptionOptions) -> Result<(Excit
         return Ok((found, Some(channel.clone())));
     }
     let there = || {
-        USUAL_EXCITATIONS
+        COMMON_EXCITATIONS
             .into_iter()
             .filter(|name| record.channel(name).is_some())
     };
@@ -207,7 +207,7 @@ fn excitation_of(record: &Record, options: &DescriptionOptions) -> Result<(Excit
             (Ok(found), None) => return Ok((found, Some(name.to_owned()))),
             (Ok(found), Some(given)) if found == *given => return Ok((found, Some(name.to_owned()))),
             (Ok(_), Some(_)) => {}
-            // A target of zero beside a disturbance is none, and not what is wrong.
+            // A target of zero next to a disturbance is none, and not what is wrong.
             (Err(IdentError::NoExcitation { .. }), _) => {}
             (Err(error), _) => {
                 reason.get_or_insert(error);

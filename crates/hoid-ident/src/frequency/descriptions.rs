@@ -88,7 +88,7 @@ fn several_runs_are_described_by_default() {
     };
     let function = describe(&records, &found.excitation, &by_hand).unwrap();
     assert_eq!(found.function, function);
-    // The delay of 0.28 s stands for the lag of the neuromuscular system too, 2 zeta/omega = 0.06 s
+    // The delay of 0.28 s represents the lag of the neuromuscular system too, 2 zeta/omega = 0.06 s
     // at low frequency and more near its resonance.
     assert!((0.28..0.45).contains(&found.delay_s), "{}", found.delay_s);
     let margins = found.margins.as_ref().unwrap();
@@ -156,7 +156,7 @@ fn a_person_who_does_not_follow_is_not_described() {
         }
     }
     assert!((7..=33).contains(&followed), "{followed}");
-    // Lines that are lost in noise beside others that are not.
+    // Lines that are lost in noise next to others that are not.
     let slow = |k: usize| (TAU * (2 * k) as f64 / PERIOD as f64).sin() + (TAU * (5 * k) as f64 / PERIOD as f64).sin();
     let runs: Vec<Record> = (0..6)
         .map(|i| {
@@ -271,7 +271,7 @@ fn what_cannot_be_described_is_refused() {
         ..DescriptionOptions::default()
     };
     assert!(message(&[bare], &named).contains("one of e, u"));
-    // Not whole periods: what is wrong with the channel that is there is said.
+    // Not whole periods: the problem is reported for the channel that exists.
     let half = record(PERIOD * 5 / 4, excitation, excitation);
     assert!(message(&[half], &options).contains("whole periods"));
     let twice = record(PERIOD, excitation, |k| 2.0 * excitation(k));

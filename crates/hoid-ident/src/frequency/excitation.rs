@@ -30,7 +30,7 @@ pub struct Excitation {
     period_s: f64,
 }
 
-/// What counts as a line of a channel.
+/// Definition of a line of a channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LineSearch {
     /// Period T in s; the longest that all lines found are harmonics of where it is `None`.
@@ -52,7 +52,7 @@ impl Excitation {
     /// The harmonics n_k of the period T in s.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] without harmonics, with a harmonic 0 or one that stands twice, or
+    /// [`IdentError::BadOption`] without harmonics, with a harmonic 0 or one that appears twice, or
     /// for a period that is not positive.
     pub fn of_harmonics(harmonics: &[usize], period_s: f64) -> Result<Self, IdentError> {
         if !(period_s.is_finite() && period_s > 0.0) {
@@ -86,12 +86,12 @@ impl Excitation {
     /// The lines omega_k in rad/s, each a harmonic of the period T in s within 1e-4 of a harmonic.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a line that is none, and as [`Excitation::of_harmonics`].
+    /// [`IdentError::BadOption`] for a line that is invalid, and as [`Excitation::of_harmonics`].
     pub fn new(omega_rad_s: &[f64], period_s: f64) -> Result<Self, IdentError> {
         let mut harmonics = Vec::with_capacity(omega_rad_s.len());
         for &omega in omega_rad_s {
             let n = omega * period_s / TAU;
-            // Also refuses what is no number.
+            // Also refuses a value that is not a number.
             if !((n - n.round()).abs() <= ROUNDING && (0.5..1e9).contains(&n)) {
                 let nearest = n.round().max(1.0) * TAU / period_s;
                 return refuse(
@@ -124,7 +124,7 @@ impl Excitation {
     /// with the period given it is refused.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a channel that is not there, or whose power is not in such
+    /// [`IdentError::BadOption`] for a channel that does not exist, or whose power is not in such
     /// lines: noise, or a span of no whole periods; [`IdentError::NoExcitation`] for a constant
     /// channel; [`IdentError::NotWholePeriods`].
     pub fn found_in(record: &Record, channel: &str, search: &LineSearch) -> Result<Self, IdentError> {

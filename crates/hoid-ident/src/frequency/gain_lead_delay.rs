@@ -90,7 +90,7 @@ impl DescribingFunction {
     /// Gain, lead and delay by weighted least squares.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a range of delays that is none, for variance weights of one
+    /// [`IdentError::BadOption`] for a range of delays that is invalid, for variance weights of one
     /// run, or for fewer lines than parameters need.
     pub fn fit_gain_lead_delay(&self, options: &GainLeadDelayOptions) -> Result<GainLeadDelay, IdentError> {
         let (shortest, longest) = options.delay_range_s;

@@ -19,7 +19,7 @@
 //!   [`Line::confidence_circle`] holds where it is not.
 //! - **Coherence** between excitation and u over runs:
 //!   `|sum U_i D_i*|^2 / (sum |U_i|^2 sum |D_i|^2)`. Of n unrelated runs it is 1/n in the mean.
-//! - **Remnant**: what u has off the lines, as the remnant shows in u behind the loop, `N/(1 + L)`.
+//! - **Remnant**: what u has at non-excited frequencies, as the remnant shows in u after the loop, `N/(1 + L)`.
 //!
 //! Sources: D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in Electronics 8 (1967) 231-249;
 //! M. M. van Paassen and M. Mulder, *Identification of Human Operator Control Behaviour in
@@ -27,22 +27,22 @@
 //! Identification: A Frequency Domain Approach*, 2012, sections 2.4 to 2.7; J. S. Bendat and A. G.
 //! Piersol, *Random Data*, 2010, chapters 9 and 11.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`Excitation`] | the lines: given, of a forcing function, or found in a channel |
 //! | `window`, `spectrum` | whole periods, offsets between channels, Fourier coefficients |
 //! | [`DescribingOptions`] | averaging, span, offset, controlled element |
 //! | `describe` | [`describe()`]: lines of all runs, averages, standard errors |
-//! | `remnant` | power off the lines: spectrum, share, noise ratio |
+//! | `remnant` | power at non-excited frequencies: spectrum, share, noise ratio |
 //! | `open_loop` | crossover frequency and phase margin by interpolation, with their spread |
 //! | `description` | [`describe_runs()`]: all of it with every choice that the records decide, and its verdict |
-//! | `doubts` | what makes a describing function doubtful |
+//! | `diagnostics` | what makes a describing function doubtful |
 //! | `unwrapping` | [`unwrapped_deg()`]: phase without jumps |
 //! | `gain_lead_delay` | gain, lead and delay by weighted least squares |
 
 mod describe;
 mod description;
-mod doubts;
+mod diagnostics;
 mod excitation;
 mod gain_lead_delay;
 mod open_loop;
@@ -64,8 +64,8 @@ pub(crate) use excitation::greatest_common_divisor;
 pub(crate) use window::Window;
 
 pub use describe::{DescribingFunction, Line, RunSummary, describe};
-pub use description::{Description, DescriptionOptions, USUAL_EXCITATIONS, describe_runs};
-pub use doubts::chance_coherence;
+pub use description::{COMMON_EXCITATIONS, Description, DescriptionOptions, describe_runs};
+pub use diagnostics::chance_coherence;
 pub use excitation::{Excitation, LineSearch};
 pub use gain_lead_delay::{GainLeadDelay, GainLeadDelayOptions, LineWeights};
 pub use open_loop::{Crossover, DescribingMargins, OpenLoop};

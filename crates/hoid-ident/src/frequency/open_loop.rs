@@ -42,7 +42,7 @@ pub struct Crossover {
     pub phase_margin_deg: f64,
 }
 
-/// Crossover and phase margin with their uncertainty; `None` where no crossover lies between the
+/// Crossover and phase margin with their uncertainty; `None` if no crossover lies between the
 /// lines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DescribingMargins {
@@ -54,7 +54,7 @@ pub struct DescribingMargins {
     pub phase_crossover_rad_s: Option<Estimate>,
     /// Gain margin there, dB.
     pub gain_margin_db: Option<Estimate>,
-    /// Those of each run.
+    /// The entries of each run.
     pub per_run: Vec<Option<Crossover>>,
     /// Standard deviation of the crossover over the runs that have one, rad/s.
     pub crossover_spread_rad_s: Option<f64>,
@@ -69,7 +69,7 @@ impl DescribingFunction {
     }
 
     /// The open loop with any frequency response over rad/s, such as that of the controlled element
-    /// behind its hold.
+    /// after its hold.
     pub fn open_loop_with(&self, element: impl Fn(f64) -> Complex64) -> OpenLoop {
         let known: Vec<Complex64> = self.lines.iter().map(|l| element(l.omega_rad_s)).collect();
         self.loop_of(|k, _| known[k], |k, _| known[k])
@@ -160,8 +160,8 @@ impl OpenLoop {
 
 impl Crossover {
     /// The lowest crossover where the magnitude of an open loop falls, between ascending
-    /// frequencies in rad/s at which its response is known; none where it does not. The phase of
-    /// the delay in s is interpolated apart.
+    /// frequencies in rad/s at which its response is known; none if it does not. The phase of the
+    /// delay in s is interpolated apart.
     pub fn of(omega_rad_s: &[f64], response: &[Complex64], delay_s: f64) -> Option<Self> {
         let mut pairs = omega_rad_s.windows(2).zip(response.windows(2));
         pairs.find_map(|(w, l)| {
@@ -266,7 +266,7 @@ mod tests {
 
     #[test]
     fn the_gain_margin_is_where_the_phase_falls_through_the_negative_axis() {
-        // 4/s behind 0.3 s: -180 deg at pi/0.6, where the gain is 4 * 0.6/pi.
+        // 4/s after 0.3 s: -180 deg at pi/0.6, where the gain is 4 * 0.6/pi.
         let omega = [0.7, 3.0, 9.0, 14.0];
         let response: Vec<Complex64> = omega
             .iter()

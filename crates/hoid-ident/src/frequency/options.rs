@@ -1,4 +1,4 @@
-//! What a describing function is made of: averaging, spans, offsets, and the channels of the
+//! Components of a describing function: averaging, spans, offsets, and the channels of the
 //! controlled element.
 
 use hoid_model::Detrend;
@@ -15,12 +15,12 @@ pub enum Averaging {
         /// Name of the channel.
         channel: String,
     },
-    /// The same with D_i = 1: every run (and period) begins at the same phase of the same
+    /// The same with D_i = 1: every run (and period) starts at the same phase of the same
     /// excitation.
     SameExcitation,
 }
 
-/// What is averaged over.
+/// Averaging.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Realisation {
     /// Each record is one realisation, however many periods it has.
@@ -46,7 +46,7 @@ pub struct MeasuredElement {
 pub struct DescribingOptions {
     /// How runs are averaged. Default [`Averaging::Ratios`].
     pub averaging: Averaging,
-    /// What a run is. Default [`Realisation::Record`].
+    /// Definition of a run. Default [`Realisation::Record`].
     pub realisation: Realisation,
     /// Start of the span, s; that of the record where it is `None`.
     pub from_s: Option<f64>,
@@ -54,7 +54,7 @@ pub struct DescribingOptions {
     pub to_s: Option<f64>,
     /// `e[k]` belongs to `u[k + offset_samples]`, a whole number or not. Default 0.
     pub offset_samples: f64,
-    /// What is taken out of e and u of each run beforehand. The lines do not see a mean, the rms
+    /// Trend removed from e and u of each run beforehand. The lines do not see a mean, the rms
     /// does; a straight line has power at all lines. Default nothing.
     pub detrend: Detrend,
     /// Bins of the shortest run that are averaged into one value of the remnant spectrum. Default

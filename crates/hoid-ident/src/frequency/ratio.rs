@@ -68,8 +68,8 @@ impl Ratio {
     }
 }
 
-/// A value with the standard error of the jackknife; none where one of the values without a run
-/// does not exist, or there is only one run.
+/// A value with the standard error of the jackknife; none if one of the values without a run does
+/// not exist, or there is only one run.
 pub(super) fn jackknife(value: f64, without: &[Option<f64>]) -> Estimate {
     let known: Vec<f64> = without.iter().copied().flatten().collect();
     let n = without.len();

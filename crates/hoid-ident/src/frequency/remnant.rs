@@ -1,4 +1,4 @@
-//! The remnant in u: its power off the lines.
+//! The remnant in u: its power at non-excited frequencies.
 //!
 //! Over whole periods the response to the excitation has no power between its lines, so that all of
 //! it there is remnant. Bin k of a window of N samples gives the one-sided density
@@ -6,9 +6,9 @@
 //! degrees of freedom); the mean over n runs and neighbouring bins, m values, has one of
 //! `1/sqrt(m)` (J. S. Bendat and A. G. Piersol, *Random Data*, 2010, section 8.5.4).
 //!
-//! At the lines the remnant stands too. With the density of the neighbourhood there,
-//! `noise ratio = power of the remnant / var(u)` estimates P_n of eq. 43, where the share off the
-//! lines leaves the lines out.
+//! At the lines there is also remnant. With the density of the neighbourhood there,
+//! `noise ratio = power of the remnant / var(u)` estimates P_n of eq. 43, where the share at
+//! non-excited frequencies leaves the lines out.
 
 use std::f64::consts::TAU;
 
@@ -21,8 +21,8 @@ use super::{spectrum::power, window::Window};
 pub struct RemnantBand {
     /// Mean frequency of its bins, rad/s.
     pub omega_rad_s: f64,
-    /// One-sided power density of u off the lines, square of the unit of u per rad/s: its integral
-    /// is a variance.
+    /// One-sided power density of u at non-excited frequencies, square of the unit of u per rad/s:
+    /// its integral is a variance.
     pub density: f64,
     /// Values that the mean is over: bins of all runs.
     pub values: usize,
@@ -54,7 +54,7 @@ impl Control<'_> {
         power(self.coefficients, k, self.window.samples)
     }
 
-    /// Variance, and the power off the lines.
+    /// Variance, and the power at non-excited frequencies.
     fn powers(&self, harmonics: &[usize]) -> (f64, f64) {
         let bins = 1..self.coefficients.len();
         let all: f64 = bins.clone().map(|k| self.power(k)).sum();
@@ -66,7 +66,7 @@ impl Control<'_> {
     }
 }
 
-/// Bands of `neighbours` bins of the shortest window, each the mean over the bins off the lines of
+/// Bands of `neighbours` bins of the shortest window, each the mean over the non-excited bins of
 /// all runs.
 pub(super) fn spectrum(runs: &[Control<'_>], harmonics: &[usize], ts_s: f64, neighbours: usize) -> Vec<RemnantBand> {
     let widest = runs.iter().map(|r| r.width_rad_s(ts_s)).fold(0.0, f64::max);
@@ -95,7 +95,7 @@ pub(super) fn spectrum(runs: &[Control<'_>], harmonics: &[usize], ts_s: f64, nei
     bands.iter().filter(|b| b.2 > 0).map(mean).collect()
 }
 
-/// Share of the power of u off the lines, and noise ratio of one run.
+/// Share of the power of u at non-excited frequencies, and noise ratio of one run.
 pub(super) fn share_and_ratio(
     run: &Control<'_>,
     harmonics: &[usize],

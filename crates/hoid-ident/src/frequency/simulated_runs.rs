@@ -40,7 +40,7 @@ fn lines() -> Excitation {
     Excitation::of_forcing_function(&Scenario::condition(Condition::C1).forcing, PERIOD_S).unwrap()
 }
 
-/// The operator behind its hold.
+/// The operator after its hold.
 fn operator(scenario: &Scenario) -> PolynomialModel {
     let d = scenario.initial.operator.discretise(scenario.sample_time).unwrap();
     let theta = vec![d.held.b0, d.held.b1, 0.0, d.held.f1, d.held.f2];
@@ -48,7 +48,7 @@ fn operator(scenario: &Scenario) -> PolynomialModel {
     PolynomialModel::new(Structure::BoxJenkins, orders, scenario.sample_time, theta).unwrap()
 }
 
-/// `K_c/(s (s + omega_b))` behind its hold, in closed form: the residues of
+/// `K_c/(s (s + omega_b))` after its hold, in closed form: the residues of
 /// `K_c/(s^2 (s + omega_b))`.
 fn element(scenario: &Scenario) -> DiscreteTransferFunction {
     let (c, ts) = (scenario.initial.controlled_element, scenario.sample_time.s());
@@ -160,9 +160,9 @@ fn error_bars_hold_what_they_say() {
     // Nearly independent: a standard error of 0.0077. Only where the remnant in e is as large as e
     // there may be no bound.
     assert!((coverage - 0.95).abs() < 0.023 && without_bound[2..].iter().all(|n| *n == 0));
-    // At the two lowest lines the remnant in e is no small part of it, and sigma holds to the first
-    // order only. At each of the others 80 squares with two degrees of freedom, and their estimates
-    // with eight: a standard error of 0.044 for the mean.
+    // At the two lowest lines the remnant in e is not a small part of it, and sigma holds to the
+    // first order only. At each of the others 80 squares with two degrees of freedom, and their
+    // estimates with eight: a standard error of 0.044 for the mean.
     let ratios: Vec<f64> = squares[2..]
         .iter()
         .map(|(square, variance)| square / variance)
@@ -187,13 +187,16 @@ fn the_remnant_is_found_off_the_lines() {
         let records = runs(&scenario, 500, 40);
         let found = describe(&records, &lines(), &DescribingOptions::default()).unwrap();
         let ratio = found.noise_ratio;
-        println!("{condition}: {ratio:?}, off the lines {:?}", found.off_line_share);
-        // Of the demanded level 0.1, of which 1000 runs are within 0.003; the mean of ratios has a
+        println!(
+            "{condition}: {ratio:?}, at non-excited frequencies {:?}",
+            found.off_line_share
+        );
+        // For the demanded level 0.1, of which 1000 runs are within 0.003; the mean of ratios has a
         // bias of some of their variance.
         assert!((ratio.value - 0.1).abs() < 3.0 * ratio.standard_error.unwrap() + 0.003);
         assert!(found.off_line_share.value < ratio.value);
 
-        // n = K_n z behind the loop: the density of held white noise is |filter|^2 Ts/pi per rad/s.
+        // n = K_n z after the loop: the density of held white noise is |filter|^2 Ts/pi per rad/s.
         let filter = RemnantFilter::new(k_n, 0.06, 1).unwrap();
         let filter = filter
             .discrete(scenario.sample_time, RemnantDiscretisation::ZeroOrderHold)

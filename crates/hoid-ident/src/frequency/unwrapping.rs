@@ -1,8 +1,8 @@
 //! Phase without jumps of whole turns.
 //!
-//! Between two lines the phase is known but for whole turns. It is taken along the shorter way once
-//! the phase of a delay, which turns fastest, is taken out: `phi + omega tau` moves by less than
-//! half a turn from line to line where tau is right within `pi/(omega_{k+1} - omega_k)`.
+//! Between two lines the phase is known except for whole turns. It is taken along the shorter way
+//! once the phase of a delay, which turns fastest, is taken out: `phi + omega tau` moves by less
+//! than half a turn from line to line where tau is right within `pi/(omega_{k+1} - omega_k)`.
 
 use std::f64::consts::PI;
 

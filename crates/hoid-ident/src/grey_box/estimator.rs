@@ -157,7 +157,7 @@ impl GreyBox {
     ) -> Result<GreyBoxFit, IdentError> {
         let mut etas: Vec<(String, Vec<f64>)> = Vec::new();
         // The minimum of another order is near, whatever the layout of the records; m = 0 has no
-        // T_n to go on with.
+        // T_n to continue with.
         if let Some(before) = before.filter(|b| b.len() == criterion.layout.names.len()) {
             etas.push((format!("order {}", criterion.layout.order - 1), before.to_vec()));
         }

@@ -1,5 +1,4 @@
-//! Where the physical parameters of each record stand in eta, and what they mean for its
-//! polynomials.
+//! Where the physical parameters of each record are in eta, and what they mean for its polynomials.
 //!
 //! Slots of one record: `[K_e, K_e_dot (or T_L), omega_nm, zeta_nm, tau_e, T_n]`, the last only for
 //! m > 0. A parameter that the records share has one place in eta, one that is individual has as

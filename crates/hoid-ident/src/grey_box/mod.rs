@@ -6,8 +6,8 @@
 //! `u = (B/F) q^-nk e + (C/D) eps` with the polynomials `theta(eta)`; the criterion is that of the
 //! general model, so that initial states are eliminated exactly, and `psi_eta = psi d theta/d eta`.
 //! Where Box-Jenkins with nc = 0 has a free D of order m, this has T_n alone, and neither D nor nk
-//! has to stand in for what the structure leaves out: T_n, K_n and tau_e are consistent. K_n
-//! follows from the innovation: `K_n = sigma/g(T_n)`.
+//! has to replace what the structure leaves out: T_n, K_n and tau_e are consistent. K_n follows
+//! from the innovation: `K_n = sigma/g(T_n)`.
 //!
 //! The order m is given or chosen by BIC over a range; m from 1 on has the same number of
 //! parameters, so that the loss decides.
@@ -15,14 +15,14 @@
 //! Source: L. Ljung, *System Identification*, 1999, sections 4.3 (grey boxes) and 7.2; T. Bohlin,
 //! *Practical Grey-box Process Identification*, 2006.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `options` | [`GreyBox`]: what may be chosen, by fields and by names |
 //! | `estimator` | the fit |
 //! | `layout` | order and bounds of the physical parameters |
 //! | `parametrisation` | what the criterion needs to know of physical parameters |
 //! | `objective` | the criterion in physical parameters, and its derivatives |
-//! | `starts` | where the searches begin |
+//! | `starts` | where the searches start |
 //! | `result` | the fit with its uncertainty |
 
 mod estimator;

@@ -33,29 +33,29 @@ pub(crate) struct PhysicalCriterion<'a, P> {
     /// none.
     pub samples: Option<Vec<usize>>,
     pub limits: Vec<(f64, f64)>,
-    /// What is known before the data, in units of the residuals; none where there is nothing.
+    /// Prior knowledge before the data, in units of the residuals; none if there is nothing.
     pub penalty: Vec<Penalty>,
-    /// What else was measured of the operator that all records share.
-    pub beside: Option<Beside<'a>>,
+    /// Common parts of else was measured of the operator that all records.
+    pub additional: Option<AdditionalTerm<'a>>,
 }
 
 /// Another criterion of the first elements of eta, added to the sum of squares with a weight.
 #[derive(Clone)]
-pub(crate) struct Beside<'a> {
+pub(crate) struct AdditionalTerm<'a> {
     pub criterion: Arc<dyn Objective + Send + Sync + 'a>,
     /// How many elements of eta it is of.
     pub elements: usize,
     pub weight: f64,
 }
 
-impl fmt::Debug for Beside<'_> {
+impl fmt::Debug for AdditionalTerm<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Beside {{ weight: {} }}", self.weight)
+        write!(f, "Additional {{ weight: {} }}", self.weight)
     }
 }
 
-impl Beside<'_> {
-    /// What it adds at eta to a linearisation of as many parameters.
+impl AdditionalTerm<'_> {
+    /// Adds its contribution at eta to a linearisation.
     pub fn add_to(&self, eta: &[f64], total: &mut Linearisation, workspace: &mut Workspace) {
         let (p, q) = (eta.len(), self.elements);
         let own = self.criterion.linearise(&eta[..q], workspace);
@@ -85,8 +85,8 @@ pub(crate) struct Penalty {
 }
 
 impl Penalty {
-    /// The same beside innovations of this variance.
-    pub fn beside(self, variance: f64) -> Self {
+    /// The same next to innovations of this variance.
+    pub fn weighted(self, variance: f64) -> Self {
         Self { variance, ..self }
     }
 
@@ -106,13 +106,13 @@ impl Penalty {
         self.variance * self.precision
     }
 
-    /// What it adds to the sum of squares.
+    /// Contribution to the sum of squares.
     pub fn at(&self, eta: &[f64]) -> f64 {
         let (value, _) = self.value_and_slope(eta);
         self.weight() * (self.mean - value).powi(2)
     }
 
-    /// `v g'(eta_i)^2/s^2`, its element of the matrix P that stands beside `psi' psi`.
+    /// `v g'(eta_i)^2/s^2`, its element of the matrix P that is next to `psi' psi`.
     pub fn curvature(&self, eta: &[f64]) -> f64 {
         let (_, slope) = self.value_and_slope(eta);
         self.weight() * slope * slope
@@ -140,15 +140,15 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
             samples: None,
             limits,
             penalty: Vec::new(),
-            beside: None,
+            additional: None,
         }
     }
 
-    /// What was measured besides, at eta: its part of the criterion; zeros where there is nothing.
-    pub fn beside_at(&self, eta: &[f64], workspace: &mut Workspace) -> Linearisation {
+    /// Additional measurements, at eta: its part of the criterion; zeros if there is nothing.
+    pub fn additional_at(&self, eta: &[f64], workspace: &mut Workspace) -> Linearisation {
         let mut own = Linearisation::empty(eta.len());
-        if let Some(beside) = &self.beside {
-            beside.add_to(eta, &mut own, workspace);
+        if let Some(additional) = &self.additional {
+            additional.add_to(eta, &mut own, workspace);
         }
         own
     }
@@ -305,7 +305,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         crate::optimize::free_parameters(self, eta, descent)
     }
 
-    /// What the polynomials of a record are at eta.
+    /// Polynomials of a record at eta.
     pub fn model_of(&self, eta: &[f64], record: usize) -> Result<Mapped, IdentError> {
         Ok(self.layout.map(eta, record, HeldSamples::default())?)
     }
@@ -356,8 +356,8 @@ impl<P: Parametrisation> Objective for PhysicalCriterion<'_, P> {
         for penalty in &self.penalty {
             penalty.add_to(eta, &mut total);
         }
-        if let Some(beside) = &self.beside {
-            beside.add_to(eta, &mut total, workspace);
+        if let Some(additional) = &self.additional {
+            additional.add_to(eta, &mut total, workspace);
         }
         total
     }

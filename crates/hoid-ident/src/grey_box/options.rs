@@ -1,5 +1,5 @@
-//! What may be chosen of the operator with a remnant of order m: the fields of [`GreyBox`], and the names under
-//! which texts set them. An option is declared here and nowhere else.
+//! Options of the operator with a remnant of order m: the fields of [`GreyBox`], and the names under which texts set
+//! them. An option is declared here and nowhere else.
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
@@ -10,9 +10,9 @@ use crate::{
 };
 
 /// Orders m of the remnant that are tried where none is given.
-const USUAL_ORDERS: RangeInclusive<usize> = 1..=4;
+const DEFAULT_ORDERS: RangeInclusive<usize> = 1..=4;
 
-/// What is to be estimated in physical parameters, and how.
+/// Quantities to be estimated in physical parameters, and how.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GreyBox {
     /// Orders m of the remnant filter to choose from, 0 (white) to 4.
@@ -36,7 +36,7 @@ pub struct GreyBox {
 impl Default for GreyBox {
     /// Orders 1 to 4 of the remnant.
     fn default() -> Self {
-        Self::new(USUAL_ORDERS)
+        Self::new(DEFAULT_ORDERS)
     }
 }
 
@@ -57,7 +57,7 @@ impl GreyBox {
 
 impl BatchOptions for GreyBox {
     fn options() -> Vec<BatchOption<Self>> {
-        let usual = Self::default();
+        let default = Self::default();
         let mut all = vec![
             shared::noise(|_: &mut Self, _, _| Ok(())).printed("noise", |_, _| Some("remnant".to_owned())),
             shared::change(),
@@ -71,7 +71,7 @@ impl BatchOptions for GreyBox {
                 Some(if one { order } else { format!("{order}, by BIC") })
             }),
             shared::delay_range(
-                usual.delay_range_s,
+                default.delay_range_s,
                 |how: &mut Self| &mut how.delay_range_s,
                 |how| how.delay_range_s,
             ),
@@ -91,12 +91,12 @@ impl BatchOptions for GreyBox {
             |how: &mut Self| &mut how.constraints,
             |how| &how.constraints,
         ));
-        all.extend(shared::search(usual.search, |how: &mut Self| &mut how.search));
+        all.extend(shared::search(default.search, |how: &mut Self| &mut how.search));
         all
     }
 }
 
 fn remnant_order() -> Setting {
     let help = "Order m of the remnant, a number or a range to search";
-    Setting::new("remnant_order", Kind::Counts, help).default(&shared::range_words(&USUAL_ORDERS))
+    Setting::new("remnant_order", Kind::Counts, help).default(&shared::range_words(&DEFAULT_ORDERS))
 }

@@ -1,4 +1,4 @@
-//! What the criterion needs to know of physical parameters: which polynomials they give.
+//! Requirements of the criterion on physical parameters: which polynomials they give.
 
 use std::ops::Range;
 
@@ -34,7 +34,7 @@ impl HeldSamples<'_> {
 }
 
 impl Mapped {
-    /// Covariance of theta by rows, `J C J'`, from that of eta; the slots of the record stand at
+    /// Covariance of theta by rows, `J C J'`, from that of eta; the slots of the record are at
     /// these places of eta.
     pub fn covariance_of_theta(&self, of_eta: &[f64], p: usize, places: &[usize]) -> Vec<f64> {
         let columns = &self.columns;
@@ -67,7 +67,7 @@ pub(crate) trait Parametrisation: Clone {
     fn delay_of(&self, record: usize) -> usize;
     /// Time between two samples.
     fn sample_time(&self) -> SampleTime;
-    /// Delay at which the sample 0 begins, in samples: the model of a smooth error acts half a sample later.
+    /// Delay at which the sample 0 starts, in samples: the model of a smooth error acts half a sample later.
     fn first_sample_begins(&self) -> f64 {
         0.0
     }

@@ -1,4 +1,4 @@
-//! What a grey-box fit found.
+//! Result of a grey-box fit.
 
 use hoid_model::{
     NotConvertible, OperatorParameters,
@@ -20,7 +20,7 @@ pub struct OrderCandidate {
     pub outcome: Result<OrderFigures, String>,
 }
 
-/// What orders are compared by.
+/// Criterion for orders.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct OrderFigures {
     /// Loss V.
@@ -38,7 +38,7 @@ pub struct OrderFigures {
 pub struct GreyBoxFit {
     pub(crate) layout: Layout,
     pub(crate) eta: Vec<f64>,
-    /// Covariance of eta by rows; zero for what was fixed or rests at a bound.
+    /// Covariance of eta by rows; zero for parameters that are fixed or at a bound.
     pub(crate) covariance: Option<Vec<f64>>,
     /// Elements of eta with a variance of their own.
     pub(crate) free: Vec<usize>,
@@ -71,7 +71,7 @@ impl GreyBoxFit {
             .collect()
     }
 
-    /// Covariance of [`GreyBoxFit::parameters`] by rows, zero for what was fixed or rests at a
+    /// Covariance of [`GreyBoxFit::parameters`] by rows, zero for parameters that are fixed or at a
     /// bound; `None` for an exact fit.
     pub fn covariance(&self) -> Option<&[f64]> {
         self.covariance.as_deref()
@@ -216,7 +216,7 @@ impl GreyBoxFit {
         self.whole().termination()
     }
 
-    /// The start that won.
+    /// The best start.
     pub fn start(&self) -> &str {
         self.whole().start()
     }

@@ -1,6 +1,6 @@
 //! Where the search in physical parameters starts.
 //!
-//! 1. `grid`: delays every 0.04 s over their range with a usual neuromuscular system, then at the
+//! 1. `grid`: delays every 0.04 s over their range with a typical neuromuscular system, then at the
 //!    best of them frequencies and dampings in the range of human operators. The residual is affine
 //!    in K_e and K_e_dot, so that both are eliminated at each point; the noise model is that of one
 //!    T_n. The best points by loss are starts.
@@ -23,9 +23,9 @@ use super::{
 /// respond to.
 const GRID_DELAY_S: f64 = 0.04;
 /// Neuromuscular frequency with which the delays are ranked, rad/s.
-const USUAL_OMEGA: f64 = 11.0;
+const DEFAULT_OMEGA: f64 = 11.0;
 /// Damping ratio with which the delays are ranked.
-const USUAL_ZETA: f64 = 0.4;
+const DEFAULT_ZETA: f64 = 0.4;
 /// Delays at which the other frequencies and dampings are tried.
 const BEST_DELAYS: usize = 2;
 /// Neuromuscular frequencies of the grid, rad/s.
@@ -35,7 +35,7 @@ const GRID_ZETA: [f64; 3] = [0.25, 0.7, 1.3];
 /// Time constants of the remnant, s; the first ranks the grid.
 /// Below half a sample a filter of third order has another minimum.
 pub(crate) const GRID_TIME_CONSTANT_S: [f64; 6] = [0.1, 0.004, 0.012, 0.03, 0.06, 0.3];
-/// Fewest delays over a range that is not a point.
+/// Least number of delays over a range that is not a point.
 const FEWEST_DELAYS: usize = 3;
 
 /// A start with its name: `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, T_n]`, the same for all
@@ -106,7 +106,7 @@ pub(crate) fn grid(criterion: &PhysicalCriterion<'_, Layout>, starts: usize, wor
     let by_loss = |points: &mut Vec<(Start, f64)>| points.sort_by(|a, b| a.1.total_cmp(&b.1));
     let mut points: Vec<(Start, f64)> = delays
         .into_iter()
-        .filter_map(|tau| ranked(tau, USUAL_OMEGA, USUAL_ZETA))
+        .filter_map(|tau| ranked(tau, DEFAULT_OMEGA, DEFAULT_ZETA))
         .collect();
     by_loss(&mut points);
     let best: Vec<f64> = (leading(&points, BEST_DELAYS).iter()).map(|s| s.slots[DELAY]).collect();

@@ -2,9 +2,9 @@
 //! models with more coefficients than the operator's.
 //!
 //! Given F, C and D the residual is affine in B; given F, C and B it is affine in D. So two grids
-//! that know nothing of the data, one of F and one of C, and least squares for the rest, reach every
-//! kind of minimum: slow real poles beside each other, a resonance, C and D that nearly cancel each
-//! other at any frequency.
+//! that has no information about the data, one of F and one of C, and least squares for the rest,
+//! reach every kind of minimum: slow real poles next to each other, a resonance, C and D that nearly
+//! cancel each other at any frequency.
 //!
 //! **Systems**, B and F: that of the minimum that is known; those of refined instrumental variables
 //! with autoregressive noise of two orders ([`crate::iv::refined_system`]); and the best places of

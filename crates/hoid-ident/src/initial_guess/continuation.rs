@@ -6,8 +6,8 @@
 //! the poles of the minimum that it finds, taken back by the K-th root, start the search on the
 //! record itself. The delay becomes a fraction of a sample, so that B gets one coefficient more.
 //!
-//! Only a start: where the system is fast beside K samples it is a bad one, and others are tried as
-//! well.
+//! Only a start: where the system is fast compared with K samples it is a bad one, and others are
+//! tried as well.
 
 use hoid_model::{Complex64, Orders, SampleTime, polynomial, polynomial_model::monic};
 
@@ -41,11 +41,11 @@ const SLOW: f64 = 1.3;
 /// The poles that the averaged record gives.
 #[derive(Debug, Default)]
 pub(crate) struct SlowPoles {
-    /// Polynomials F, best first; none where the records are short or the model has no poles in F
+    /// Polynomials F, best first; none if the records are short or the model has no poles in F
     /// alone.
     pub f: Vec<Vec<f64>>,
-    /// True when all poles of the best one are slow beside the average, so that it determines
-    /// nearly all that the record does.
+    /// True when all poles of the best one are slow compared with the average, so that it
+    /// determines nearly all that the record does.
     pub complete: bool,
 }
 
@@ -75,7 +75,7 @@ pub(crate) struct AveragedRecords {
 }
 
 impl AveragedRecords {
-    /// `None` where the records are too short, or the model has no poles in F alone.
+    /// `None` if the records are too short, or the model has no poles in F alone.
     pub fn of(criterion: &Criterion<'_>, sample_time: SampleTime) -> Option<Self> {
         let shortest = criterion.data.iter().map(|d| d.u.len()).min().unwrap_or(0);
         let factor = (shortest / SAMPLES_LEFT).min(LARGEST_FACTOR);
@@ -243,8 +243,8 @@ fn averaged(x: &[f64], factor: usize) -> Vec<f64> {
         .collect()
 }
 
-/// The polynomial whose roots are the principal K-th roots; `None` where a root has none that is
-/// real with it (on the closed negative axis).
+/// The polynomial whose roots are the principal K-th roots; `None` if a root has none that is real
+/// with it (on the closed negative axis).
 fn root_of_poles(f: &[f64], factor: usize) -> Option<Vec<f64>> {
     let k = factor as f64;
     let roots: Option<Vec<Complex64>> = polynomial::roots(&monic(f))?

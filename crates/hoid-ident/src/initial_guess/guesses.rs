@@ -13,15 +13,15 @@
 //!    few times (K. Steiglitz and L. E. McBride, *IEEE Trans. Automatic Control* 10 (1965)
 //!    461-464). The `arx` poles themselves, badly biased where the noise poles are not those of the
 //!    system (m0 = 1: a2 near 0), only where that fails.
-//! 4. `high-order arx`: an ARX model with so many poles that the noise has some of its own, and the
-//!    poles of its noise-free response by Steiglitz and McBride (B. Wahlberg, *Automatica* 25
-//!    (1989) 829-841, in its simplest form).
+//! 4. `high-order arx`: an ARX model with a given number of poles that the noise has some of its
+//!    own, and the poles of its noise-free response by Steiglitz and McBride (B. Wahlberg,
+//!    *Automatica* 25 (1989) 829-841, in its simplest form).
 //! 5. `instruments`: ARX, instrumental variables twice, the residual, C and D from it
 //!    ([`crate::iv`]).
 //!
-//! The last three only where the poles of the first are not all slow beside its average: there it
-//! determines nearly all that the record does. The proposals are ranked by their loss with the
-//! initial states eliminated; the search runs from the best of them, and the best minimum wins.
+//! The last three only where the poles of the first are not all slow compared with its average:
+//! there it determines nearly all that the record does. The proposals are ranked by their loss with
+//! the initial states eliminated; the search runs from the best of them, and the best minimum wins.
 //! Short records and larger models have more minima than these find: there others are tried
 //! afterwards ([`crate::initial_guess::broad`]).
 
@@ -44,7 +44,7 @@ use crate::{
 /// Proposals that are completed with a noise model of their own.
 const COMPLETED: usize = 4;
 
-/// The starts, with what is left to find of them.
+/// The starts, with the remaining unknowns.
 pub(crate) fn initial_guesses(
     criterion: &Criterion<'_>,
     sample_time: SampleTime,
@@ -155,7 +155,7 @@ fn ranked_grid(
 }
 
 /// Theta and sum of squares for a given F: A and B by least squares, the noise model by
-/// autoregression of what is left, and A and B once more with that noise model. With A in the model
+/// autoregression of the residual, and A and B once more with that noise model. With A in the model
 /// that is repeated: A and the noise model depend on each other (generalised least squares; D. W.
 /// Clarke, *IFAC Symposium on Identification*, Prague 1967).
 fn complete(criterion: &Criterion<'_>, f: &[f64], workspace: &mut Workspace) -> Option<(Vec<f64>, f64)> {

@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Theta for the orders of the criterion; `None` where A and F are both there (the chain does not
-/// tell their poles apart), where there is no input, and where the data do not carry it.
+/// distinguish their poles), where there is no input, and where the data do not carry it.
 pub(crate) fn instrument_chain(criterion: &Criterion<'_>) -> Option<Vec<f64>> {
     let o = criterion.orders;
     if o.nb == 0 || (o.na > 0 && o.nf > 0) {

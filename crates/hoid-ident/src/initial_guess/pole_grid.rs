@@ -1,6 +1,6 @@
-//! Poles that know nothing of the data: in the range of human operators, F of an operator's
-//! neuromuscular system at a few frequencies and dampings, through the exact zero-order hold; and
-//! all over the unit disc, whatever the sample time.
+//! Poles that has no information about the data: in the range of human operators, F of an
+//! operator's neuromuscular system at a few frequencies and dampings, through the exact zero-order
+//! hold; and all over the unit disc, whatever the sample time.
 
 use hoid_model::{Complex64, SampleTime, polynomial};
 

@@ -1,9 +1,9 @@
-//! Starts for models whose A stands beside a noise model or beside F: which poles belong to A?
+//! Starts for models whose A is next to a noise model or next to F: which poles belong to A?
 //!
 //! A belongs to the system and to the noise, F to the system and D to the noise alone, and the loss
 //! has a minimum at many a confusion of them: ARARX with a1 = -0.65, a2 = 0.11, d1 = -0.93 ends 40
-//! % too high from least squares, the pole of D in A. So the poles come from fits that know nothing
-//! of the division, and every way to deal them out is a start:
+//! % too high from least squares, the pole of D in A. So the poles come from fits that has no
+//! information about the division, and every way to deal them out is a start:
 //!
 //! - the poles of the system, A F, from instruments, which no coloured noise biases in an open loop
 //!   ([`crate::iv`]): any na of them are A, the rest F, and the noise model follows from what is
@@ -12,7 +12,7 @@
 //!   without its common factor: any nd of them are D, any nf of the rest F, and A and B follow by
 //!   least squares.
 //!
-//! A few steps of the search from each tell which of them lead down.
+//! A few steps of the search from each show which of them lead down.
 
 use hoid_model::{Complex64, Orders, polynomial, polynomial_model::monic};
 
@@ -31,7 +31,7 @@ const STEPS: usize = 8;
 /// Poles, or pairs of them, that are dealt out at most.
 const MAX_GROUPS: usize = 6;
 
-/// True where A stands beside other polynomials that could take its poles.
+/// True if A is next to other polynomials that could take its poles.
 pub(crate) fn concerns(o: &Orders) -> bool {
     o.na > 0 && o.nb > 0 && o.nc + o.nd + o.nf > 0
 }

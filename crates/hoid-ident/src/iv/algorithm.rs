@@ -1,15 +1,15 @@
-//! What a method of instrumental variables gives to the estimator, and gets from it.
+//! Interface between a method of instrumental variables and the estimator.
 
 use hoid_model::Structure;
 
 use super::equation::IvProblem;
 use crate::{IdentError, Termination, criterion::Criterion};
 
-/// A method: each stands in a file of its own and is listed in [`IvMethod`](super::IvMethod).
+/// A method: each is in a file of its own and is listed in [`IvMethod`](super::IvMethod).
 pub(super) struct Algorithm {
     /// Short name, as in options and tables.
     pub name: &'static str,
-    /// What it is, in a line without a full stop.
+    /// Its definition, in a line without a full stop.
     pub help: &'static str,
     /// Where it comes from.
     pub source: &'static str,
@@ -28,7 +28,7 @@ pub(super) struct IterationLimits {
     pub tolerance: f64,
 }
 
-/// What a method found.
+/// Result of a method.
 pub(super) struct IvSolution {
     /// Theta in the order of [`Orders::parameter_names`](hoid_model::Orders::parameter_names).
     pub theta: Vec<f64>,

@@ -11,7 +11,7 @@ const OWN_PART: f64 = 1e-10;
 /// Longest invented past in samples.
 const PAST: usize = 256;
 
-/// The signal behind an invented past, and the length of that past: reflected at the first sample
+/// The signal after an invented past, and the length of that past: reflected at the first sample
 /// and faded in, so that what is simulated from it starts without a jump.
 pub(super) fn with_past(x: &[f64]) -> (Vec<f64>, usize) {
     let length = PAST.min(x.len().saturating_sub(1));

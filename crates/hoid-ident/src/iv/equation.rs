@@ -22,7 +22,7 @@ use super::columns::{Columns, orthonormal, with_past};
 use crate::{
     IdentError,
     criterion::Data,
-    criterion::initial_state_responses::{InitialStateResponses, Past},
+    criterion::initial_state_responses::{InitialHistory, InitialStateResponses},
     linalg::least_squares::{LeastSquares, add_scaled, dot},
 };
 
@@ -168,6 +168,8 @@ impl<'a> IvProblem<'a> {
             z: self.instruments(filter, system),
         };
         let free = self.initial_state_responses(filter);
+        // 1/(C F) starts at rest at the first row, the true filter does not: the difference is a free response, which
+        // is projected out of all columns. The estimate then does not depend on the unknown past.
         let all = equation.phi.iter_mut().chain(&mut equation.z).chain([&mut equation.y]);
         all.for_each(|column| eliminate(&free, column));
         equation
@@ -187,6 +189,7 @@ impl<'a> IvProblem<'a> {
                 z = columns;
                 continue;
             }
+            // Each source serves only the rows whose noise did not enter its weights (split-sample instruments).
             for rows in self.rows_of(&source.samples, filter.d.len()) {
                 for (to, from) in z.iter_mut().zip(&columns) {
                     to[rows.clone()].copy_from_slice(&from[rows.clone()]);
@@ -220,7 +223,7 @@ impl<'a> IvProblem<'a> {
     /// Initial-state responses of 1/(C F) in each record, with its rows.
     fn initial_state_responses(&self, filter: Prefilter<'_>) -> Vec<(InitialStateResponses, usize)> {
         let poles = product(&monic(filter.c), &monic(filter.f));
-        let past = Past {
+        let past = InitialHistory {
             c: &[],
             d: &[],
             f: &[&poles[1..]],
@@ -248,6 +251,7 @@ impl<'a> IvProblem<'a> {
         }
         let mut at = 0;
         for n in self.rows(filter.d.len()) {
+            // d/df_i of F C eps = D (F u - B e): the second term of psi_fi is eps(t-i)/F.
             let mut through = eps[at..at + n].to_vec();
             divide_in_place(filter.f, &mut through);
             for (i, column) in psi[..self.poles].iter_mut().enumerate() {
@@ -301,6 +305,8 @@ impl<'a> IvProblem<'a> {
     /// # Errors
     /// [`IdentError::SingularInstruments`].
     pub fn solve(&self, equation: &Equation) -> Result<Vec<f64>, IdentError> {
+        // Z = Q T with T regular, so that Z' Phi theta = Z' y and Q' Phi theta = Q' y have the same solution, but the
+        // condition number of Z does not enter.
         let q = self.basis(&equation.z)?;
         let mut product: Vec<f64> = equation
             .phi
@@ -312,7 +318,7 @@ impl<'a> IvProblem<'a> {
         if !solved.has_full_rank() {
             return Err(IdentError::SingularInstruments {
                 dependence: format!(
-                    "they do not tell the regressors apart: {}",
+                    "they do not distinguish the regressors: {}",
                     solved.describe_dependence(&self.names)
                 ),
             });

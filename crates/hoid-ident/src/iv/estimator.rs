@@ -27,7 +27,7 @@ pub struct InstrumentalVariable {
     pub method: IvMethod,
     /// The orders.
     pub orders: Orders,
-    /// What the instruments are made of.
+    /// Components of the instruments.
     pub instruments: Instruments,
     /// Largest number of iterations of the refined methods. Default 100.
     pub max_iterations: usize,

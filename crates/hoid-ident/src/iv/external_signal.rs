@@ -100,6 +100,8 @@ pub(super) fn noise_free<'a>(external: &[&[f64]], data: &[Data<'a>]) -> Vec<Sour
     (0..BLOCKS)
         .map(|k| {
             let block = k * samples / BLOCKS..(k + 1) * samples / BLOCKS;
+            // Weights from the other blocks: the noise of this block is independent of them, so that the instrument is
+            // uncorrelated with it.
             let weights = weights_of_others(&basis, &whole, &target, block.clone()).unwrap_or_else(|| whole.clone());
             let sum = combination(&basis, &weights, samples);
             Source {
@@ -117,6 +119,8 @@ fn weights_of_others(basis: &[Vec<f64>], whole: &[f64], target: &[f64], block: R
     let mut right = whole.to_vec();
     for i in 0..p {
         let inside = &basis[i][block.clone()];
+        // Normal equations of all samples minus those of the block; the basis is orthonormal over all samples, so that
+        // the Gram matrix of all is the identity.
         right[i] -= dot(inside, &target[block.clone()]);
         for j in 0..p {
             let unit = if i == j { 1.0 + RIDGE } else { 0.0 };
@@ -188,7 +192,7 @@ mod tests {
     #[test]
     fn filters_are_orthonormal() {
         let mut impulse = vec![0.0; 4000];
-        // Behind the samples that the invented past is made of.
+        // After the samples that the invented past is made of.
         impulse[300] = 1.0;
         let columns = laguerre(&[&impulse], 0.9, 12);
         for (i, a) in columns.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! What the instruments are made of.
+//! Components of the instruments.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use hoid_model::Record;
 /// Channel of the forcing function in a record that has one.
 pub const FORCING_CHANNEL: &str = "f_t";
 
-/// What the instruments are made of.
+/// Components of the instruments.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Instruments {
     /// The input itself and the output that the model simulates from it. For an open loop: in a
@@ -30,7 +30,7 @@ impl Instruments {
 
     /// The forcing function f_t where all records have it: in a closed loop it is the signal that
     /// the noise does not reach. Else those that are simulated.
-    pub fn usual(records: &[Record]) -> Self {
+    pub fn default_for(records: &[Record]) -> Self {
         if records.iter().all(|r| r.channel(FORCING_CHANNEL).is_some()) {
             Self::External(FORCING_CHANNEL.to_owned())
         } else {

@@ -28,7 +28,7 @@
 //! the start, raised by D, would outweigh all that follows. Several records add up, row by row,
 //! with a common theta.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `estimator` | options, and the fit |
 //! | `methods` | the methods, a file each, and their list |

@@ -1,4 +1,4 @@
-//! Noise-free signals of a closed loop for estimators beside the methods of this folder.
+//! Noise-free signals of a closed loop for estimators next to the methods of this folder.
 
 use std::ops::Range;
 
@@ -32,7 +32,7 @@ pub(crate) fn noise_free_inputs(records: &[Record], channel: &str) -> Result<Vec
     Ok(made.into_iter().map(of).collect())
 }
 
-/// `(B/F) q^-nk e` behind an invented past, with theta of a Box-Jenkins model.
+/// `(B/F) q^-nk e` after an invented past, with theta of a Box-Jenkins model.
 pub(crate) fn simulated_output(orders: &Orders, theta: &[f64], e: &[f64]) -> Vec<f64> {
     let b = &theta[..orders.nb];
     let f = &theta[theta.len() - orders.nf..];

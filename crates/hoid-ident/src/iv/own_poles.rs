@@ -1,19 +1,18 @@
 //! The equation solved for its own poles, where the iteration of the refined methods does not
 //! settle.
 //!
-//! The iteration solves `Z' L (F u - B q^-nk e) = 0` for F and B with the 1/F of the iteration before
-//! in L. Where F has a pole so slow that the record hardly tells it from one on the unit circle, as
-//! the lag of an operator is, or where the model is too small, that equation is solved by a pole
-//! outside the circle; reflected inside, it leads to the same again. What is sought is a zero of
+//! The iteration solves `Z' L (F u - B q^-nk e) = 0` for F and B with the 1/F of the iteration before in L. Where F has
+//! a pole so slow that the record hardly distinguishes it from one on the unit circle, as the lag of an operator is, or
+//! where the model is too small, that equation is solved by a pole outside the circle; reflected inside, it leads to
+//! the same again. What is searched for is a zero of
 //!
 //! `g(theta) = Z' eps(theta)`,  `eps = (D/C) (u - (B/F) q^-nk e)`,
 //!
-//! which is the same at a fixed point, but has F stable by itself. So with Z, C and D of a system
-//! fixed, `|Q' eps(theta)|^2`, Q an orthonormal basis of Z, is minimised over B and stable F (damped
-//! Gauss-Newton, along the border of stability where that is in the way: [`crate::optimize`]). Then Z,
-//! C and D are made anew, until they no longer move theta ([`Extrapolation`] helps where that
-//! creeps or swings). Where g has no zero in the region of stability, the smallest value lies on its
-//! border, and the termination says so.
+//! which is the same at a fixed point, but has F stable by itself. So with Z, C and D of a system fixed,
+//! `|Q' eps(theta)|^2`, Q an orthonormal basis of Z, is minimised over B and stable F (damped Gauss-Newton, along the
+//! border of stability where that is in the way: [`crate::optimize`]). Then Z, C and D are made again, until they no
+//! longer move theta ([`Extrapolation`] helps where that creeps or swings). Where g has no zero in the region of
+//! stability, the smallest value lies on its border, and the termination reports it.
 //!
 //! **Where that has no end.** For a model that is smaller than the operator, eps is correlated with
 //! some of the instruments that other systems make, and theta may follow its own instruments without
@@ -55,7 +54,8 @@ const RIDGE: f64 = 1e-10;
 const INNER: f64 = 1e-2;
 /// Radius from which on a pole lies on the unit circle.
 const ON_CIRCLE: f64 = 1.0 - 1e-7;
-/// A step of this many standard errors, over all parameters, says nothing about the operator.
+/// A step of this many standard errors, over all parameters, carries no information about the
+/// operator.
 const IMMATERIAL: f64 = 0.5;
 /// The iteration has no end where so many steps in turn have not shortened it by this factor.
 const PATIENCE: usize = 12;
@@ -68,7 +68,7 @@ struct GivenInstruments<'p, 'a> {
     problem: &'p IvProblem<'a>,
     noise: &'p NoiseModel,
     q: Columns,
-    /// What counts as the sum of squares of the output: smaller values than 1e-26 of it are zero.
+    /// Definition of the sum of squares of the output: smaller values than 1e-26 of it are zero.
     power: f64,
 }
 
@@ -165,7 +165,7 @@ pub(super) fn solve_for_own_poles(
             return Ok(last);
         }
         system = match &nearest {
-            // The extrapolation has led astray.
+            // The extrapolation has led diverged.
             Some((least, near)) if moved > ASTRAY * least => {
                 extrapolation = Extrapolation::default();
                 near.system.clone()

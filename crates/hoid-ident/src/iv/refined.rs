@@ -34,7 +34,7 @@ const FAR: f64 = 1.15;
 /// Steps below this share of the output are rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// Iterates, and where that does not settle goes on in the nonlinear form ([`super::own_poles`]);
+/// Iterates, and where that does not settle continues in the nonlinear form ([`super::own_poles`]);
 /// `noise_of` gives the noise model that belongs to a system.
 pub(super) fn settle(
     limits: IterationLimits,
@@ -58,6 +58,7 @@ pub(super) fn settle(
         let found = solve_for_own_poles(limits, problem, from, &mut noise_of)?;
         spent += found.termination.iterations;
         let variance = found.variance();
+        // The estimating equation has several zeros; that of the operator has about the smallest residual met.
         let far = variance > FAR * whitest.variance;
         let class = match found.termination.reason {
             Reason::Settled | Reason::InstrumentsHeld if !far => 0.0,
@@ -108,6 +109,7 @@ fn iterate(
         let equation = problem.equation(noise.prefilter(&system[..problem.poles]), &system);
         let next = problem.solve(&equation)?;
         iterations += 1;
+        // |Z delta|/sigma: a distance in standard errors, since the covariance is about sigma^2 (Z'Z)^-1.
         let mut step = vec![0.0; equation.y.len()];
         for (column, (a, b)) in equation.z.iter().zip(next.iter().zip(&system)) {
             add_scaled(&mut step, a - b, column);
@@ -125,6 +127,7 @@ fn iterate(
                 system: Some(system.clone()),
             };
         }
+        // The next iteration simulates with F and filters with 1/F: both need stable poles.
         let (next, reflected) = problem.stabilised(&next)?;
         let reason = match (settled || iterations >= limits.max_iterations, reflected, settled) {
             (true, true, _) => Some(Reason::UnstableEstimate),
@@ -140,6 +143,7 @@ fn iterate(
                 termination: Termination { reason, iterations },
             });
         }
+        // A fixed point iteration can alternate between two systems; half steps damp that and keep the fixed point.
         let share = if iterations > FULL_STEPS { 0.5 } else { 1.0 };
         for (s, n) in system.iter_mut().zip(&next) {
             *s += share * (n - *s);
@@ -163,6 +167,8 @@ fn of_noise_free_parts(problem: &IvProblem<'_>) -> Result<Vec<f64>, IdentError> 
     let delayed: Vec<Vec<f64>> = source.inputs.iter().map(|x| late(x)).collect();
     let driving: Vec<&[f64]> = delayed.iter().map(Vec::as_slice).collect();
     let outputs: Vec<&[f64]> = problem.data.iter().map(|d| d.u).collect();
+    // In a closed loop e contains noise. The projections on the noise-free input do not, so that least squares on them
+    // is consistent up to the error of the projection.
     let clean = following(&driving, &outputs);
     let data = clean.iter().zip(&source.inputs).map(|(u, e)| Data::new(e, u)).collect();
     let parts = problem.of(data, Vec::new());
@@ -173,6 +179,8 @@ fn of_noise_free_parts(problem: &IvProblem<'_>) -> Result<Vec<f64>, IdentError> 
             f: &system[..parts.poles],
             ..Prefilter::default()
         };
+        // Steiglitz and McBride: filtered with 1/F of the iteration before, the equation error becomes the output
+        // error.
         system = parts.least_squares(filter)?;
     }
     Ok(system)

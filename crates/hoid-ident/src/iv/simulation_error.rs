@@ -1,4 +1,4 @@
-//! What a system leaves of the output: the disturbance, of which the noise model is made.
+//! The output that a system leaves unexplained: the disturbance, of which the noise model is made.
 
 use hoid_model::Orders;
 

@@ -156,7 +156,7 @@ impl LeastSquares {
         x
     }
 
-    /// Says which columns depend on which, by name.
+    /// Reports which columns depend on which, by name.
     pub fn describe_dependence(&self, names: &[String]) -> String {
         let p = self.columns();
         let sentences: Vec<String> = (self.rank..p)

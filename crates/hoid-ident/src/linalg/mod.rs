@@ -1,6 +1,6 @@
 //! Linear algebra of the estimators.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `products` | sums of products of long signals |
 //! | `least_squares` | linear regression by QR with column pivoting |

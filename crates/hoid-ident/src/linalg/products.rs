@@ -3,11 +3,11 @@
 //! A normal matrix needs the product of each pair of its columns. One column against four others at
 //! a time reads five numbers for four products, where single products read eight; and a column that
 //! is the one before it, a sample later, needs no pass: `sum x(t-1) y(t-1)` over a span is
-//! `sum x(t) y(t)` but for the samples at both ends.
+//! `sum x(t) y(t)` except for the samples at both ends.
 //!
 //! Each product has partial sums of a fixed number and order, in registers that are chosen when the
 //! program runs ([`hoid_lanes::with_four_lanes`]): the bits are the same whatever the registers,
-//! whatever is summed beside, and in whatever stretches the record is read.
+//! whatever is summed alongside, and in whatever stretches the record is read.
 
 use std::ops::Range;
 
@@ -17,7 +17,7 @@ use crate::linalg::least_squares::add_scaled;
 
 /// Samples that are read at a time: those of all columns stay in the nearest memory. A multiple of
 /// eight, the most partial sums of a product. For residuals the number is part of the last digits,
-/// since their sums are closed behind each stretch.
+/// since their sums are closed after each stretch.
 const STRETCH: usize = 512;
 
 /// Products of one column with four, two or one other.
@@ -88,7 +88,7 @@ impl<F: FourLanes> Tile<F> {
         self.sums = [s0, s1, s2, s3];
     }
 
-    /// The product of x with the k-th of ys over whole columns: the sums, and what lies behind the
+    /// The product of x with the k-th of ys over whole columns: the sums, and anything after the
     /// last whole block.
     #[inline(always)]
     fn total<'a>(&self, k: usize, column: impl Fn(usize) -> &'a [f64]) -> f64 {
@@ -120,7 +120,7 @@ fn eights(x: &[f64]) -> &[[[f64; 4]; 2]] {
     fours(x).as_chunks().0
 }
 
-/// Where the stretches of n samples begin and end.
+/// Where the stretches of n samples start and end.
 fn stretches(n: usize) -> impl Iterator<Item = Range<usize>> {
     (0..n).step_by(STRETCH).map(move |from| from..n.min(from + STRETCH))
 }
@@ -239,7 +239,7 @@ impl FourLaneTask for Gram<'_, '_> {
     }
 }
 
-/// What the product of columns i and j has more than that of the columns before them.
+/// Difference of the product of columns i and j from that of the columns before them.
 fn ends(columns: &[Lagged<'_>], i: usize, j: usize) -> f64 {
     let (x, y) = (columns[i - 1].values, columns[j - 1].values);
     let last = x.len() - 1;
@@ -328,7 +328,7 @@ impl FourLaneTask for Residuals<'_, '_> {
     fn run<F: FourLanes>(self, zero: F) {
         let Self { columns, factors, of } = self;
         let inputs: Vec<usize> = (1..columns.len()).collect();
-        // The residual stands in the place of y.
+        // The residual is in the place of y.
         let mut tiles = Vec::with_capacity(columns.len());
         Tile::cover(0, &[0], zero, &mut tiles);
         Tile::cover(0, &inputs, zero, &mut tiles);

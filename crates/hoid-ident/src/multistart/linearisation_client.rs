@@ -1,5 +1,5 @@
 //! A search by reverse communication: it names the theta at which it needs the linearisation of the
-//! criterion, and is updated with it. Whoever drives it decides how to linearise: alone, or for
+//! criterion, and is updated with it. Code that drives it decides how to linearise: alone, or for
 //! several records side by side.
 
 use crate::{

@@ -1,7 +1,7 @@
 //! Searches from several starts, driven from outside: what they need of the criterion is given to
 //! them, so that the searches of several records can run side by side.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `start` | a start of a search, and which of its polynomials are still to be found |
 //! | `searches` | the searches from the best starts, and the lowest minimum |

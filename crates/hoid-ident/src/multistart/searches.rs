@@ -1,8 +1,8 @@
 //! Searches from several starts of one criterion, one linearisation after the other.
 //!
 //! First what is left to find of each start, then the search from the best of them, and from the
-//! next ones. A start that turns out to lie in the basin of a minimum that is known is left out,
-//! and a search that comes close to one without a promise to end lower is stopped.
+//! next ones. A start that proves to lie in the basin of a minimum that is known is left out, and a
+//! search that comes close to one without a promise to end lower is stopped.
 //!
 //! The searches do not evaluate the criterion themselves: they name the theta at which they need
 //! its linearisation and are updated with it (reverse communication), so that those of several
@@ -102,7 +102,7 @@ impl<'s> MultiStart<'s> {
         self.starts.iter().position(|start| start.next_block().is_some())
     }
 
-    /// Begins the searches, with the best start.
+    /// Starts the searches, with the best start.
     fn rank(&mut self) {
         self.starts.retain(|start| start.value.is_finite());
         self.starts.sort_by(|a, b| a.value.total_cmp(&b.value));
@@ -111,7 +111,7 @@ impl<'s> MultiStart<'s> {
         self.begin();
     }
 
-    /// Begins at the next start.
+    /// Starts at the next start.
     fn begin(&mut self) {
         while let (None, Some(Start { label, theta, .. })) = (&self.searching, self.starts.pop()) {
             let known = self.best().map(|minimum| minimum.at.sum_of_squares);

@@ -32,7 +32,7 @@ impl Start {
     }
 
     /// With B and the noise model still to be found for its F, without A and C: B with white noise,
-    /// D of what is left, and B once more with that noise model.
+    /// D of the residual, and B once more with that noise model.
     pub fn of_poles(label: &str, o: &Orders, f: &[f64]) -> Self {
         let left = if o.nd > 0 {
             vec![Block::B, Block::D, Block::B]

@@ -4,8 +4,8 @@ use super::objective::Minimum;
 use crate::linalg::least_squares::dot;
 
 /// True when a start of that loss lies in the basin of a minimum that is known: its loss is what
-/// the quadratic model around the minimum says of it, so that a search from there would end in the
-/// same place.
+/// the quadratic model around the minimum reports about it, so that a search from there would end
+/// in the same place.
 pub(crate) fn lies_in_basin(minimum: &Minimum, start: &[f64], sum_of_squares: f64) -> bool {
     let p = start.len();
     let delta: Vec<f64> = start.iter().zip(&minimum.theta).map(|(a, b)| a - b).collect();

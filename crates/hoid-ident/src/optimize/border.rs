@@ -43,7 +43,7 @@ impl GaussNewton<'_> {
         })
     }
 
-    /// Goes on in coordinates in which the border of stability is a bound. `None` where the loss is
+    /// Continues in coordinates in which the border of stability is a bound. `None` if the loss is
     /// not finite or the rival will not be beaten.
     fn follow_the_border(&mut self, workspace: &mut Workspace) -> Option<Reason> {
         let Some((coordinates, kappa)) = StableCoordinates::of(self.objective, &self.theta) else {

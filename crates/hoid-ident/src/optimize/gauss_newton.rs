@@ -30,17 +30,17 @@ pub(crate) struct GaussNewton<'s> {
     growth: f64,
     /// Decrease that the quadratic model predicts for the undamped step of this iteration.
     predicted_decrease: f64,
-    /// What the Gauss-Newton matrix lacks of half the second derivative, from the gradients of the
-    /// last steps; empty where that is not used.
+    /// Difference of half the second derivative from the Gauss-Newton matrix, from the gradients of
+    /// the last steps; empty if that is not used.
     secant: Vec<f64>,
     trial: Trial,
     /// Where the derivatives are needed next.
     evaluation_point: Vec<f64>,
 }
 
-/// What the next linearisation decides.
+/// Quantities decided by the next linearisation.
 enum Trial {
-    /// Whether the start is any good.
+    /// Whether the start is usable.
     Start,
     /// A step of Levenberg and Marquardt, and the decrease that the quadratic model predicts for
     /// it.
@@ -96,7 +96,7 @@ impl<'s> GaussNewton<'s> {
         &self.evaluation_point
     }
 
-    /// True while nothing is known of it but its start.
+    /// True while nothing is known about it but its start.
     pub fn is_at_its_start(&self) -> bool {
         matches!(self.trial, Trial::Start)
     }
@@ -284,7 +284,7 @@ impl<'s> GaussNewton<'s> {
         Progress::Ended(Some(if lost { Reason::SmallDecrease } else { Reason::NoDescent }))
     }
 
-    /// Makes theta behind a step the next evaluation point; false where there is no predictor.
+    /// Makes theta after a step the next evaluation point; false if there is no predictor.
     fn ask(&mut self, delta: &[f64], factor: f64) -> bool {
         self.evaluation_point.clear();
         self.evaluation_point

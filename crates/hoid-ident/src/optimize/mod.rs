@@ -8,7 +8,7 @@
 //! | Levenberg-Marquardt | `(H + mu diag H)^-1 g`, mu by the ratio of gained to predicted decrease (H. B. Nielsen, *Damping parameter in Marquardt's method*, IMM-REP-1999-05, DTU) |
 //! | Gauss-Newton | `H^-1 g`, halved until the loss falls |
 //! | steepest descent | `alpha (diag H)^-1 g`, alpha best for the quadratic model, halved until the loss falls |
-//! | automatic | Levenberg-Marquardt, near the minimum with a secant; where it finds no lower loss although the gradient is not zero, it goes on in coordinates in which the border of stability is a bound ([`reflection_coefficients`]) |
+//! | automatic | Levenberg-Marquardt, near the minimum with a secant; where it finds no lower loss although the gradient is not zero, it continues in coordinates in which the border of stability is a bound ([`reflection_coefficients`]) |
 //!
 //! **The secant.** Gauss and Newton leave the part of the second derivative out that vanishes with
 //! white residuals of the right model. Where the model is not right (a delay that is off by a few

@@ -1,4 +1,4 @@
-//! What a search needs to know of a model, and what it finds.
+//! Requirements of a search on a model, and what it finds.
 
 use std::ops::Range;
 
@@ -39,10 +39,10 @@ impl Linearisation {
 }
 
 /// A sum of squares over theta with its derivatives: what the search needs to know of a model. The
-/// search takes it as `dyn`: a call is nothing beside a pass over a record, and it is compiled once
-/// for all models.
+/// search takes it as `dyn`: a call is nothing compared with a pass over a record, and it is
+/// compiled once for all models.
 pub(crate) trait Objective {
-    /// True where the predictor exists: finite theta, stable polynomials.
+    /// True if the predictor exists: finite theta, stable polynomials.
     fn is_feasible(&self, theta: &[f64]) -> bool;
     /// Sum of squares, `psi' eps` and `psi' psi` at a feasible theta; the workspace is room for
     /// signals, kept from one linearisation to the next.

@@ -42,7 +42,7 @@ impl fmt::Display for Reason {
             Self::NoDescent => "not converged: no step inside the region of stable C and F lowers the loss",
             Self::Settled => "converged: a further iteration does not move the parameters",
             Self::InstrumentsHeld => {
-                "converged with the instruments held: made anew they go on to move the parameters, by less than half a standard error"
+                "converged with the instruments held: made again they go on to move the parameters, by less than half a standard error"
             }
             Self::UnstableEstimate => {
                 "not converged: the estimate had a pole outside the unit circle, reflected into it"

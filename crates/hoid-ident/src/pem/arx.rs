@@ -1,16 +1,14 @@
 //! ARX by linear least squares.
 //!
-//! `u(t) = phi(t)' theta + eps(t)` with `phi = [-u(t-1) .. -u(t-na), e(t-nk) .. e(t-nk-nb+1)]` (eq.
-//! 5.31), from the first sample at which phi lies inside the record (eq. 5.33) in each record, or
-//! with zeros for what lies before it.
+//! `u(t) = phi(t)' theta + eps(t)` with `phi = [-u(t-1) .. -u(t-na), e(t-nk) .. e(t-nk-nb+1)]` (eq. 5.31), from the
+//! first sample at which phi lies inside the record (eq. 5.33) in each record, or with zeros for anything before it.
 //!
-//! **How it is solved.** The columns are shifts of two signals, so that `Phi' Phi` costs a few
-//! passes over the record, a tenth of an orthogonal factorisation. A solution of the normal
-//! equations has an error of `cond(Phi' Phi) eps`; one step of refinement from the residuals
-//! themselves, `theta + (Phi' Phi)^-1 Phi' (y - Phi theta)`, squares that factor (A. Bjorck,
-//! *Numerical Methods for Least Squares Problems*, 1996, sec. 2.9.3). Where the regressors are too
-//! close to dependence for it, where the fit is exact, where u has a level, and where zeros stand before the
-//! record, QR with column pivoting decides and solves.
+//! **How it is solved.** The columns are shifts of two signals, so that `Phi' Phi` costs a few passes over the record,
+//! a tenth of an orthogonal factorisation. A solution of the normal equations has an error of `cond(Phi' Phi) eps`; one
+//! step of refinement from the residuals themselves, `theta + (Phi' Phi)^-1 Phi' (y - Phi theta)`, squares that factor
+//! (A. Bjorck, *Numerical Methods for Least Squares Problems*, 1996, sec. 2.9.3). Where the regressors are too close to
+//! dependence for it, where the fit is exact, where u has a level, and where zeros are before the record, QR with
+//! column pivoting decides and solves.
 
 use hoid_model::{Orders, SampleTime, Structure};
 use nalgebra::{DMatrix, DVector};
@@ -30,7 +28,7 @@ const WELL_CONDITIONED: f64 = 1e7;
 /// Share of the residuals in the power of the output below which the fit counts as exact here.
 const EXACT: f64 = 1e-12;
 
-/// Solution of the regression with what its uncertainty needs.
+/// Solution of the regression with the data for its uncertainty.
 #[derive(Debug)]
 struct Regression {
     pub theta: Vec<f64>,
@@ -127,7 +125,7 @@ fn columns<'a>(orders: &Orders, data: &Data<'a>, first: usize) -> Vec<Lagged<'a>
     outputs.chain(inputs).collect()
 }
 
-/// None where QR is to decide.
+/// None if QR is to decide.
 fn by_normal_equations(orders: &Orders, data: &[Data<'_>], first: usize) -> Option<Regression> {
     let p = orders.na + orders.nb;
     if p == 0 || first < orders.first_regressed_sample() {
@@ -149,7 +147,7 @@ fn by_normal_equations(orders: &Orders, data: &[Data<'_>], first: usize) -> Opti
     });
     let factor = scaled.cholesky()?;
     let inverse = factor.inverse();
-    // Not <=: NaN is no condition either.
+    // Not <=: NaN is not a condition either.
     let well_conditioned = p as f64 * inverse.trace() < WELL_CONDITIONED;
     if !well_conditioned {
         return None;
@@ -171,7 +169,7 @@ fn by_normal_equations(orders: &Orders, data: &[Data<'_>], first: usize) -> Opti
         theta[i] += correction[i];
         squares -= correction[i] * sign(i) * residuals.products[i];
     }
-    // An exact fit leaves the rounding of the residuals, which QR says better.
+    // An exact fit leaves the rounding of the residuals, which QR reports better.
     if !squares.is_finite() || squares < EXACT * power {
         return None;
     }

@@ -105,7 +105,7 @@ impl<'q, 'a> FitProblem<'q, 'a> {
     }
 }
 
-/// The start with a stable A where that was asked for; `None` where the roots of A cannot be found.
+/// The start with a stable A where that was requested; `None` if the roots of A cannot be found.
 fn stabilised(mut start: Start, constrained: &ConstrainedCriterion<'_, '_>) -> Option<Start> {
     if constrained.stable {
         let na = constrained.criterion.orders.na;

@@ -1,4 +1,4 @@
-//! What a fit by the prediction error method needs to know beside the records.
+//! Settings of a fit by the prediction error method.
 
 use std::collections::BTreeMap;
 
@@ -25,7 +25,7 @@ pub(crate) struct FitSettings {
     pub constraints: BTreeMap<String, Constraint>,
     pub priors: BTreeMap<String, Prior>,
     pub loss: Loss,
-    /// True where u of each record has a level.
+    /// True if u of each record has a level.
     pub level: bool,
     /// True when A must be stable too.
     pub stable: bool,

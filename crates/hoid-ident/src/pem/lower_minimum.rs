@@ -1,10 +1,9 @@
-//! A lower minimum than the one that the usual starts lead to, where there may be one.
+//! A lower minimum than the one that the default starts lead to, where there may be one.
 //!
-//! The starts that are tried are from all over the region of stability
-//! ([`crate::initial_guess::broad`]). A few steps of the search from each tell which of them lead
-//! down; the best go on to the end, unless they come close to the minimum that is known without a
-//! promise to end lower. What is known stays as it is, to the last digit, where nothing lower is
-//! found.
+//! The starts that are tried are from all over the region of stability ([`crate::initial_guess::broad`]). A few steps
+//! of the search from each show which of them lead down; the best go on to the end, unless they come close to the
+//! minimum that is known without a promise to end lower. What is known stays as it is, to the last digit, where nothing
+//! lower is found.
 //!
 //! **Where.** A record of some hundred samples has many minima, and a model with more coefficients
 //! than the operator's (nb, nf > 2, nc > 0, nd > 4) has them in longer records too. There the first few
@@ -35,7 +34,7 @@ const OF_LONG: [usize; 2] = [12, 3];
 const LOWER: f64 = 1e-7;
 
 /// A lower minimum with the name of its start. With a start that was given, or with a single start,
-/// no other is looked for.
+/// no other is searched for.
 pub(crate) fn lower_minimum(
     settings: &FitSettings,
     constrained: &ConstrainedCriterion<'_, '_>,
@@ -91,7 +90,8 @@ fn first_span<'a>(criterion: &Criterion<'a>) -> Criterion<'a> {
     let mut left = SPAN;
     let mut data = Vec::new();
     for d in &criterion.data {
-        // A piece with fewer residuals than this says little more than its initial states.
+        // A piece with fewer residuals than this carries little information more than its initial
+        // states.
         if left < SPAN / 10 {
             break;
         }

@@ -1,10 +1,10 @@
 //! The fit by the prediction error method: what it minimises is [`crate::criterion`], how is
 //! [`crate::optimize`].
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `constraints` | bounds and priors |
-//! | `fit_settings` | what a fit needs to know beside the records |
+//! | `fit_settings` | what a fit needs to know next to the records |
 //! | `prediction_focus`, `simulation_focus` | the fit by the prediction error, and of models that are to simulate |
 //! | `arx` | structures that are linear in theta |
 //! | `fit_problem` | the searches from all starts of one fit, and the fit at the lowest minimum |

@@ -7,13 +7,12 @@
 //! 0.6745, from the residuals of the round before; it is held after [`SCALES`] rounds, so that the
 //! rounds settle.
 //!
-//! A bounded loss bounds what a residual weighs, and not what a sample brings into the regressors: one
-//! sample of e that is wrong is in the response of the operator for seconds, with residuals that are
-//! large because theta is right, and theta gives way (F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw
-//! and W. A. Stahel, *Robust Statistics*, 1986, section 6.3: the influence is that of the residual times
-//! that of the position). So that the position is bounded too, the records come here with each sample
-//! of e and u held to its neighbours ([`crate::faults::resistant`], by the estimator); of a normal
-//! channel one sample in 16 000 is moved, and the efficiency is that of the loss.
+//! A bounded loss bounds the weight of a residual, and not the effect of a sample on the regressors: one sample of e
+//! that is wrong is in the response of the operator for seconds, with residuals that are large because theta is right,
+//! and theta gives way (F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw and W. A. Stahel, *Robust Statistics*, 1986,
+//! section 6.3: the influence is that of the residual times that of the position). So that the position is bounded too,
+//! the records come here with each sample of e and u held to its neighbours ([`crate::faults::resistant`], by the
+//! estimator); of a normal channel one sample in 16 000 is moved, and the efficiency is that of the loss.
 //!
 //! Covariance (Huber, eq. 7.6.8, for residuals that are independent of the gradient):
 //! `s^2 kappa (psi' psi)^-1`, `kappa = mean(rho'^2) / mean(rho'')^2`, with the unweighted psi.
@@ -30,7 +29,7 @@ use crate::{
     pem::{constraints::ConstrainedCriterion, fit_settings::FitSettings},
 };
 
-/// Rounds in which the scale is estimated anew.
+/// Rounds in which the scale is estimated again.
 const SCALES: usize = 10;
 
 /// Largest number of rounds.
@@ -60,6 +59,8 @@ impl Reweighting {
     /// Square roots of the weights for the next round, by the residuals of each record. `None` when
     /// the residuals have no scale (half of them are zero).
     pub fn next(&mut self, residuals: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
+        // A scale that is estimated in every round can alternate with the weights; held, each round lowers Huber's
+        // loss.
         if self.round < SCALES {
             self.scale = median_absolute(residuals) / 0.674_489_750_196_081_7;
         }
@@ -114,6 +115,7 @@ pub(crate) fn fit(
         let next = minimise(&objective, minimum.theta.clone(), &settings.search, None, workspace)
             .ok_or(IdentError::NoFiniteLoss)?;
         iterations += next.termination.iterations;
+        // step' G step/(S/n): the squared distance of the rounds in standard errors.
         let step: Vec<f64> = next.theta.iter().zip(&minimum.theta).map(|(a, b)| a - b).collect();
         let p = step.len();
         let curvature: f64 = (0..p)
@@ -132,6 +134,7 @@ pub(crate) fn fit(
     };
     let free = free_parameters(constrained, &minimum.theta, &minimum.at.descent);
     let names = criterion.orders.parameter_names();
+    // The covariance uses the unweighted psi (Huber 1981, eq. 7.6.8); the weights enter through `variance`.
     let plain = constrained.linearise(&minimum.theta, workspace);
     let inverse = inverse_of_free(&plain.gram, &free, &names)?;
     let variance = rounds.variance(&residuals, names.len() + criterion.states());
@@ -274,7 +277,8 @@ mod tests {
 
     #[test]
     fn what_cannot_be_held_is_fitted_as_it_is() {
-        // A constant error has no neighbours that say anything of it, and no response to find.
+        // A constant error has no neighbours that carry information about it, and no response to
+        // find.
         let clean = simulated(2);
         let e = Channel::new("e", "", vec![1.0; clean.len()]);
         let u = Channel::new("u", "", clean.output().to_vec());

@@ -8,7 +8,7 @@
 //! to first order, `(psi' psi)^-1 psi' (sigma^2 H H') psi (psi' psi)^-1` (L. Ljung, *System
 //! Identification*, 1999, section 9.4), with `H' psi` the filter H run backwards in time. It holds
 //! in an open loop; in a closed loop the input is correlated with the noise and the system is
-//! biased besides. C and D have the covariance of their own search, and no correlation with the
+//! biased in addition. C and D have the covariance of their own search, and no correlation with the
 //! system is taken into account.
 
 use std::collections::BTreeMap;

@@ -1,13 +1,13 @@
-//! An option of a batch estimator, declared once: what is known of it, what its text sets, what is printed of it.
+//! An option of a batch estimator, declared once: the prior knowledge of it, what its text sets, what is printed of it.
 
 use hoid_model::SampleTime;
 
 use super::setting::Setting;
 use crate::IdentError;
 
-/// What a text makes of an estimator.
+/// Sets an option of an estimator from a text.
 type Set<E, X> = Box<dyn Fn(&mut E, &Setting, &str) -> Result<(), X>>;
-/// The value in words at a sample time; `None` for one that is not worth a line.
+/// The value as text at a sample time; `None` for one that is not worth a line.
 type Words<E> = Box<dyn Fn(&E, SampleTime) -> Option<String>>;
 
 /// An option of an estimator `E`, whose texts are refused by an `X`.
@@ -25,7 +25,7 @@ pub trait BatchOptions: Sized + 'static {
 }
 
 impl<E: 'static, X: 'static> BatchOption<E, X> {
-    /// An option, and what its text sets.
+    /// An option and its setter.
     pub fn new(setting: Setting, set: impl Fn(&mut E, &Setting, &str) -> Result<(), X> + 'static) -> Self {
         Self {
             setting,
@@ -46,7 +46,7 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
     /// Sets it from its text.
     ///
     /// # Errors
-    /// For a text that is no value of it, or contradicts what was set before.
+    /// For a text that is not a value of it, or contradicts what was set before.
     pub fn set(&self, of: &mut E, text: &str) -> Result<(), X> {
         (self.set)(of, &self.setting, text)
     }
@@ -66,7 +66,7 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
         }
     }
 
-    /// The same option of what the estimator is a part of.
+    /// The same option of the estimator that contains this one.
     pub fn within<W: 'static, Y: From<X> + 'static>(
         self,
         part: fn(&W) -> &E,

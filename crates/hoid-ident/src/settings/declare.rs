@@ -5,7 +5,7 @@
 /// share are a struct of their own, named under `groups`.
 ///
 /// In `#[setting(..)]` stand methods of [`Setting`](crate::settings::Setting): `unit`, `bounds`,
-/// `default` (in words), `name` (where it is not that of the field).
+/// `default` (as text), `name` (where it is not that of the field).
 #[macro_export]
 macro_rules! settings {
     (
@@ -107,7 +107,7 @@ mod tests {
             pub delay_s: (f64, f64) = (0.05, 0.6),
         }
         groups {
-            /// What is shared.
+            /// Shared data.
             pub shared: Shared,
         }
     }

@@ -9,14 +9,14 @@ pub enum Kind {
     Flag,
     /// A whole number.
     Count,
-    /// A number; `inf` where the bounds allow it.
+    /// A number; `inf` if the bounds allow it.
     Number,
     /// Samples (`256`), seconds (`2.56s`) or `inf`.
     Memory,
     /// A number, or `off`.
     NumberOrOff,
     /// A number, or the word alone for this one.
-    NumberOrUsual(&'static str),
+    NumberOrDefault(&'static str),
     /// A transfer function of s, as `90/(s(s+6))`.
     Element,
     /// `LO..HI`, two finite numbers in order.
@@ -37,13 +37,14 @@ pub enum Kind {
     Channel,
     /// Names, as `K,T_L`.
     Names,
-    /// What is known of a person: `population`, `none`, `NAME=CENTRE:SPREAD,..`, or a file of a fit.
+    /// Known properties of a person: `population`, `none`, `NAME=CENTRE:SPREAD,..`, or a file of a
+    /// fit.
     Prior,
     /// Values of a type by name, as `b0=256,f=inf`.
     Named(&'static Kind),
 }
 
-/// What numbers may be.
+/// Bounds of numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Bounds {
     /// Any number.

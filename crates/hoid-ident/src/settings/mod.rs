@@ -48,15 +48,16 @@ use crate::IdentError;
 
 /// Options with names.
 pub trait Settings {
-    /// What there is to be set, in the order of the declaration, with the defaults.
+    /// Available settings, in the order of the declaration, with the defaults.
     fn list(&self) -> Vec<Setting>;
 
     /// Sets an option from its text; false when the name is not among them.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a text that is no value of the option, or out of its bounds.
+    /// [`IdentError::BadOption`] for a text that is not a value of the option, or out of its
+    /// bounds.
     fn set(&mut self, name: &str, text: &str) -> Result<bool, IdentError>;
 
-    /// The value of an option as text; `None` where it has none, or the name is not among them.
+    /// The value of an option as text; `None` if it has none, or the name is not among them.
     fn get(&self, name: &str) -> Option<String>;
 }

@@ -97,7 +97,7 @@ impl fmt::Display for DelayRange {
     }
 }
 
-/// `N` or `LO..HI` in samples, or with an s behind one or both ends in seconds.
+/// `N` or `LO..HI` in samples, or with an s after one or both ends in seconds.
 impl Value for DelayRange {
     const KIND: Kind = Kind::Delay;
 
@@ -131,14 +131,14 @@ impl FromStr for DelayRange {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        Self::read(text).map_err(|expected| format!("{text:?} is no delay; write {expected}"))
+        Self::read(text).map_err(|expected| format!("{text:?} is not a delay; write {expected}"))
     }
 }
 
 impl FromStr for OneOrSpan {
     type Err = String;
 
-    /// Of numbers that are not negative.
+    /// For numbers that are not negative.
     fn from_str(text: &str) -> Result<Self, String> {
         let read = Self::read(text).map_err(|expected| format!("{text:?}: expected {expected}"))?;
         match read.0 >= 0.0 {

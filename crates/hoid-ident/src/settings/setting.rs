@@ -1,4 +1,4 @@
-//! What is known of an option.
+//! Known properties of an option.
 
 use hoid_model::{NamedChoice, Structure};
 
@@ -15,13 +15,13 @@ pub struct Setting {
     pub name: &'static str,
     /// Type of its value.
     pub kind: Kind,
-    /// Unit of its value; empty where it has none.
+    /// Unit of its value; empty if it has none.
     pub unit: &'static str,
-    /// Default as text, or in words; empty where nothing stands for it.
+    /// Default as text, or as text; empty if nothing represents it.
     pub default: String,
-    /// What its numbers may be.
+    /// Bounds of its numbers.
     pub bounds: Bounds,
-    /// What it does, without a full stop.
+    /// Its behaviour, without a full stop.
     pub help: String,
 }
 
@@ -65,7 +65,7 @@ impl Setting {
         Self { bounds, ..self }
     }
 
-    /// With a default in words.
+    /// With a default as text.
     pub fn default(self, words: &str) -> Self {
         Self {
             default: words.to_owned(),
@@ -85,7 +85,7 @@ impl Setting {
     /// Reads a value.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a text that is none, or out of the bounds.
+    /// [`IdentError::BadOption`] for a text that is invalid, or out of the bounds.
     pub fn read<V: Value>(&self, text: &str) -> Result<V, IdentError> {
         let bad = |expected: String| self.refused(text, &expected);
         let value = V::read(text.trim()).map_err(bad)?;
@@ -108,7 +108,7 @@ impl Setting {
         })
     }
 
-    /// Refuses a text, with what was expected.
+    /// Refuses a text, with the expected value.
     pub fn refused(&self, text: &str, expected: &str) -> IdentError {
         IdentError::BadOption {
             option: self.name.to_owned(),
@@ -117,7 +117,7 @@ impl Setting {
         }
     }
 
-    /// Refuses it beside others, with the reason.
+    /// Refuses it next to others, with the reason.
     pub fn error(&self, reason: impl Into<String>) -> IdentError {
         IdentError::Option {
             name: self.name,
@@ -126,12 +126,12 @@ impl Setting {
     }
 }
 
-/// What is known of an estimator or a recursive method.
+/// Known properties of an estimator or a recursive method.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MethodSpec {
     /// Name as typed.
     pub name: &'static str,
-    /// What it is, in a line without a full stop.
+    /// Its definition, in a line without a full stop.
     pub help: &'static str,
     /// Where it comes from in the literature.
     pub source: &'static str,

@@ -15,10 +15,10 @@ pub trait Value: Sized {
     /// Reads a text.
     ///
     /// # Errors
-    /// What was expected, in words.
+    /// The expected value, as text.
     fn read(text: &str) -> Result<Self, String>;
 
-    /// The value as text; `None` for one that stands for nothing.
+    /// The value as text; `None` for one that has no meaning.
     fn text(&self) -> Option<String>;
 
     /// The numbers in it, which bounds are held against.
@@ -167,7 +167,7 @@ impl Value for Prior {
     }
 }
 
-/// Names behind each other, as `K,T_L`.
+/// Names after each other, as `K,T_L`.
 impl Value for Vec<String> {
     const KIND: Kind = Kind::Names;
 
@@ -187,7 +187,7 @@ impl Value for Vec<String> {
 /// `NAME=VALUE,NAME=VALUE`, each name once.
 ///
 /// # Errors
-/// What was expected, in words.
+/// The expected value, as text.
 pub fn named_pairs(text: &str) -> Result<Vec<(String, String)>, String> {
     let mut pairs: Vec<(String, String)> = Vec::new();
     for item in text.split(',').map(str::trim).filter(|item| !item.is_empty()) {
@@ -267,7 +267,7 @@ choices!(Stable { "predictor" = Stable::Predictor, "noise" = Stable::PredictorAn
 mod tests {
     use super::*;
 
-    /// What is written is read back as the same value.
+    /// A written value is read back unchanged.
     fn returns<V: Value + PartialEq + std::fmt::Debug>(text: &str, value: V) {
         assert_eq!(V::read(text), Ok(value));
         let read = V::read(text).ok().and_then(|v| v.text()).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Within what the parameters of a change are sought.
+//! Within what the parameters of a change are searched for.
 
 use std::collections::BTreeMap;
 
@@ -13,8 +13,8 @@ const ZETA_LIMITS: (f64, f64) = (1e-4, 100.0);
 const LAG_LIMITS_S: (f64, f64) = (1e-3, 1e6);
 /// Largest omega_nm as a share of pi/Ts.
 const HIGHEST_FREQUENCY: f64 = 0.999;
-/// Share of the span at either end in which t_M is not sought by default: less of a record does not
-/// determine two gains.
+/// Share of the span at either end in which t_M is not searched by default: less of a record does
+/// not determine two gains.
 const ENDS: f64 = 0.05;
 /// Largest rate times the sample time: four fifths of the change take two samples (2 ln 9 = 4.4). A
 /// faster one looks the same, and its likelihood would be a staircase in t_M, with a step for each
@@ -24,10 +24,10 @@ pub(crate) const FASTEST: f64 = 2.0;
 /// Largest rate times the sample time that can be given.
 const FASTEST_GIVEN: f64 = 10.0;
 /// Smallest rate times the span: nine tenths of the change fill it (2 ln 19 = 5.9), and its ends
-/// are hardly told from a line.
+/// are hardly distinguished from a line.
 const SLOWEST: f64 = 5.0;
 
-/// What bounds depend on.
+/// Quantities that determine bounds.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Frame {
     pub ts_s: f64,
@@ -54,9 +54,9 @@ pub(crate) fn limits(
     }
     let mut result = Vec::with_capacity(names.len());
     for (place, (name, element)) in names.iter().zip(layout.elements()).enumerate() {
-        let (widest, usual) = ranges(layout, frame, element)?;
+        let (widest, default) = ranges(layout, frame, element)?;
         let asked = constraints.get(name).copied();
-        let (low, high) = asked.map_or(usual, Constraint::limits);
+        let (low, high) = asked.map_or(default, Constraint::limits);
         let within = (low.max(widest.0), high.min(widest.1));
         let moved = low == high && within != (low, high);
         if asked.is_some_and(|c| !c.is_sound()) || within.0 > within.1 || moved {
@@ -74,8 +74,8 @@ pub(crate) fn limits(
 
 type Range = (f64, f64);
 
-/// Where a parameter has a meaning at all, and where it is sought unless the user says otherwise,
-/// in the units that are typed.
+/// Where a parameter has a meaning at all, and where it is searched for unless the user specifies
+/// otherwise, in the units that are typed.
 fn ranges(layout: &Layout, frame: &Frame, element: Element) -> Result<(Range, Range), IdentError> {
     let (from, to) = frame.span_s;
     let span = to - from;
@@ -128,11 +128,11 @@ mod tests {
     fn limits_hold_what_has_a_meaning() {
         let none = BTreeMap::new();
         let layout = Layout::new(Form::Lead, true, 1);
-        let usual = limits(&layout, &frame(), &none).unwrap();
-        assert_eq!(usual.len(), 10);
-        assert_eq!(usual[layout.midpoint], (4.0, 76.0));
-        assert_eq!(usual[layout.delay], (0.05, 0.6));
-        assert!((usual[layout.log_rate].1.exp() - 200.0).abs() < 1e-9);
+        let default = limits(&layout, &frame(), &none).unwrap();
+        assert_eq!(default.len(), 10);
+        assert_eq!(default[layout.midpoint], (4.0, 76.0));
+        assert_eq!(default[layout.delay], (0.05, 0.6));
+        assert!((default[layout.log_rate].1.exp() - 200.0).abs() < 1e-9);
         let with = |name: &str, c: Constraint| limits(&layout, &frame(), &BTreeMap::from([(name.to_owned(), c)]));
         assert_eq!(
             with("t_M", Constraint::Fixed(79.0)).unwrap()[layout.midpoint],
@@ -166,8 +166,8 @@ mod tests {
         assert_eq!(with(Constraint::Fixed(5.0)).unwrap()[place], (0.2, 0.2));
         assert_eq!(with(Constraint::Between(2.0, 8.0)).unwrap()[place], (0.125, 0.5));
         assert!(with(Constraint::Fixed(-5.0)).is_err());
-        let usual = limits(&layout, &frame(), &BTreeMap::new()).unwrap();
-        let (low, high) = usual[place];
+        let default = limits(&layout, &frame(), &BTreeMap::new()).unwrap();
+        let (low, high) = default[place];
         assert!((low - 1e-3).abs() < 1e-15 && (high - 30.0).abs() < 1e-12);
     }
 }

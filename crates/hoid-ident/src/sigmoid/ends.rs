@@ -29,7 +29,7 @@ pub struct NamedEstimate {
 pub struct ChangedOperator {
     /// The operator.
     pub operator: FamilyOperator,
-    /// Its parameters: those of the numerator, products of them, and what does not change.
+    /// Its parameters: those of the numerator, products of them, and the constant part.
     pub parameters: Vec<NamedEstimate>,
 }
 
@@ -39,8 +39,8 @@ impl ChangedOperator {
         self.parameters.iter().find(|p| p.name == name).map(|p| p.estimate)
     }
 
-    /// The same by the names of the reference text; `None` for another form than a gain and a lead
-    /// with the neuromuscular part.
+    /// The same by the names of the thesis; `None` for another form than a gain and a lead with the
+    /// neuromuscular part.
     pub fn lead(&self) -> Option<OperatorEstimate> {
         if self.operator.form() != Form::Lead {
             return None;
@@ -56,9 +56,9 @@ impl ChangedOperator {
     }
 }
 
-/// What theta is known to.
+/// Theta with its covariance.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Known<'a> {
+pub(super) struct ThetaEstimate<'a> {
     pub layout: &'a Layout,
     pub theta: &'a [f64],
     /// Of theta, by rows; `None` for an exact fit.
@@ -67,7 +67,7 @@ pub(super) struct Known<'a> {
     pub change_point: Option<f64>,
 }
 
-impl Known<'_> {
+impl ThetaEstimate<'_> {
     /// The operator before (0) or after (1) the change.
     pub fn end(&self, end: usize) -> Result<ChangedOperator, ModelError> {
         let mut values = [0.0; MOST_VARYING];
@@ -117,11 +117,11 @@ impl Known<'_> {
         self.named(&operator, changes, of)
     }
 
-    /// The part of a gradient that belongs to what does not change.
+    /// The part of a gradient that belongs to the constant part.
     fn constant_part(&self, gradient: &[f64]) -> Vec<f64> {
         let mut whole = vec![0.0; self.theta.len()];
         for (place, slope) in self.layout.poles().into_iter().zip(&gradient[self.layout.varying..]) {
-            // omega_nm and zeta_nm stand in theta themselves.
+            // omega_nm and zeta_nm are in theta themselves.
             let logarithmic = self.layout.muscles.is_some_and(|own| own.contains(&place));
             whole[place] = if logarithmic { slope / self.theta[place] } else { *slope };
         }
@@ -129,7 +129,7 @@ impl Known<'_> {
     }
 
     /// The parameters of an operator whose gradients are `wanted`; `of` makes from a gradient along
-    /// the coordinates that along theta, and a variance beside.
+    /// the coordinates that along theta, and a variance alongside.
     fn named(
         &self,
         operator: &FamilyOperator,
@@ -163,7 +163,7 @@ impl Known<'_> {
     }
 }
 
-/// No variance, no standard error: what was held has none.
+/// No variance, no standard error: fixed parameters has none.
 pub(super) fn estimate(value: f64, variance: f64) -> Estimate {
     if variance > 0.0 {
         Estimate::with_variance(value, variance)

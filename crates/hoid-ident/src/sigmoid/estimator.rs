@@ -120,7 +120,7 @@ impl SigmoidChange {
             return Err(IdentError::BadOption {
                 option: "the form of the operator".to_owned(),
                 found: format!("{} without neuromuscular dynamics", self.form),
-                expected: "one that is no pure derivative: with neuromuscular dynamics, or with a lag".to_owned(),
+                expected: "one that is not a pure derivative: with neuromuscular dynamics, or with a lag".to_owned(),
             });
         }
         let (low, high) = self.delay_range_s;

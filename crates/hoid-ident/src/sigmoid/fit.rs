@@ -3,7 +3,7 @@
 use hoid_model::{Form, Record, SampleTime, Structure, uncertainty::Estimate};
 
 use super::{
-    ends::{ChangedOperator, Known, NamedEstimate, estimate},
+    ends::{ChangedOperator, NamedEstimate, ThetaEstimate, estimate},
     inference::{Comparison, Remark, constant_operator, inference},
     layout::Layout,
     objective::{ChangeCriterion, Data},
@@ -24,7 +24,7 @@ pub struct ChangeParameter {
     pub remark: Option<Remark>,
 }
 
-/// What changes, as it is in force at one time.
+/// The part that changes, as it is in force at one time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GainsAt {
     /// Time on the axis of the record, s.
@@ -96,7 +96,7 @@ impl SigmoidFit {
         levels: Option<[f64; 2]>,
     ) -> Result<Self, IdentError> {
         let found = inference(criterion, minimum, constant)?;
-        let known = Known {
+        let known = ThetaEstimate {
             layout: &criterion.layout,
             theta: &minimum.theta,
             covariance: found.covariance.as_deref(),
@@ -167,7 +167,7 @@ impl SigmoidFit {
     }
 
     /// Covariance of the parameters in the order and the units of [`SigmoidFit::parameters`], by
-    /// rows; zero for what was held, `None` for an exact fit.
+    /// rows; zero for fixed parameters, `None` for an exact fit.
     pub fn covariance(&self) -> Option<Vec<f64>> {
         let p = self.theta.len();
         let scale: Vec<f64> = (0..p).map(|i| self.layout.typed_slope(i, self.theta[i])).collect();
@@ -229,7 +229,7 @@ impl SigmoidFit {
         self.rate_interval.map(|i| (i.low, i.high))
     }
 
-    /// True where the change is too fast for t_M to have an error that is normally distributed: a
+    /// True if the change is too fast for t_M to have an error that is normally distributed: a
     /// change point.
     pub fn is_change_point(&self) -> bool {
         self.change_point
@@ -255,7 +255,7 @@ impl SigmoidFit {
         self.comparison
     }
 
-    /// True where the change is worth its parameters by the BIC. Otherwise t_M and G mean nothing
+    /// True if the change is worth its parameters by the BIC. Otherwise t_M and G mean nothing
     /// ([`Remark::NoChange`]), and [`SigmoidFit::constant_operator`] describes the records.
     pub fn change_found(&self) -> bool {
         self.comparison.bic_difference > 0.0
@@ -265,10 +265,10 @@ impl SigmoidFit {
     /// sigmoid where the records show a change, else those of the fit without one.
     ///
     /// The errors are those of the delta method, t_M and G included. Around a change point, where
-    /// the sigmoid is no line over the interval of t_M, `step^2 p (1 - p)` stands for the latter,
-    /// with p the probability that the change has happened.
+    /// the sigmoid is not a line over the interval of t_M, `step^2 p (1 - p)` represents the
+    /// latter, with p the probability that the change has happened.
     pub fn gains_at(&self, time_s: f64) -> GainsAt {
-        let known = Known {
+        let known = ThetaEstimate {
             layout: &self.layout,
             theta: &self.theta,
             covariance: self.covariance.as_deref(),
@@ -307,8 +307,8 @@ impl SigmoidFit {
         self.innovation_variance
     }
 
-    /// Standard deviation of the innovations before and after the change; `None` where the same
-    /// throughout was asked for, or the residuals have no size.
+    /// Standard deviation of the innovations before and after the change; `None` if the same
+    /// throughout was requested, or the residuals have no size.
     pub fn noise_levels(&self) -> Option<[f64; 2]> {
         self.levels
     }
@@ -328,7 +328,7 @@ impl SigmoidFit {
         self.termination
     }
 
-    /// The start that won.
+    /// The best start.
     pub fn start(&self) -> &str {
         &self.start
     }
@@ -356,8 +356,8 @@ impl SigmoidFit {
         })
     }
 
-    /// The level of u in a record, in the unit of u, with its standard error; `None` where it was not
-    /// estimated ([`crate::SigmoidChange::level`]), and of an exact fit.
+    /// The level of u in a record, in the unit of u, with its standard error; `None` if it was not estimated
+    /// ([`crate::SigmoidChange::level`]), and of an exact fit.
     pub fn level(&self, record: &Record) -> Option<Estimate> {
         let (criterion, covariance) = (self.criterion(self.layout, record).ok()?, self.covariance.as_ref()?);
         let (value, variance) = criterion.level_of(&self.theta, 0, self.innovation_variance, covariance)?;

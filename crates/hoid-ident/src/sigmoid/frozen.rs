@@ -1,6 +1,6 @@
 //! Poles, delay and noise model from which searches start.
 //!
-//! Of an operator of a gain and a lead they come from Box-Jenkins fits to the first and the last
+//! For an operator of a gain and a lead they come from Box-Jenkins fits to the first and the last
 //! third of the records; where those give no operator, from a small grid of poles. A form of the
 //! family has a grid throughout.
 
@@ -76,7 +76,7 @@ pub(super) fn of_windows(criterion: &ChangeCriterion<'_>, records: &[Record]) ->
     for (part, name) in [(0, "first"), (2, "last")] {
         let windows: Option<Vec<Record>> = records.iter().map(|r| third(r, part)).collect();
         let Some(windows) = windows else { continue };
-        // Each delay goes on from the model of the one before.
+        // Each delay continues from the model of the one before.
         let mut fits: Vec<Fit> = Vec::new();
         for nk in delays(criterion) {
             let before = fits.last().map(|f| f.model().theta().to_vec());

@@ -1,4 +1,4 @@
-//! What the two minima, with a change and without, say: covariance, which parameters have a
+//! Inference from the two minima, with a change and without: covariance, which parameters have a
 //! standard error, and whether there was a change.
 //!
 //! The covariance is `sigma^2 (psi' psi)^-1` of the parameters that were free, with the initial
@@ -9,7 +9,7 @@ use std::fmt;
 
 use super::{
     bounds::FASTEST,
-    ends::{ChangedOperator, Known},
+    ends::{ChangedOperator, ThetaEstimate},
     layout::Layout,
     objective::ChangeCriterion,
     prior,
@@ -30,7 +30,7 @@ pub enum Remark {
     /// It rests at a bound.
     AtBound,
     /// G rests at its upper bound: the change takes no longer than two samples, and how fast it was
-    /// cannot be told.
+    /// cannot be determined.
     Abrupt,
     /// The records show no change (BIC): t_M and G mean nothing, and gains on either side of it are
     /// chosen by chance.
@@ -58,7 +58,9 @@ impl fmt::Display for Remark {
         f.write_str(match self {
             Self::Fixed => "fixed",
             Self::AtBound => "rests at a bound",
-            Self::Abrupt => "at its upper bound: the change takes no longer than two samples, its rate cannot be told",
+            Self::Abrupt => {
+                "at its upper bound: the change takes no longer than two samples, its rate cannot be determined"
+            }
             Self::NoChange => "the records show no change: take the fit without one",
             Self::ChangePoint => "the change is too fast for a normal error: take the likelihood interval",
             Self::Undetermined => "not determined by the data",
@@ -79,7 +81,7 @@ pub struct Comparison {
     pub bic_difference: f64,
 }
 
-/// What the minimum with a change says beside theta.
+/// Inference at the minimum with a change.
 pub(super) struct Inference {
     /// Variance of the innovations, weighted where the noise level changes.
     pub innovation_variance: f64,
@@ -88,7 +90,7 @@ pub(super) struct Inference {
     /// Why an element of theta has no standard error, where it has none.
     pub remarks: Vec<Option<Remark>>,
     pub comparison: Comparison,
-    /// True where the change is too fast for t_M to have a normal error.
+    /// True if the change is too fast for t_M to have a normal error.
     pub change_point: bool,
 }
 
@@ -228,7 +230,7 @@ pub(super) fn constant_operator(
         inverse.iter_mut().for_each(|c| *c *= variance);
         Some(inverse)
     };
-    let known = Known {
+    let known = ThetaEstimate {
         layout,
         theta,
         covariance: covariance.as_deref(),

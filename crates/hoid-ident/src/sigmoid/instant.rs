@@ -5,7 +5,7 @@ use super::layout::{Layout, MOST_VARYING};
 /// Argument from which `e^-x` is zero in double precision.
 const NOTHING: f64 = 746.0;
 
-/// The sigmoid and what changes with it at one time.
+/// The sigmoid and the changing parameters at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Instant {
     /// Share of the change that has happened.
@@ -18,7 +18,7 @@ pub(crate) struct Instant {
     pub values: [f64; MOST_VARYING],
     /// The numerator over its gain, by ascending powers of s.
     pub shape: [f64; 3],
-    /// Derivatives of the shape along the parameters beside the gain.
+    /// Derivatives of the shape along the parameters next to the gain.
     pub slopes: [[f64; 3]; 2],
 }
 

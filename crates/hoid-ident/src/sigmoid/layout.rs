@@ -1,14 +1,14 @@
 //! Order and meaning of the parameters.
 //!
-//! What changes has two places in theta, before and after the change; what does not has one:
+//! A parameter that changes has two places in theta, before and after the change; a constant one has one place:
 //!
 //! `theta = [v1 v2 of each of the numerator, t_M, ln G, 1/T_I, omega_nm, zeta_nm, tau_e, d1 .. d_nd]`
 //!
-//! where the numerator has the gain (K, with a lag K/T_I), and beside it T_L, or c_1 and c_2, or T_L
-//! and alpha ([`Form::shape`]); what a form does not have has no place. For the operator of a gain
-//! and a lead that is `[K_e1, K_e2, T_L1, T_L2, t_M, ln G, omega_nm, zeta_nm, tau_e, d1 .. d_nd]`.
-//! The rate enters by its logarithm: it is positive, and its likelihood is far more nearly a
-//! parabola in ln G than in G. A lag enters by `1/T_I`, for the same reason.
+//! where the numerator has the gain (K, with a lag K/T_I), and next to it T_L, or c_1 and c_2, or T_L and alpha
+//! ([`Form::shape`]); what a form does not have has no place. For the operator of a gain and a lead that is
+//! `[K_e1, K_e2, T_L1, T_L2, t_M, ln G, omega_nm, zeta_nm, tau_e, d1 .. d_nd]`. The rate enters by its logarithm: it is
+//! positive, and its likelihood is far more nearly a parabola in ln G than in G. A lag enters by `1/T_I`, for the same
+//! reason.
 
 use hoid_model::{
     FamilyOperator, Form, ModelError, Orders,
@@ -29,10 +29,10 @@ pub const SIGMOID_NAMES: [(&str, &str); 9] = [
     ("tau_e", "s"),
 ];
 
-/// Most parameters of a numerator.
+/// Largest number of parameters of a numerator.
 pub(crate) const MOST_VARYING: usize = 3;
 
-/// Where everything stands in theta.
+/// Where everything is in theta.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Layout {
     pub form: Form,
@@ -51,14 +51,14 @@ pub(crate) struct Layout {
     pub noise: usize,
 }
 
-/// What an element of theta is.
+/// Definition of an element of theta.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Element {
     /// A coordinate of the numerator, before (0) or after (1) the change.
     Varying(Coordinate, usize),
     Midpoint,
     LogRate,
-    /// A coordinate that does not change; omega_nm and zeta_nm stand for their logarithms.
+    /// A coordinate that does not change; omega_nm and zeta_nm represent their logarithms.
     Constant(Coordinate),
     /// d_i.
     Noise(usize),
@@ -118,18 +118,18 @@ impl Layout {
         usize::from(self.form.has_pole()) + if self.neuromuscular { 2 } else { 0 }
     }
 
-    /// True where the operator passes e on at once.
+    /// True if the operator passes e on at once.
     pub fn has_direct_part(&self) -> bool {
         self.form.degree() == self.order()
     }
 
-    /// How many samples more than nk must pass before the state alone tells of the past.
+    /// How many samples more than nk must pass before the state alone reports the past.
     pub fn reach(&self) -> usize {
         if self.has_direct_part() { 2 } else { 0 }
     }
 
     /// Pieces of a sample within which the response is a smooth function of the delay: the direct
-    /// part has a kink in the middle ([`hoid_model::operator_family`], `hold`).
+    /// part has a kink in the middle ([`hoid_model::operator_family`], `zoh`).
     pub fn pieces(&self) -> usize {
         if self.has_direct_part() { 2 } else { 1 }
     }
@@ -217,7 +217,7 @@ impl Layout {
         }
     }
 
-    /// Derivative of what is reported along an element of theta.
+    /// Derivative of the report along an element of theta.
     pub fn typed_slope(&self, place: usize, value: f64) -> f64 {
         match place {
             _ if place == self.log_rate => value.exp(),

@@ -2,11 +2,11 @@
 //! change estimated.
 //!
 //! `u(t) = sum_i n_i(t - tau) y_i(t) + (1/D) eps`, where y_i is the exact response of `s^i` over the
-//! poles of the operator, behind their delay, to the held error ([`objective`]), and n_i the
+//! poles of the operator, after their delay, to the held error ([`objective`]), and n_i the
 //! coefficients of their numerator. Its parameters, the gain and T_L (or c_1 and c_2, or T_L and
 //! alpha), go from their initial to their last value as `1/(1 + e^{-G (t - t_M)})` (eq. 5); the lag,
 //! the neuromuscular part and the delay stay. Every form of [`hoid_model::operator_family`] will do;
-//! by default it is a gain and a lead, `u = K_e y_0 + K_e_dot y_1`, `K_e_dot = K_e T_L`. What is in
+//! by default it is a gain and a lead, `u = K_e y_0 + K_e_dot y_1`, `K_e_dot = K_e T_L`. Contents of
 //! the numerator at both ends, t_M, G, the poles, a real tau_e and D are found together by the
 //! prediction error method, which is maximum likelihood for normal innovations. Source: P. M. T.
 //! Zaal, *Manual control adaptation to changing vehicle dynamics in roll-pitch control tasks*, J.
@@ -21,12 +21,12 @@
 //! chi-square distribution then (R. B. Davies, *Biometrika* 74 (1987) 33-43); the decision is by
 //! the BIC, `LR > 4 ln n`.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `options` | [`SigmoidChange`]: what may be chosen, by fields and by names |
 //! | `estimator` | the fit |
 //! | `layout` | order and meaning of the parameters |
-//! | `bounds` | within what they are sought |
+//! | `bounds` | within what they are searched for |
 //! | `instant` | the sigmoid and the numerator at one time |
 //! | `unit_operator` | responses of each power of s over the poles, with their derivatives |
 //! | `objective` | the criterion and its derivatives |

@@ -22,8 +22,8 @@ pub enum NoiseLevel {
 /// Smallest ratio of the two levels: what lies below is a record without noise on one side.
 const SMALLEST_RATIO: f64 = 1e-3;
 
-/// `[sigma_1, sigma_2]` for the residuals and the share of the change at each; `None` where they
-/// have no size.
+/// `[sigma_1, sigma_2]` for the residuals and the share of the change at each; `None` if they have
+/// no size.
 pub(crate) fn levels(residuals: &[Vec<f64>], shares: &[Vec<f64>]) -> Option<[f64; 2]> {
     let pairs = || residuals.iter().flatten().zip(shares.iter().flatten());
     // From the weighted mean squares on either side.

@@ -1,34 +1,31 @@
 //! The prediction-error criterion of an operator that changes.
 //!
-//! With y_i the response of `s^i` over the poles of the operator, behind their delay, to the held
-//! error, and n_i the coefficients of the numerator,
+//! With y_i the response of `s^i` over the poles of the operator, after their delay, to the held error, and n_i the
+//! coefficients of the numerator,
 //!
 //! `w(t) = sum_i n_i(t - tau) y_i(t)`,  `v = u - w`,  `eps = D v`,
 //!
-//! because the delay stands behind the gains. For a gain and a lead that is `K_e(t - tau) y_0(t) +
-//! K_e_dot(t - tau) y_1(t)`, with y_0 of `omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}`. The
-//! y_i have one F and one state in common, which the numerator does not touch, so that
-//! y_i = (B_i/F) q^-nk e holds throughout ([`super::unit_operator`]). With the gain k and the shape
-//! m of the numerator, `n = k m(x)` ([`hoid_model::Form::shape`]),
+//! because the delay is after the gains. For a gain and a lead that is `K_e(t - tau) y_0(t) + K_e_dot(t - tau) y_1(t)`,
+//! with y_0 of `omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}`. The y_i have one F and one state in common, which
+//! the numerator does not touch, so that y_i = (B_i/F) q^-nk e holds throughout ([`super::unit_operator`]). With the
+//! gain k and the shape m of the numerator, `n = k m(x)` ([`hoid_model::Form::shape`]),
 //!
 //! `dw/dk = sum_i m_i y_i`,  `dw/dx_j = k sum_i (dm_i/dx_j) y_i`.
 //!
-//! **Initial states.** The state of the operator where a record begins is unknown, as many numbers
-//! as they have poles. Any state is reached from rest by as many held errors before it; those are
-//! the unknowns, so that the same filters give the responses to them and all derivatives. Of a gain
-//! and a lead they stand before the record, of other forms right before the first residual: there
-//! nothing of a fast pole has died away, and none of the responses is lost beside the others.
-//! They enter eps linearly and are eliminated exactly for each theta, as in
+//! **Initial states.** The state of the operator where a record starts is unknown, as many numbers as they have poles.
+//! Any state is reached from rest by as many held errors before it; those are the unknowns, so that the same filters
+//! give the responses to them and all derivatives. For a gain and a lead they are before the record, of other forms
+//! right before the first residual: there nothing of a fast pole has died away, and none of the responses is lost next
+//! to the others. They enter eps linearly and are eliminated exactly for each theta, as in
 //! [`crate::criterion::initial_state_responses`]: `eps = (I - Q Q') eps_0`, psi with the best
 //! states, `psi' (I - Q Q') psi` (G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973)
 //! 413-432; L. Kaufman, *BIT* 15 (1975) 49-57).
 //!
-//! **Level.** Of recorded data u may have a level c that is no response to e ([`crate::Fit::level`]). It
-//! is one more linear unknown of each record, with a response of ones, eliminated in the same way. The
-//! means could not be taken out beforehand, as the response to that of e changes with the gains.
+//! **Level.** Of recorded data u may have a level c that is not a response to e ([`crate::Fit::level`]). It is one more
+//! linear unknown of each record, with a response of ones, eliminated in the same way. The means could not be taken out
+//! beforehand, as the response to that of e changes with the gains.
 //!
-//! **Prior.** What is known before the data stands beside them as squares of its own
-//! ([`super::prior`]).
+//! **Prior.** What is known before the data is next to them as squares of its own ([`super::prior`]).
 
 use hoid_model::{Form, SampleTime, uncertainty::variance_along};
 
@@ -63,12 +60,12 @@ pub(crate) struct ChangeCriterion<'a> {
     pub piece: Option<usize>,
     /// False for the model whose first state holds throughout.
     pub changes: bool,
-    /// Weights of the residuals of each record, from the first residual on; none where all count
-    /// the same.
+    /// Weights of the residuals of each record, from the first residual on; none if all count the
+    /// same.
     pub weights: Option<Vec<Vec<f64>>>,
-    /// What is known before the data.
+    /// Prior knowledge before the data.
     pub penalty: Vec<Penalty>,
-    /// True where u of each record has a level.
+    /// True if u of each record has a level.
     pub level: bool,
 }
 
@@ -113,7 +110,7 @@ impl ChangeCriterion<'_> {
         (self.layout.order() + usize::from(self.level)) * self.data.len()
     }
 
-    /// What the prior adds to the sum of squares.
+    /// Contribution of the prior to the sum of squares.
     pub fn penalty_at(&self, theta: &[f64]) -> f64 {
         self.penalties().map(|penalty| penalty.at(theta)).sum()
     }
@@ -150,7 +147,7 @@ impl ChangeCriterion<'_> {
         }
     }
 
-    /// Numerators in force behind the delay at each sample from the first regressed one on.
+    /// Numerators in force after the delay at each sample from the first regressed one on.
     fn gains(&self, theta: &[f64], record: usize) -> Vec<Instant> {
         let (from, data) = (self.first - self.layout.nd, self.data[record]);
         let at = |t: usize| data.start_s + t as f64 * self.sample_time.s() - theta[self.layout.delay];
@@ -173,7 +170,7 @@ impl ChangeCriterion<'_> {
         if unit.nk + layout.reach() > from || self.first >= n {
             return None;
         }
-        // Where the oldest error of the past stands; those of a direct part reach on by two samples.
+        // Position of the oldest error of the past; those of a direct part reach on by two samples.
         let oldest = match layout.form {
             Form::Lead => 0,
             _ => from - unit.nk - layout.reach(),
@@ -182,7 +179,7 @@ impl ChangeCriterion<'_> {
         input.extend_from_slice(&data.e[..n - unit.nk]);
         let powers = unit.b.len();
         let mut y: Vec<Vec<f64>> = (0..powers).map(|i| unit.response(i, &input)).collect();
-        // Sample t stands at t - nk + past_errors.
+        // Sample t is at t - nk + past_errors.
         let begin = from + past_errors - unit.nk;
         let gains = self.gains(theta, record);
         let respond = |y: &[&[f64]]| combined(&gains, y, Instant::numerator);
@@ -196,7 +193,7 @@ impl ChangeCriterion<'_> {
             .map(|age| {
                 let tails: Vec<&[f64]> = h.iter().map(|h| h.get(begin - oldest - age..).unwrap_or(&[])).collect();
                 let mut column = respond(&tails);
-                // Room for D behind its end.
+                // Room for D after its end.
                 column.resize((column.len().max(past_errors) + nd).min(n - from), 0.0);
                 column
             })
@@ -229,9 +226,9 @@ impl ChangeCriterion<'_> {
         })
     }
 
-    /// The level of u in one record at a minimum, and its variance for this variance of the
-    /// innovations and covariance of theta: `sigma^2/r^2` for given theta, with r the length of its
-    /// column q r off those of the states, and what is not known of theta, along `dc/dtheta = -q' psi/r`.
+    /// The level of u in one record at a minimum, and its variance for this variance of the innovations and covariance
+    /// of theta: `sigma^2/r^2` for given theta, with r the length of its column q r off those of the states, and the
+    /// uncertainty of theta, along `dc/dtheta = -q' psi/r`.
     pub fn level_of(&self, theta: &[f64], record: usize, variance: f64, covariance: &[f64]) -> Option<(f64, f64)> {
         let pass = self.pass(theta, record)?;
         let (value, length) = pass.level.filter(|(_, length)| *length > 0.0)?;

@@ -1,5 +1,5 @@
-//! What may be chosen of an operator who changes once: the fields of [`SigmoidChange`], and the names under which
-//! texts set them. An option is declared here and nowhere else.
+//! Options of an operator that changes once: the fields of [`SigmoidChange`], and the names under which texts set them.
+//! An option is declared here and nowhere else.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ use crate::{
     shared_options as shared,
 };
 
-/// What is to be estimated, and how.
+/// Quantity to be estimated, and how.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SigmoidChange {
     /// Form of the operator: what changes is its numerator (K, T_L, c_1, c_2, alpha), with a lag the
@@ -24,8 +24,8 @@ pub struct SigmoidChange {
     pub neuromuscular: bool,
     /// A level of u in each record, estimated: of recorded data ([`SigmoidFit::level`](crate::SigmoidFit::level)). Default false.
     pub level: bool,
-    /// What is known of the person before the data; that of T_L counts before and after the change.
-    /// Default nothing.
+    /// Prior knowledge of the person before the data; that of T_L counts before and after the
+    /// change. Default nothing.
     pub prior: OperatorPrior,
     /// Order nd of D.
     pub nd: usize,
@@ -92,7 +92,7 @@ impl SigmoidChange {
 
 impl BatchOptions for SigmoidChange {
     fn options() -> Vec<BatchOption<Self>> {
-        let usual = Self::default();
+        let default = Self::default();
         let mut all = vec![
             shared::noise(|_: &mut Self, _, _| Ok(())),
             shared::change().printed("change", |_, _| Some("sigmoid".to_owned())),
@@ -108,7 +108,7 @@ impl BatchOptions for SigmoidChange {
             })
             .printed("orders", |how, _| Some(format!("nd={}", how.nd))),
             shared::delay_range(
-                usual.delay_range_s,
+                default.delay_range_s,
                 |how: &mut Self| &mut how.delay_range_s,
                 |how| how.delay_range_s,
             ),
@@ -124,7 +124,7 @@ impl BatchOptions for SigmoidChange {
             |how: &mut Self| &mut how.constraints,
             |how| &how.constraints,
         ));
-        all.extend(shared::search(usual.search, |how: &mut Self| &mut how.search));
+        all.extend(shared::search(default.search, |how: &mut Self| &mut how.search));
         all
     }
 }

@@ -1,6 +1,6 @@
-//! What is known of the person before the data, beside the criterion of a change.
+//! Prior knowledge of the person before the data, next to the criterion of a change.
 //!
-//! A prior of a positive parameter x, `ln x ~ N(m, s)`, stands as `sigma^2 (ln x - m)^2/s^2` beside
+//! A prior of a positive parameter x, `ln x ~ N(m, s)`, stands as `sigma^2 (ln x - m)^2/s^2` next to
 //! the squared residuals ([`crate::family::OperatorPrior`]); that of T_L counts before and after the
 //! change. sigma^2, the variance of the innovations, is that of the fit: both in turn.
 
@@ -32,7 +32,7 @@ pub(super) fn penalties(layout: &Layout, prior: &OperatorPrior) -> Vec<Penalty> 
             Element::Varying(own, _) | Element::Constant(own) => *own == coordinate,
             _ => false,
         };
-        // omega_nm and zeta_nm stand here themselves, in the family by their logarithms.
+        // omega_nm and zeta_nm are here themselves, in the family by their logarithms.
         let own = elements.iter().enumerate().filter(move |(_, e)| is_own(e));
         own.map(move |(place, _)| Penalty {
             place,
@@ -47,7 +47,7 @@ pub(super) fn penalties(layout: &Layout, prior: &OperatorPrior) -> Vec<Penalty> 
 
 /// The penalties with the variance of the innovations as their unit.
 pub(super) fn weighted(unit: &[Penalty], variance: f64) -> Vec<Penalty> {
-    unit.iter().map(|p| p.beside(variance)).collect()
+    unit.iter().map(|p| p.weighted(variance)).collect()
 }
 
 /// Variance of the innovations at a minimum.

@@ -1,6 +1,6 @@
 //! Profile likelihood intervals of t_M and G.
 //!
-//! An interval holds the values at which the other parameters, searched anew, lose little:
+//! An interval holds the values at which the other parameters, searched again, lose little:
 //! `n ln(V(x)/V) <= q`. It needs no parabola. For G, and for t_M where the change is resolved (two
 //! standard errors are less than the width 1/G of the change), the loss is chi-square with one
 //! degree of freedom: q = 3.84 for 95 %. An abrupt change is a change point instead: the loss at
@@ -33,7 +33,7 @@ pub(crate) struct Interval {
     pub high: f64,
 }
 
-/// What a walk along the profile came upon.
+/// Result of a walk along the profile.
 #[derive(Debug)]
 pub(crate) enum Profile {
     /// An interval.
@@ -44,8 +44,8 @@ pub(crate) enum Profile {
 
 /// Whether t_M, with this standard error of a regular parameter, is a change point.
 pub(crate) fn is_change_point(layout: &Layout, theta: &[f64], standard_error: f64) -> bool {
-    // Derivatives at one t_M do not tell about another one a width of the change away: the ends of
-    // a 95 % interval.
+    // Derivatives at one t_M do not determine about another one a width of the change away: the
+    // ends of a 95 % interval.
     2.0 * standard_error >= (-theta[layout.log_rate]).exp()
 }
 
@@ -68,7 +68,7 @@ pub(crate) fn profile_likelihood_interval(
     let options = SearchOptions {
         method: SearchMethod::LevenbergMarquardt,
         max_iterations: 30,
-        // Of the statistic, n times this: a thousandth of the quantile.
+        // For the statistic, n times this: a thousandth of the quantile.
         tolerance: 1e-3 * quantile / n,
     };
     let (low, high) = criterion.limits[place];

@@ -3,7 +3,7 @@
 //! `u = sum_i (n_i1 (1 - s) + n_i2 s) y_i` with the share s of the change and the responses y_i,
 //! whitened by D. From the coefficients n at either end follow the parameters of the numerator:
 //! where it has a coefficient less than parameters allow, those that lie nearest in the metric of
-//! the responses. A slow pole of the operator has a state where a record begins, which is one more
+//! the responses. A slow pole of the operator has a state where a record starts, which is one more
 //! unknown for each.
 
 use hoid_model::Form;
@@ -20,7 +20,7 @@ use crate::linalg::least_squares::{add_scaled, dot, solve_symmetric};
 const SETTLING: f64 = 4.0;
 /// Where the pole is that settles last, when there is no neuromuscular part, 1/s.
 const FAST: f64 = 10.0;
-/// Lead times that a square of a lead is sought at, s: from the first by the factor.
+/// Lead times that a square of a lead is searched for at, s: from the first by the factor.
 const LEADS_S: (f64, f64, usize) = (0.02, 1.12, 60);
 
 /// Responses for given poles, delay and noise model.
@@ -82,7 +82,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
             if of_states > 0 {
                 columns.push(self.whitened(&self.slow_state(u.len())));
             }
-            // Those of the other records are zero here.
+            // The entries of the other records are zero here.
             let place = |i: usize| if i < ends * powers { i } else { i + record };
             let target = self.whitened(u);
             power += dot(&target, &target);
@@ -112,7 +112,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
         (rank.is_finite() && values.iter().all(|g| g.is_finite())).then_some((rank, values))
     }
 
-    /// What the best numerators of a theta leave of u, in each record.
+    /// The part of u that the best numerators for a theta leave unexplained, in each record.
     pub fn unexplained(&self, theta: &[f64]) -> Option<Vec<Vec<f64>>> {
         let (layout, mut all) = (&self.criterion.layout, Vec::new());
         for (record, (first, y, u)) in self.signals.iter().enumerate() {
@@ -153,7 +153,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
             .collect()
     }
 
-    /// Times behind the delay of the samples of a record.
+    /// Times after the delay of the samples of a record.
     fn times(&self, theta: &[f64], record: usize, first: usize, n: usize) -> impl Iterator<Item = f64> {
         let (data, ts) = (&self.criterion.data[record], self.criterion.sample_time.s());
         let from = first - self.criterion.layout.nd;

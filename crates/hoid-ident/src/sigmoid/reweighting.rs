@@ -23,7 +23,7 @@ const SETTLED: f64 = 1e-6;
 /// two-hundredth.
 const NO_MATTER: f64 = 1e-6;
 
-/// The minimum with the noise levels found in turn with the fit, and the levels; `None` where the
+/// The minimum with the noise levels found in turn with the fit, and the levels; `None` if the
 /// residuals are rounding.
 ///
 /// # Errors

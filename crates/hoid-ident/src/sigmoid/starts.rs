@@ -98,7 +98,7 @@ pub(crate) fn without_change(criterion: &ChangeCriterion<'_>, theta: &[f64]) -> 
     theta
 }
 
-/// Rank and theta for one change, the gains being best.
+/// Rank and theta for one change, with the best gains.
 fn rank_at(ranking: &Ranking<'_, '_>, theta: &[f64], t_m: f64) -> Option<(f64, Vec<f64>)> {
     let mut there = theta.to_vec();
     there[ranking.criterion.layout.midpoint] = t_m;

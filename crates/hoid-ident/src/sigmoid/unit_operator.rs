@@ -4,7 +4,7 @@
 //! `F y_i = B_i q^-nk e`, `F dy_i/dp = (dB_i/dp) q^-nk e - (dF/dp) y_i` for p of 1/T_I, omega_nm,
 //! zeta_nm and tau_e. For a gain and a lead B and F are those of
 //! [`hoid_model::delayed_operator`], else those of
-//! [`FamilyOperator::hold_powers_within`](hoid_model::FamilyOperator::hold_powers_within).
+//! [`FamilyOperator::zoh_powers_within`](hoid_model::FamilyOperator::hold_powers_within).
 
 use hoid_core::filter::{divide_in_place, fir};
 use hoid_model::{
@@ -66,7 +66,7 @@ impl UnitOperator {
     fn of_family(layout: &Layout, theta: &[f64], sample: usize, ts: SampleTime) -> Option<Self> {
         // The numerator takes no part.
         let operator = layout.operator(theta, &[1.0; 3]).ok()?;
-        let powers = operator.hold_powers_within(sample, ts).ok()?;
+        let powers = operator.zoh_powers_within(sample, ts).ok()?;
         // From the coordinates of the family to theta.
         let scale: Vec<(usize, f64)> = layout
             .poles()

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{Fit, IdentError, Series};
 
-/// What the residual tests say. A lag outside its 99 % bound is expected once in a hundred; more
+/// Results of the residual tests. A lag outside its 99 % bound is expected once in a hundred; more
 /// than [`OUTSIDE_ALLOWED`] of them is a sign.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ResidualDiagnostics {
@@ -50,7 +50,7 @@ pub struct Validation {
 }
 
 impl Validation {
-    /// What the residual tests say.
+    /// Results of the residual tests.
     pub fn diagnostics(&self) -> ResidualDiagnostics {
         let outside = |keep: fn(i64) -> bool| {
             let c = &self.cross_correlation;
@@ -67,7 +67,7 @@ impl Validation {
 }
 
 impl fmt::Display for Validation {
-    /// VAF and NRMSE of simulation and prediction, then what each residual test says.
+    /// VAF and NRMSE of simulation and prediction, then what each residual test shows.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let q = &self.quality;
         let found = self.diagnostics();
@@ -219,7 +219,8 @@ impl Fit {
 }
 
 impl GoodnessOfFit {
-    /// That of several records together, as [`Fit::quality`], where their validations are at hand.
+    /// The value for several records together, as [`Fit::quality`], where their validations are
+    /// available.
     pub fn pooled<'a>(validated: impl Iterator<Item = (&'a Record, &'a Validation)>) -> Self {
         let with = |all: ErrorSums, (record, v): (&'a Record, &'a Validation)| {
             all.and(&record.output()[v.first..], &v.simulated, &v.predicted)

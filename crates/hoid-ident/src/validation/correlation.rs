@@ -46,7 +46,7 @@ pub(super) fn centred(mut x: Vec<f64>) -> Vec<f64> {
     x
 }
 
-/// Covariances over a size; zeros where that is zero.
+/// Covariances over a size; zeros if that is zero.
 fn relative_to(size: f64, mut covariances: Vec<f64>) -> Vec<f64> {
     covariances
         .iter_mut()

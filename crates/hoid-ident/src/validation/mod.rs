@@ -6,13 +6,13 @@
 //! - residual autocorrelation `r_eps(k) / r_eps(0)`, bounds `+- z / sqrt n` for white residuals;
 //! - cross-correlation of residuals and input, `r_eps,e(k) / sqrt(r_eps(0) r_e(0))`, with the
 //!   bounds `+- z sqrt( (1/n) sum_k rho_eps(k) rho_e(k) )` that hold when the residuals need not be
-//!   white (Ljung, *System Identification*, 1999, eq. 16.56). At positive lags it tells of dynamics
+//!   white (Ljung, *System Identification*, 1999, eq. 16.56). At positive lags it reports dynamics
 //!   that the model missed; at negative lags (the residual leads the input) of feedback, which a
 //!   closed loop always has;
 //! - whiteness by `Q = n (n + 2) sum_k r_k^2/(n - k)`, chi-square distributed for white residuals
 //!   (G. M. Ljung and G. E. P. Box, *Biometrika* 65 (1978) 297-303).
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `comparison` | a model against a record |
 //! | `goodness_of_fit` | VAF and NRMSE |

@@ -1,15 +1,15 @@
 //! Own starts reach the global minimum on short records of textbook systems.
 //!
 //! **Experiment.** Random systems ([`systems`]) are fitted with their own orders from the own
-//! starts, and beside it from the true parameters and from random starts. The lowest loss of all is
-//! the reference; the own starts reach it where their loss is at most 1e-6 (relative) above it.
+//! starts, and next to it from the true parameters and from random starts. The lowest loss of all
+//! is the reference; the own starts reach it where their loss is at most 1e-6 (relative) above it.
 //!
-//! **What does not count.** Short records often have their lowest loss at a model that says nothing
-//! about the system: a root of C or F on the unit circle (farther out than 1 - 1e-4), where the
-//! estimated initial state of that root removes a trend or a sinusoid from the record; or common
-//! factors, a zero of B beside a root of F or a root of C beside one of D (closer than 0.01), where
-//! the parameters of both are not determined. Where the reference is such a minimum, the system is
-//! counted apart.
+//! **What does not count.** Short records often have their lowest loss at a model that carries no
+//! information about the system: a root of C or F on the unit circle (farther out than 1 - 1e-4),
+//! where the estimated initial state of that root removes a trend or a sinusoid from the record; or
+//! common factors, a zero of B next to a root of F or a root of C next to one of D (closer than
+//! 0.01), where the parameters of both are not determined. Where the reference is such a minimum,
+//! the system is counted apart.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod systems;
@@ -32,7 +32,7 @@ const CANCELS: f64 = 0.01;
 struct Outcome {
     number: u64,
     own: Option<Fit>,
-    /// Of the true parameters and the random starts.
+    /// For the true parameters and the random starts.
     lowest: Option<Fit>,
     own_s: f64,
 }
@@ -80,7 +80,7 @@ impl Outcome {
         self.above() <= REACHED
     }
 
-    /// True where the reference is a minimum that counts.
+    /// True if the reference is a minimum that counts.
     fn counts(&self) -> bool {
         let reference = if self.above() <= 0.0 { &self.own } else { &self.lowest };
         reference.as_ref().is_some_and(is_regular)
@@ -159,7 +159,7 @@ fn own_starts_reach_the_global_minimum_of_a_thousand_systems() {
 
 #[test]
 fn own_starts_reach_the_global_minimum() {
-    // The usual starts alone miss one system in twelve.
+    // The default starts alone miss one system in twelve.
     let [counted, reached, ..] = study(0..60, 6);
     assert!(counted > 50 && reached == counted, "{reached} of {counted}");
 }

@@ -14,7 +14,7 @@ const SAMPLES: usize = 300;
 /// Samples before it.
 const RUN_IN: usize = 500;
 
-/// A system, what was recorded of it, and random numbers for whoever goes on with it.
+/// A system, what was recorded of it, and random numbers for the caller that continues with it.
 pub struct System {
     pub orders: Orders,
     pub theta: Vec<f64>,
@@ -26,7 +26,7 @@ pub struct System {
 pub struct Draw(u64);
 
 impl Draw {
-    /// The stream of a number.
+    /// The random stream with a number.
     pub fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x5851_f42d_4c95_7f2d)
     }
@@ -144,7 +144,7 @@ impl System {
     }
 }
 
-/// White, behind two equal poles, or steps to +1 and -1 that last 5 to 20 samples.
+/// White, after two equal poles, or steps to +1 and -1 that last 5 to 20 samples.
 fn input(draw: &mut Draw, mut white: Vec<f64>) -> Vec<f64> {
     match draw.one_of(3) {
         0 => {}

@@ -1,13 +1,13 @@
 //! Refined instrumental variables on recorded people.
 //!
-//! The recordings lie in the directory that `HOID_HUMAN_DATA` names; without it the test says so and
-//! passes.
+//! The recordings lie in the directory that `HOID_HUMAN_DATA` names; without it the test reports it
+//! and passes.
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
 use hoid_ident::{Estimator, InstrumentalVariable, Instruments, IvMethod};
 use hoid_model::{Channel, Orders, Record, SampleTime, Structure};
 
-/// The trials of a person and plant: e = r - y, paired with the u of the row behind it.
+/// The trials of a person and plant: e = r - y, paired with the u of the row after it.
 fn trials(cell: &str) -> Option<Vec<Record>> {
     let dir = std::env::var_os("HOID_HUMAN_DATA")?;
     let mut files: Vec<_> = std::fs::read_dir(dir)
@@ -51,7 +51,7 @@ fn trial(text: &str) -> Record {
     .unwrap()
 }
 
-/// What says that it has converged is not worse than the prediction error method by much: on the
+/// What states that it has converged is not worse than the prediction error method by much: on the
 /// border of stability it once was, by half of the loss.
 #[test]
 #[ignore = "minutes; prints the table of all cells"]

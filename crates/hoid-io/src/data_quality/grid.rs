@@ -1,7 +1,7 @@
-//! The even grid behind a recorded time, and how the time differs from it.
+//! The even grid after a recorded time, and how the time differs from it.
 //!
-//! Row i stands at `t_i = t_0 + k_i Ts + jitter`, with whole k that grow by one from row to row,
-//! and by more where rows are missing. The k are found by a phase that follows the times,
+//! Row i is at `t_i = t_0 + k_i Ts + jitter`, with whole k that grow by one from row to row, and by
+//! more where rows are missing. The k are found by a phase that follows the times,
 //! `k_i - k_{i-1} = round((t_i - g) / Ts)` with `g` pulled a small share of the way to each time:
 //! jitter of nearly half a sample is then no gap. A row taken too far is given back when the next
 //! seems to stand. Ts is the slope of least squares, found twice.
@@ -12,22 +12,22 @@
 /// Rows of a part, and the fewest that make one.
 const PART: usize = 256;
 const LEAST_PART: usize = 5;
-/// A gap of so many rows is a pause, behind which the grid begins anew.
+/// A gap of a given number of rows is a pause, after which the grid starts again.
 const PAUSE: f64 = 10.0;
 /// Rows within which a step that was taken too far is set right.
 const NEAR: usize = 4;
-/// Times that say where a grid begins.
+/// Times that report where a grid starts.
 const BEGIN: usize = 8;
 
-/// Where the rows stand on an even grid.
+/// Where the rows are on an even grid.
 pub(crate) struct Grid {
     /// Rows whose time is later than that of all before.
     pub(crate) rows: Vec<usize>,
     /// Steps of the grid from each of them to the one before; 1 where no row is missing.
     pub(crate) steps: Vec<f64>,
-    /// Sample time, s; NaN where fewer than two rows advance.
+    /// Sample time, s; NaN if fewer than two rows advance.
     pub(crate) sample_time_s: f64,
-    /// Rows whose time stands still.
+    /// Rows whose time stays constant.
     pub(super) standing: Vec<usize>,
     /// Rows whose time lies before that of an earlier row.
     pub(super) back: Vec<usize>,
@@ -90,8 +90,8 @@ impl Grid {
             .map(|i| (i - 1, self.steps[i] - 1.0))
     }
 
-    /// Deviation from lines over parts without a gap: RMS, and the largest with its row; none where
-    /// no part is long enough.
+    /// Deviation from lines over parts without a gap: RMS, and the largest with its row; none if no
+    /// part is long enough.
     pub(crate) fn jitter(&self, t: &[f64]) -> Option<(f64, f64, usize)> {
         let (mut squares, mut freedom) = (0.0, 0);
         let mut worst = (0.0, 0);
@@ -128,7 +128,7 @@ impl Grid {
 fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
     steps.fill(1.0);
     let mut owed: Option<usize> = None;
-    // Where a grid begins, the first times together say where it lies: one alone is off by its
+    // Where a grid starts, the first times together report where it lies: one alone is off by its
     // jitter.
     let begin = |i: usize| {
         let ahead = times[i..]
@@ -167,7 +167,7 @@ fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
 
 /// Slope of least squares of the times over the grid.
 pub(super) fn slope(times: &[f64], steps: &[f64]) -> f64 {
-    // Counted anew for each sum: a record of hours has no room for its indices.
+    // Counted again for each sum: a record of hours has no room for its indices.
     let indexed = || {
         let mut index = 0.0;
         times.iter().zip(steps).enumerate().map(move |(i, (time, step))| {

@@ -1,18 +1,18 @@
-//! Rows that are there twice, and stalls: channels that all hold their values while the time goes
-//! on.
+//! Rows that are duplicated, and stalls: channels that all hold their values while the time
+//! continues.
 //!
 //! One channel may hold because a hand rests, and two in coarse steps may do so together. A stall
-//! is told by the channel that naturally holds shortest: all hold for longer than `min_c L_c`. For
-//! a channel in steps L is ten times the length that nine of ten of its holds do not exceed; for
-//! one in full precision twice its longest hold while another channel moves, which is 0 unless it
-//! is printed with few decimals: then each hold of all channels is told, unless one of them is in
-//! steps and the hold is of one row. A channel that stands alone must be in full precision to be
+//! is reported by the channel that naturally holds shortest: all hold for longer than `min_c L_c`.
+//! For a channel in steps L is ten times the length that nine of ten of its holds do not exceed;
+//! for one in full precision twice its longest hold while another channel moves, which is 0 unless
+//! it is printed with few decimals: then each hold of all channels is reported, unless one of them
+//! is in steps and the hold is of one row. A channel that is alone must be in full precision to be
 //! judged.
 
 use std::ops::Range;
 
 use super::grid::Grid;
-use super::issue::{Place, QualityIssue, QualityIssueKind, at};
+use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
 use super::signals::{Signal, Signals};
 use super::values::Levels;
 use crate::wording::{counted, short};
@@ -27,7 +27,7 @@ pub(super) fn standing(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<Quali
                 .all(|signal| signal.values[*row] == signal.values[row - 1] || signal.values[*row].is_nan())
     };
     let (repeated, others): (Vec<usize>, Vec<usize>) = grid.standing.iter().copied().partition(same);
-    // Of rows behind a time that was set back the first alone is earlier than the row before.
+    // For rows after a time that was set back the first alone is earlier than the row before.
     let falls = |row: &usize| {
         signals
             .time
@@ -42,7 +42,7 @@ pub(super) fn standing(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<Quali
         (QualityIssueKind::Repeated, repeated),
         (QualityIssueKind::Unordered, others),
     ] {
-        let places: Vec<Place> = rows.iter().map(|row| signals.place(&(*row..row + 1))).collect();
+        let places: Vec<RowSpan> = rows.iter().map(|row| signals.place(&(*row..row + 1))).collect();
         let Some(first) = places.first() else { continue };
         let what = if kind == QualityIssueKind::Repeated {
             "there twice, time included"
@@ -92,7 +92,7 @@ pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Gri
     if moving.is_empty() || rows < 3 {
         return;
     }
-    // Whether each row holds the row before; rows that are there twice are another matter.
+    // Whether each row holds the row before; rows that are duplicated are another matter.
     let advances = |row: usize| grid.is_none_or(|grid| grid.standing.binary_search(&row).is_err());
     let holds: Vec<Vec<bool>> = moving
         .iter()
@@ -119,7 +119,7 @@ pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Gri
                 2 * alone.iter().map(Range::len).max().unwrap_or(0)
             }
         };
-        // Beside a channel in steps, which holds often, one printed with few digits meets it at a
+        // Next to a channel in steps, which holds often, one printed with few digits meets it at a
         // peak by chance.
         let by_chance = usize::from(moving.iter().any(|(_, levels)| levels.is_coarse()));
         moving.iter().zip(&holds).map(natural).min().unwrap_or(0).max(by_chance)
@@ -128,8 +128,8 @@ pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Gri
         .into_iter()
         .filter(|run| run.len() > limit)
         .collect();
-    let places: Vec<Place> = stalled.iter().map(|run| signals.place(run)).collect();
-    let seconds = |place: &Place| place.to_s.zip(place.from_s).map_or(0.0, |(to, from)| to - from);
+    let places: Vec<RowSpan> = stalled.iter().map(|run| signals.place(run)).collect();
+    let seconds = |place: &RowSpan| place.to_s.zip(place.from_s).map_or(0.0, |(to, from)| to - from);
     let Some(longest) = places.iter().max_by(|a, b| {
         (a.rows, seconds(a))
             .partial_cmp(&(b.rows, seconds(b)))

@@ -1,4 +1,4 @@
-//! What is wrong with the columns of a table that a record is made of.
+//! Problems with the columns of a table that a record is made of.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use crate::IoError;
 use crate::record::ReadOptions;
 use crate::table::{Table, column_expression};
 
-/// What is wrong with the columns that are asked for, within the span.
+/// Problems with the columns that are requested, within the span.
 ///
 /// # Errors
 /// [`IoError::NoSuchColumn`] and [`IoError::Expression`].
@@ -41,7 +41,7 @@ pub(crate) fn issues_of_signals(
         .collect();
     used.sort_unstable();
     used.dedup();
-    // A frequency to resample to says nothing of the clock of the file.
+    // A frequency to resample to carries no information about the clock of the file.
     let nominal_hz = options.sampling_hz.filter(|_| !options.repair.resample);
     let mut found = of_columns(table, &used, time, nominal_hz, span_rows(table, time, options));
     // A difference may rightly have one constant term, such as a reference of zero.
@@ -66,7 +66,7 @@ pub(crate) fn issues_of_signals(
     found
 }
 
-/// The rows of the span, as far as the time of the file tells.
+/// The rows of the span, as far as the time of the file shows.
 fn span_rows(table: &Table<'_>, time: Option<usize>, options: &ReadOptions) -> Range<usize> {
     let at = |row: usize| match (time, options.sampling_hz) {
         (Some(time), _) => table.columns[time].values[row],
@@ -81,7 +81,7 @@ fn span_rows(table: &Table<'_>, time: Option<usize>, options: &ReadOptions) -> R
     start..end.unwrap_or(table.rows)
 }
 
-/// What is wrong with some columns of a table.
+/// Problems with some columns of a table.
 fn of_columns(
     table: &Table<'_>,
     used: &[usize],

@@ -1,4 +1,4 @@
-//! A finding: what it is, where, how much, and what can be done about it.
+//! A finding: kind, place, size, and what can be done about it.
 
 use std::fmt;
 
@@ -9,26 +9,26 @@ use crate::wording::decimal;
 /// Places of a finding that are written as JSON; all of them are counted.
 const PLACES_WRITTEN: usize = 100;
 
-/// What is wrong.
+/// The problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum QualityIssueKind {
     /// Values that are missing or not finite.
     Missing,
-    /// Time that stands still or runs back.
+    /// Time that stays constant or runs back.
     Unordered,
-    /// Rows that are there twice, time included.
+    /// Rows that are duplicated, time included.
     Repeated,
-    /// Rows that are not there.
+    /// Rows that do not exist.
     Gap,
     /// Times off an even grid.
     Jitter,
-    /// A clock that is off another, or off a usual rate.
+    /// A clock that is off another, or off a typical rate.
     Clock,
     /// A clock whose rate changes.
     Drift,
-    /// All channels hold their values while the time goes on.
+    /// All channels hold their values while the time continues.
     Stalled,
     /// A channel that stays at its end.
     Saturated,
@@ -42,7 +42,7 @@ impl QualityIssueKind {
     /// Kinds that are places in a record and can be left out of it; a clock or a constant is none.
     pub const MASKABLE: [Self; 4] = [Self::Missing, Self::Gap, Self::Stalled, Self::Saturated];
 
-    /// What can be done about it.
+    /// Remedy.
     pub fn remedy(self) -> &'static str {
         match self {
             Self::Missing => "bridge empty cells with --fill, or leave out with --from and --to or --mask missing",
@@ -76,27 +76,27 @@ hoid_model::named_choice!(QualityIssueKind, "kind of fault", 11, {
 
 /// Rows that follow each other.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Place {
+pub struct RowSpan {
     /// The first row, counted from 1 without header and comments; of a gap the row before it.
     pub row: usize,
     /// How many rows; of a gap those that are missing.
     pub rows: usize,
     /// Time of the first row, s; none without a time.
     pub from_s: Option<f64>,
-    /// Time of the row behind the last, s.
+    /// Time of the row after the last, s.
     pub to_s: Option<f64>,
 }
 
 /// One finding.
 #[derive(Debug, Clone, PartialEq)]
 pub struct QualityIssue {
-    /// What it is.
+    /// Its definition.
     pub kind: QualityIssueKind,
     /// The channel; empty for the time and for all channels.
     pub channel: String,
     /// Rows concerned.
     pub rows: usize,
-    /// Their share of the rows looked at.
+    /// Their share of the rows examined.
     pub share: f64,
     /// How much, in `unit`: jitter RMS in s; a gap, a stall or a saturation its longest time in s;
     /// a clock and a drift the relative deviation; the step of what is quantised; else the number
@@ -105,7 +105,7 @@ pub struct QualityIssue {
     /// Unit of the size.
     pub unit: String,
     /// Where.
-    pub places: Vec<Place>,
+    pub places: Vec<RowSpan>,
     /// A sentence without a full stop.
     pub text: String,
 }
@@ -129,7 +129,7 @@ impl Serialize for QualityIssue {
             text: &'a str,
             remedy: &'static str,
             place_count: usize,
-            places: &'a [Place],
+            places: &'a [RowSpan],
         }
         Written {
             kind: self.kind,
@@ -148,7 +148,7 @@ impl Serialize for QualityIssue {
 }
 
 /// "row 12 (0.11 s)".
-pub(super) fn at(place: &Place) -> String {
+pub(super) fn at(place: &RowSpan) -> String {
     match place.from_s {
         Some(s) => format!("row {} ({} s)", place.row, decimal(s)),
         None => format!("row {}", place.row),

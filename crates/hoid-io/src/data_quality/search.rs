@@ -28,8 +28,8 @@ pub(crate) fn issues_of(signals: &Signals<'_>) -> Vec<QualityIssue> {
     found
 }
 
-/// What is wrong with the values of e and u: saturation, quantisation, constants. Of its time nothing is known
-/// but that it is even.
+/// Problems with the values of e and u: saturation, quantisation, constants. Of its time nothing is known but that it
+/// is even.
 pub fn quality_of_record(record: &Record) -> Vec<QualityIssue> {
     let channels = record.input_channel().into_iter().chain([record.output_channel()]);
     let columns = channels
@@ -45,7 +45,7 @@ pub fn quality_of_record(record: &Record) -> Vec<QualityIssue> {
     })
 }
 
-/// Whether a name says that a column counts time.
+/// Whether a name states that a column counts time.
 pub(crate) fn names_a_clock(name: &str) -> bool {
     let name = name.to_ascii_lowercase();
     ["time", "clock", "stamp"].iter().any(|word| name.contains(word))

@@ -1,18 +1,18 @@
-//! Columns as they are looked at, and what is known of their time.
+//! Columns as they are examined, and the prior knowledge of their time.
 
 use std::ops::Range;
 
-use super::issue::Place;
+use super::issue::RowSpan;
 use crate::table::Precision;
 
-/// A column as it is looked at.
+/// A column as it is examined.
 #[derive(Clone, Copy)]
 pub(crate) struct Signal<'a> {
     pub(crate) name: &'a str,
     pub(crate) values: &'a [f64],
 }
 
-/// Columns of one length, and what is known of their time.
+/// Columns of one length, and the prior knowledge of their time.
 #[derive(Default)]
 pub(crate) struct Signals<'a> {
     pub(crate) columns: Vec<Signal<'a>>,
@@ -23,7 +23,7 @@ pub(crate) struct Signals<'a> {
     pub(crate) nominal_hz: Option<f64>,
     /// Other columns that count time.
     pub(crate) clocks: Vec<Signal<'a>>,
-    /// Rows before the first one looked at.
+    /// Rows before the first one examined.
     pub(crate) before: usize,
 }
 
@@ -43,8 +43,8 @@ impl Signals<'_> {
         }
     }
 
-    pub(super) fn place(&self, rows: &Range<usize>) -> Place {
-        Place {
+    pub(super) fn place(&self, rows: &Range<usize>) -> RowSpan {
+        RowSpan {
             row: self.before + rows.start + 1,
             rows: rows.len(),
             from_s: self.at_s(rows.start),

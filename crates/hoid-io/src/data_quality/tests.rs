@@ -155,7 +155,7 @@ fn rails_and_steps() {
     for (one, value) in found.iter().zip([-0.9, 1.0]) {
         assert_eq!(one.rows, clipped.iter().filter(|v| **v == value).count());
     }
-    // Steps alone are no rail, at any coarseness and with any phase of the steps.
+    // Steps alone are not a rail, at any coarseness and with any phase of the steps.
     for levels in [8.0, 16.0, 31.0, 64.0, 256.0] {
         for phase in [0.0, 0.2, 0.5, 0.77] {
             let steps: Vec<f64> = u

@@ -1,19 +1,19 @@
-//! The time against the even grid behind it: jitter, missing rows, a clock that is off or drifts.
+//! The time against the even grid after it: jitter, missing rows, a clock that is off or drifts.
 
 use super::grid::{Grid, slope};
-use super::issue::{Place, QualityIssue, QualityIssueKind, at};
+use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
 use super::signals::Signals;
 use crate::table::Precision;
 use crate::wording::{counted, decimal, short};
 
-/// Deviation from the grid that is no jitter, sample times; that of `sampling`.
+/// Deviation from the grid that is not jitter, sample times; that of `sampling`.
 const JITTER: f64 = 1e-3;
-/// Relative deviation of a clock from a given rate that is told; crystals are within 1e-4.
+/// Relative deviation of a clock from a given rate that is reported; crystals are within 1e-4.
 const OFF: f64 = 2e-4;
-/// The same from a usual rate that nobody gave, and the farthest that still looks like it.
-const OFF_USUAL: (f64, f64) = (5e-4, 1e-2);
-/// Usual rates of recorders, Hz.
-const USUAL_HZ: [f64; 42] = [
+/// The same from a typical rate that no one gave, and the farthest that still looks like it.
+const OFF_COMMON: (f64, f64) = (5e-4, 1e-2);
+/// Common rates of recorders, Hz.
+const COMMON_HZ: [f64; 42] = [
     1.0, 2.0, 4.0, 5.0, 8.0, 10.0, 12.5, 15.0, 16.0, 20.0, 24.0, 25.0, 29.97, 30.0, 32.0, 40.0, 50.0, 59.94, 60.0,
     64.0, 75.0, 80.0, 90.0, 100.0, 119.88, 120.0, 125.0, 128.0, 144.0, 150.0, 200.0, 240.0, 250.0, 256.0, 300.0, 400.0,
     500.0, 512.0, 600.0, 1000.0, 1024.0, 2000.0,
@@ -68,9 +68,9 @@ pub(super) fn find(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIs
 }
 
 fn gaps(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
-    let places: Vec<Place> = grid
+    let places: Vec<RowSpan> = grid
         .gaps()
-        .map(|(i, missing)| Place {
+        .map(|(i, missing)| RowSpan {
             row: signals.before + grid.rows[i] + 1,
             rows: missing as usize,
             from_s: signals.at_s(grid.rows[i]),
@@ -91,7 +91,7 @@ fn gaps(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
         size: longest,
         unit: "s".to_owned(),
         text: format!(
-            "{} missing in {}, the first behind {}; the longest step is {} s",
+            "{} missing in {}, the first after {}; the longest step is {} s",
             counted(missing, "row"),
             counted(places.len(), "place"),
             at(first),
@@ -101,25 +101,25 @@ fn gaps(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
     });
 }
 
-/// The rate against the one that was given, or the usual one that it nearly is.
+/// The rate against the one that was given, or the default one that it nearly is.
 fn rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec<QualityIssue>) {
     let (ts, n) = (grid.sample_time_s, grid.rows.len() as f64);
     // Standard error of a slope, and what rounding of the ends can do.
     let uncertain = 5.0 * (rms * 12_f64.sqrt() / n.powf(1.5)).max(unit / n / 5.0) / ts;
     let hz = 1.0 / ts;
-    let usual = || {
-        USUAL_HZ
+    let typical = || {
+        COMMON_HZ
             .into_iter()
             .min_by(|a, b| (a / hz).ln().abs().total_cmp(&(b / hz).ln().abs()))
-            .filter(|usual| {
-                let off = (hz / usual - 1.0).abs();
-                off > OFF_USUAL.0 && off < OFF_USUAL.1
+            .filter(|typical| {
+                let off = (hz / typical - 1.0).abs();
+                off > OFF_COMMON.0 && off < OFF_COMMON.1
             })
     };
     let (expected, given) = match signals.nominal_hz {
         Some(given) => (given, true),
-        None => match usual() {
-            Some(usual) => (usual, false),
+        None => match typical() {
+            Some(typical) => (typical, false),
             None => return,
         },
     };
@@ -139,7 +139,7 @@ fn rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec
         text: format!(
             "t gives {hz:.4} Hz {what} {} Hz {}: the clock of t runs {way} by {} %{}",
             short(expected),
-            if given { "were expected" } else { "is usual" },
+            if given { "were expected" } else { "is common" },
             short(100.0 * off.abs()),
             if given {
                 ""
@@ -210,7 +210,7 @@ fn second_clocks(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssu
         else {
             continue;
         };
-        // The ends stand for the rate as far as a row of jitter allows.
+        // The ends represent the rate as far as a row of jitter allows.
         let uncertain = 2.0 / pairs.len() as f64;
         if off.abs() <= OFF.max(uncertain) {
             continue;

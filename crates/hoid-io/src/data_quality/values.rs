@@ -7,25 +7,25 @@
 //! It is saturated at an end where it stays there as no peak does. In full precision no two values
 //! in a row are equal by chance: three rows at the extreme value are a rail. In steps a peak stays
 //! longest at its top: of a parabola with its top at the far edge of the last step, 3 times as long
-//! there as on average at the next three steps. A rail is told where the rows at the extreme are at
-//! least 6 times as many as that average, with a stay of 5 rows at least, and where the channel
-//! came there and stayed more than once.
+//! there as on average at the next three steps. A rail is reported where the rows at the extreme
+//! are at least 6 times as many as that average, with a stay of 5 rows at least, and where the
+//! channel came there and stayed more than once.
 
 use std::ops::Range;
 
-use super::issue::{Place, QualityIssue, QualityIssueKind, at};
+use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
 use super::signals::{Signal, Signals};
 use crate::wording::{counted, short};
 
-/// A quantised channel is told from this step on, as a share of its deviation: its noise has 1e-5
-/// of its power there.
+/// A quantised channel is distinguished from this step on, as a share of its deviation: its noise
+/// has 1e-5 of its power there.
 const COARSE: f64 = 1e-2;
 /// Rows in a row at the extreme that are a rail, for values in full precision and in steps.
 const STAY: (usize, usize) = (3, 5);
 /// Rows at a rail against the average of the next steps.
 const PEAK: usize = 6;
 
-/// What a rail of a channel is.
+/// Definition of a rail of a channel.
 pub(crate) struct Rail {
     /// The value at which it stays.
     pub(crate) value: f64,
@@ -134,7 +134,7 @@ pub(crate) fn rails(values: &[f64], levels: &Levels) -> Vec<Rail> {
         }
         let rows: usize = stays.iter().map(Range::len).sum();
         let beside: usize = next.iter().map(|level| count(*level)).sum();
-        // What begins or ends the record may be a value that settles.
+        // What starts or ends the record may be a value that settles.
         let inner = || {
             stays
                 .iter()
@@ -191,8 +191,8 @@ pub(super) fn find(signals: &Signals<'_>, signal: Signal<'_>, levels: &Levels, f
         return;
     }
     for rail in rails(values, levels) {
-        let places: Vec<Place> = rail.stays.iter().map(|stay| signals.place(stay)).collect();
-        let seconds = |place: &Place| place.to_s.zip(place.from_s).map_or(0.0, |(to, from)| to - from);
+        let places: Vec<RowSpan> = rail.stays.iter().map(|stay| signals.place(stay)).collect();
+        let seconds = |place: &RowSpan| place.to_s.zip(place.from_s).map_or(0.0, |(to, from)| to - from);
         let longest = places.iter().map(seconds).fold(0.0, f64::max);
         let text = format!(
             "{name} stays at its {} value, {}, in {} ({} %), in {}; the first is {}",
@@ -221,7 +221,7 @@ pub(super) fn find(signals: &Signals<'_>, signal: Signal<'_>, levels: &Levels, f
 fn missing(
     signals: &Signals<'_>,
     signal: Signal<'_>,
-    tell: &mut impl FnMut(QualityIssueKind, usize, f64, &str, Vec<Place>, String),
+    tell: &mut impl FnMut(QualityIssueKind, usize, f64, &str, Vec<RowSpan>, String),
 ) {
     let mut gone: Vec<Range<usize>> = Vec::new();
     for (row, _) in signal.values.iter().enumerate().filter(|(_, v)| !v.is_finite()) {
@@ -230,7 +230,7 @@ fn missing(
             _ => gone.push(row..row + 1),
         }
     }
-    let places: Vec<Place> = gone.iter().map(|run| signals.place(run)).collect();
+    let places: Vec<RowSpan> = gone.iter().map(|run| signals.place(run)).collect();
     let Some(first) = places.first() else { return };
     let rows: usize = gone.iter().map(Range::len).sum();
     let text = format!(

@@ -19,7 +19,7 @@ pub struct Library {
     platform: Platform,
 }
 
-/// What a shared library runs on: names of the folders, ending.
+/// Platform of a shared library: names of the folders, ending.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Platform {
     in_two: &'static str,
@@ -74,8 +74,8 @@ const MAC: [(u32, Platform); 2] = [
     ),
 ];
 
-/// Functions that the library of a unit hands out: that of hoid, of FMI 2 and of FMI 3. Their names stand in
-/// its table of symbols, each ended by a 0, whatever the system.
+/// Functions that the library of a unit hands out: that of hoid, of FMI 2 and of FMI 3. Their names are in its table of
+/// symbols, each ended by a 0, whatever the system.
 const FUNCTIONS: [&str; 3] = ["hoid_abi_version", "fmi2Instantiate", "fmi3InstantiateCoSimulation"];
 
 fn hands_out(bytes: &[u8], function: &str) -> bool {
@@ -116,7 +116,7 @@ impl Library {
     /// Reads a library; its platform is that of its head.
     ///
     /// # Errors
-    /// [`IoError::Unreadable`]; [`IoError::NoLibrary`] for what is no shared library of a known platform;
+    /// [`IoError::Unreadable`]; [`IoError::NoLibrary`] for what is not a shared library of a known platform;
     /// [`IoError::OtherLibrary`] for one of something else.
     pub fn read(path: &Path) -> Result<Self, IoError> {
         let bytes = read_bytes(path)?;
@@ -136,7 +136,7 @@ impl Library {
 /// Writes a unit whose sample time is `step_s`. The same parts give the same bytes.
 ///
 /// # Errors
-/// Those of files; [`IoError::NoLibrary`] for settings that contradict themselves, or two libraries of one
+/// The errors of files; [`IoError::NoLibrary`] for settings that contradict themselves, or two libraries of one
 /// platform.
 pub fn write_fmu(
     path: &Path,
@@ -287,7 +287,7 @@ mod tests {
             assert!(refused.contains("cargo xtask ffi"), "{refused}");
         }
         assert!(Library::read(&folder.path().join("nowhere")).is_err());
-        // Of one name a part is not the name.
+        // For one name a part is not the name.
         for (bytes, ..) in heads() {
             let text = String::from_utf8_lossy(FUNCTIONS[1].as_bytes()).into_owned();
             let place = bytes.windows(text.len()).position(|w| w == text.as_bytes()).unwrap();

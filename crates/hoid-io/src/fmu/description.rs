@@ -28,7 +28,7 @@ const UNITS: [(&str, &str); 3] = [
 ];
 
 impl FmuKind {
-    /// What description and library have to agree on: version and kind.
+    /// Token that description and library share: version and kind.
     pub fn token(self) -> String {
         format!("hoid-{}-{}", env!("CARGO_PKG_VERSION"), self.name())
     }

@@ -3,10 +3,10 @@
 //!
 //! *Functional Mock-up Interface for Model Exchange and Co-Simulation*, version 2.0.4 (Modelica
 //! Association, 2022), and *Functional Mock-up Interface Specification*, version 3.0.1 (2023). The
-//! library is that of `hoid-ffi`; what it and the description have to agree on stands here, the
+//! library is that of `hoid-ffi`; what it and the description have to agree on is here, the
 //! variables ([`FmuKind::variables`]), whose value references are their places, and the token.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `variables` | the variables of a unit |
 //! | `settings` | what the library reads when it starts |

@@ -1,4 +1,4 @@
-//! What the library of a unit reads when it starts, from the resources of the unit.
+//! Settings in the resources of a unit, which its library reads at start.
 
 use std::collections::BTreeMap;
 
@@ -10,24 +10,24 @@ use super::variables::{FmuKind, FmuStart, FmuVariable, Role};
 /// Name of the file among the resources.
 pub const FMU_SETTINGS: &str = "hoid.json";
 
-/// What a unit is.
+/// Definition of a unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FmuSettings {
     kind: String,
-    /// Parameters that start with other values than usual.
+    /// Parameters that start with other values than typical.
     #[serde(default)]
-    parameters: BTreeMap<String, Given>,
+    parameters: BTreeMap<String, SettingValue>,
     /// Text of the scenario file of an operator.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scenario: Option<String>,
-    /// A fit as `hoid identify --json` prints it, which a tracker begins with.
+    /// A fit as `hoid identify --json` prints it, which a tracker starts with.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fit: Option<String>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-enum Given {
+enum SettingValue {
     Boolean(bool),
     Integer(i32),
     Real(f64),
@@ -35,7 +35,7 @@ enum Given {
 }
 
 impl FmuSettings {
-    /// A unit with its usual parameters.
+    /// A unit with its default parameters.
     pub fn new(kind: FmuKind) -> Self {
         Self {
             kind: kind.name().to_owned(),
@@ -53,7 +53,7 @@ impl FmuSettings {
         }
     }
 
-    /// With the text of a fit, which a tracker begins with.
+    /// With the text of a fit, which a tracker starts with.
     pub fn with_fit(self, text: String) -> Self {
         Self {
             fit: Some(text),
@@ -64,10 +64,10 @@ impl FmuSettings {
     /// With another start of a parameter.
     pub fn with(mut self, parameter: &str, start: FmuStart) -> Self {
         let given = match start {
-            FmuStart::Real(value) => Given::Real(value),
-            FmuStart::Integer(value) => Given::Integer(value),
-            FmuStart::Boolean(value) => Given::Boolean(value),
-            FmuStart::Text(text) => Given::Text(text),
+            FmuStart::Real(value) => SettingValue::Real(value),
+            FmuStart::Integer(value) => SettingValue::Integer(value),
+            FmuStart::Boolean(value) => SettingValue::Boolean(value),
+            FmuStart::Text(text) => SettingValue::Text(text),
         };
         self.parameters.insert(parameter.to_owned(), given);
         self
@@ -76,7 +76,7 @@ impl FmuSettings {
     /// From the text of the file.
     ///
     /// # Errors
-    /// What is wrong with it, in words.
+    /// Problems with it, as text.
     pub fn parse(text: &str) -> Result<Self, String> {
         let settings: Self = serde_json::from_str(text).map_err(|error| format!("{FMU_SETTINGS}: {error}"))?;
         settings.kind()?;
@@ -90,10 +90,10 @@ impl FmuSettings {
         text
     }
 
-    /// What the unit does.
+    /// Behaviour of the unit.
     ///
     /// # Errors
-    /// For a kind that is none.
+    /// For a kind that is invalid.
     pub fn kind(&self) -> Result<FmuKind, String> {
         FmuKind::of_name(&self.kind).map_err(|error| format!("{FMU_SETTINGS}: {error}"))
     }
@@ -109,11 +109,11 @@ impl FmuSettings {
                 .find(|variable| variable.role == Role::Parameter && variable.name == name)
                 .ok_or_else(|| format!("{FMU_SETTINGS}: the unit has no parameter {name}"))?;
             parameter.start = match (&parameter.start, given) {
-                (FmuStart::Real(_), Given::Real(value)) => FmuStart::Real(*value),
-                (FmuStart::Real(_), Given::Integer(value)) => FmuStart::Real(f64::from(*value)),
-                (FmuStart::Integer(_), Given::Integer(value)) => FmuStart::Integer(*value),
-                (FmuStart::Boolean(_), Given::Boolean(value)) => FmuStart::Boolean(*value),
-                (FmuStart::Text(_), Given::Text(text)) => FmuStart::Text(text.clone()),
+                (FmuStart::Real(_), SettingValue::Real(value)) => FmuStart::Real(*value),
+                (FmuStart::Real(_), SettingValue::Integer(value)) => FmuStart::Real(f64::from(*value)),
+                (FmuStart::Integer(_), SettingValue::Integer(value)) => FmuStart::Integer(*value),
+                (FmuStart::Boolean(_), SettingValue::Boolean(value)) => FmuStart::Boolean(*value),
+                (FmuStart::Text(_), SettingValue::Text(text)) => FmuStart::Text(text.clone()),
                 _ => return Err(format!("{FMU_SETTINGS}: the parameter {name} is of another type")),
             };
         }

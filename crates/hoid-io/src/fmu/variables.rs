@@ -10,7 +10,7 @@ pub const DETERMINED: [&str; 6] = [
     "tau_e_determined",
 ];
 
-/// What a unit does.
+/// Behaviour of a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FmuKind {
     /// Estimates a person from e and u.
@@ -24,14 +24,14 @@ hoid_model::named_choice!(FmuKind, "kind of unit", 2, {
     Operator => "operator",
 });
 
-/// What a variable is for.
+/// Purpose of a variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// Set before the start.
     Parameter,
     /// Set at every sample.
     Input,
-    /// Told at every sample.
+    /// Reported at every sample.
     Output,
 }
 
@@ -56,7 +56,7 @@ pub struct FmuVariable {
     pub name: &'static str,
     /// Its unit, empty for none.
     pub unit: &'static str,
-    /// What it is for.
+    /// Its purpose.
     pub role: Role,
     /// Type and start.
     pub start: FmuStart,
@@ -108,7 +108,7 @@ fn tracker() -> Vec<FmuVariable> {
             "controlled_element",
             "",
             text(""),
-            "what the person controls, as 90/(s(s+6)); empty for none",
+            "the controlled element, as 90/(s(s+6)); empty for none",
         ),
         parameter(
             "options",
@@ -116,7 +116,7 @@ fn tracker() -> Vec<FmuVariable> {
             text(""),
             "further options in JSON, by the keywords of pyhoid.Tracker",
         ),
-        parameter("with_excitation", "", Boolean(false), "true where f_t is connected"),
+        parameter("with_excitation", "", Boolean(false), "true if f_t is connected"),
         input("e", "tracking error"),
         input("u", "control output of the person"),
         input("f_t", "excitation: target or disturbance"),
@@ -151,7 +151,7 @@ fn tracker() -> Vec<FmuVariable> {
         all.push(output(error, unit, Real(f64::NAN), error_help));
     }
     for name in DETERMINED {
-        all.push(output(name, "", Boolean(false), "true where the data determine it"));
+        all.push(output(name, "", Boolean(false), "true if the data determine it"));
     }
     all.extend([
         output("innovation", "", Real(f64::NAN), "a-priori innovation"),
@@ -177,7 +177,7 @@ fn tracker() -> Vec<FmuVariable> {
             "restarts",
             "",
             Integer(0),
-            "how often the guard began the estimate again",
+            "how often the guard started the estimate again",
         ),
     ]);
     all

@@ -6,8 +6,8 @@
 
 use crate::IoError;
 
-/// What every file may unpack to, bytes. Readers hold values up to four times on their way (as they
-/// stand in the file, as numbers, as columns, in a survey): a file of a few bytes stays below 300 MB.
+/// Limit of what each file may unpack to, bytes. Readers hold values up to four times on their way (as they are in the
+/// file, as numbers, as columns, in a survey): a file of a few bytes stays below 300 MB.
 const AT_LEAST: u64 = 48 << 20;
 /// And so many times its own length.
 const FACTOR: u64 = 64;
@@ -15,12 +15,12 @@ const FACTOR: u64 = 64;
 const CEILING: u64 = 16 << 30;
 /// The variable of the environment that raises what a file may unpack to, MB.
 const UNPACKED: &str = "HOID_MAX_UNPACKED_MB";
-/// What a text takes beside its characters, as it is held and copied.
+/// Overhead of a text in addition to its characters, bytes.
 const TEXT: u64 = 64;
 /// Structures inside of structures, at most.
 pub(super) const MOST_NESTED: usize = 32;
 
-/// What is left of the memory that a file may take.
+/// The remainder of the memory that a file may take.
 #[derive(Debug)]
 pub(super) struct Budget {
     left: u64,
@@ -28,7 +28,7 @@ pub(super) struct Budget {
 }
 
 impl Budget {
-    /// That of a file of so many bytes.
+    /// The value for a file of a given number of bytes.
     pub(super) fn of(file_bytes: usize) -> Self {
         let by_size = AT_LEAST.saturating_add(FACTOR.saturating_mul(file_bytes as u64));
         Self::up_to(by_size.min(CEILING).max(raised().unwrap_or(0)))
@@ -54,19 +54,19 @@ impl Budget {
         }
     }
 
-    /// Takes what so many numbers take as [`f64`] beside the bytes each that they stand in.
+    /// Takes what so many numbers take as [`f64`] next to the bytes each that they are in.
     pub(super) fn take_numbers(&mut self, count: usize, bytes_each: usize, file: &str) -> Result<(), IoError> {
         let more = (size_of::<f64>() as u64).saturating_sub(bytes_each as u64);
         self.take(more.saturating_mul(count as u64), file)
     }
 
-    /// Takes what so many texts of so many bytes in all are held in, before they are.
+    /// Takes what so many texts of a given number of bytes in all are held in, before they are.
     pub(super) fn take_texts(&mut self, count: usize, bytes: usize, file: &str) -> Result<(), IoError> {
         self.take(TEXT.saturating_mul(count as u64).saturating_add(bytes as u64), file)
     }
 }
 
-/// What the environment allows, bytes.
+/// Limit from the environment, bytes.
 fn raised() -> Option<u64> {
     let megabytes: u64 = std::env::var(UNPACKED).ok()?.trim().parse().ok()?;
     megabytes.checked_mul(1 << 20)
@@ -90,11 +90,11 @@ impl Settings {
 
     /// Its greatest length, bytes.
     pub(crate) fn longest(self) -> u64 {
-        let usual = match self {
+        let typical = match self {
             Self::Json => 10 << 20,
             Self::Toml => 2 << 20,
         };
-        raised().map_or(usual, |raised| usual.max(raised / self.share()))
+        raised().map_or(typical, |raised| typical.max(raised / self.share()))
     }
 }
 

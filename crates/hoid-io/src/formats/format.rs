@@ -1,7 +1,6 @@
-//! What the rest of the crate knows of a file format: its name, its endings, how it is read and how
-//! it is written.
+//! Interface of a file format: its name, its endings, how it is read and how it is written.
 //!
-//! A format says all of this in one [`Format`], in its own module of `formats`; reading, writing,
+//! A format states all of this in one [`Format`], in its own module of `formats`; reading, writing,
 //! the survey of a file and all messages go through it.
 
 use std::io::{self, Write};
@@ -19,7 +18,7 @@ use crate::time::with_time;
 pub(crate) struct Format {
     /// Its name for a person.
     pub(crate) name: &'static str,
-    /// The extensions in lower case that stand for it, the usual one first.
+    /// The extensions in lower case that represent it, the default one first.
     pub(super) endings: &'static [&'static str],
     /// How its bytes are read.
     pub(crate) reading: Reading,
@@ -35,13 +34,13 @@ type TableReader = for<'a> fn(&'a mut Vec<u8>, &'a str) -> Result<Table<'a>, IoE
 type ResultsReader = fn(Vec<u8>, &str) -> Result<OutputTable, IoError>;
 /// All arrays with their paths.
 type ArraysReader = fn(Vec<u8>, &str) -> Result<Contents, IoError>;
-/// Begins a file of rows.
+/// Starts a file of rows.
 type RowsStart = fn(&mut dyn Write, &TableSchema) -> io::Result<Box<dyn RowWriter>>;
 /// Writes columns of one length.
 pub(crate) type ColumnsWriter = fn(&mut dyn Write, &TableSchema, &[Values<'_>]) -> io::Result<()>;
 type RecordWriter = fn(&mut dyn Write, &Record) -> io::Result<()>;
 
-/// What a file of the format is.
+/// Definition of a file of the format.
 pub(crate) enum Reading {
     /// One flat table.
     Table {
@@ -58,9 +57,9 @@ pub(crate) enum Reading {
 pub(crate) enum Writing {
     /// Row by row, in bounded memory.
     Rows(RowsStart),
-    /// Each column as one array, which says its length first: all rows have to be there.
+    /// Each column as one array, which reports its length first: all rows have to be there.
     Columns(ColumnsWriter),
-    /// Not at all; what the extension stands for, as in "the format of a recorder".
+    /// Not at all; what the extension represents, as in "the format of a recorder".
     ReadOnly(&'static str),
 }
 

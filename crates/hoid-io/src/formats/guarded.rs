@@ -16,7 +16,7 @@ thread_local! {
     static READING: Cell<bool> = const { Cell::new(false) };
 }
 
-/// What a foreign reader gives, its panic as [`IoError::Damaged`].
+/// Result of a foreign reader, its panic as [`IoError::Damaged`].
 pub(super) fn guarded<T>(file: &str, read: impl FnOnce() -> Result<T, IoError>) -> Result<T, IoError> {
     without_panic(read).unwrap_or_else(|what| {
         Err(IoError::Damaged {

@@ -21,7 +21,7 @@ pub fn writable_endings() -> String {
     endings(&written)
 }
 
-/// The endings of some formats in words.
+/// The endings of some formats as text.
 fn endings(formats: &[&Format]) -> String {
     let of_one = |format: &&Format| {
         let dotted: Vec<String> = format.endings.iter().map(|ending| format!(".{ending}")).collect();
@@ -37,7 +37,7 @@ fn endings(formats: &[&Format]) -> String {
     }
 }
 
-/// What to do about files that others read, by their ending. pyhoid reads those of `PYTHON` itself.
+/// How to handle files that others read, by their ending. pyhoid reads those of `PYTHON` itself.
 const ELSEWHERE: [(&[&str], &str); 12] = [
     (&["gz", "zip", "bz2", "xz", "zst"], "unpack it first"),
     (&["arrow", "feather", "ipc", "xlsx", "xls", "ods"], PYTHON),
@@ -84,7 +84,7 @@ fn ending_of(path: &Path) -> Option<String> {
     path.extension().map(|ending| ending.to_string_lossy().to_lowercase())
 }
 
-/// The format that the ending of a file stands for.
+/// The format that the ending of a file represents.
 fn format_of(path: &Path) -> Option<&'static Format> {
     let ending = ending_of(path)?;
     ALL.iter()
@@ -92,7 +92,8 @@ fn format_of(path: &Path) -> Option<&'static Format> {
         .find(|format| format.endings.contains(&ending.as_str()))
 }
 
-/// That an ending stands for no format, with what is `expected` and the remedy, if there is one.
+/// That an ending does not correspond to any format, with what is `expected` and the remedy, if
+/// there is one.
 fn unknown(path: &Path, expected: String, remedy: Option<&str>) -> IoError {
     IoError::UnknownFormat {
         file: path.display().to_string(),
@@ -113,7 +114,7 @@ fn format_to_read(path: &Path) -> Result<&'static Format, IoError> {
     })
 }
 
-/// The format of a file to write, which is no directory. A pipe or a device takes CSV under any
+/// The format of a file to write, which is not a directory. A pipe or a device takes CSV under any
 /// other name.
 pub(crate) fn format_to_write(path: &Path) -> Result<&'static Format, IoError> {
     let known = fs::metadata(path).ok();
@@ -193,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn endings_in_words() {
+    fn endings_as_text() {
         assert_eq!(endings(&[&csv::CSV]), ".csv (also as .txt)");
         assert_eq!(
             endings(&[&csv::CSV, &csv::TSV, &csv::TSV]),

@@ -2,9 +2,9 @@
 //!
 //! To add one: a module with a [`Format`], here its `mod` line and its line in [`ALL`].
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
-//! | `format` | [`Format`]: what a format says of itself, and all that the rest of the crate knows of it |
+//! | `format` | [`Format`]: the self-description of a format, and all that the rest of the crate knows of it |
 //! | `lookup` | the format of a file by its extension; what to do about the formats of others |
 //! | `csv` | text with commas, semicolons or tabs |
 //! | `parquet` | Apache Parquet |

@@ -1,5 +1,5 @@
 //! Text packed by gzip, and recordings of the Brain Imaging Data Structure: a table without a header
-//! whose columns and rate stand in a file of JSON beside it (BIDS specification, *Physiological
+//! whose columns and rate are in a file of JSON next to it (BIDS specification, *Physiological
 //! recordings*).
 
 use std::fmt::Write as _;
@@ -17,7 +17,7 @@ use crate::table::Cell;
 /// Bytes that are unpacked together.
 const PART: usize = 1 << 16;
 
-/// The name without `.gz`; `None` where it has no such end.
+/// The name without `.gz`; `None` if it has no such end.
 pub(super) fn inner(path: &Path) -> Option<PathBuf> {
     let packed = path.extension()?.eq_ignore_ascii_case("gz");
     packed.then(|| path.with_extension(""))
@@ -32,7 +32,7 @@ pub(super) fn unpacked(bytes: &[u8], file: &str) -> Result<Vec<u8>, IoError> {
     loop {
         let read = reader.read(&mut part).map_err(|error| IoError::Damaged {
             file: file.to_owned(),
-            found: format!("it is no whole gzip file: {error}"),
+            found: format!("it is not a whole gzip file: {error}"),
         })?;
         if read == 0 {
             return Ok(text);
@@ -42,7 +42,7 @@ pub(super) fn unpacked(bytes: &[u8], file: &str) -> Result<Vec<u8>, IoError> {
     }
 }
 
-/// What the file beside a table without a header says of it.
+/// Statement of the file next to a table without a header about it.
 #[derive(Deserialize)]
 struct Sidecar {
     #[serde(rename = "SamplingFrequency")]
@@ -53,7 +53,7 @@ struct Sidecar {
     columns: Vec<String>,
 }
 
-/// The table with a header and a column t, where a file of JSON beside it says both.
+/// The table with a header and a column t, where a file of JSON next to it reports both.
 pub(super) fn with_sidecar(bytes: Vec<u8>, path: &Path) -> Vec<u8> {
     let said = fs::read(path.with_extension("json")).ok();
     let Some(sidecar) = said.and_then(|json| serde_json::from_slice::<Sidecar>(&json).ok()) else {

@@ -1,4 +1,4 @@
-//! Files that are whole or not there: written beside their place, then renamed into it.
+//! Files that are whole or not there: written next to their place, then renamed into it.
 
 use std::fs;
 use std::io::{self, BufWriter, Write};
@@ -12,7 +12,7 @@ use crate::IoError;
 /// device is written into directly.
 ///
 /// # Errors
-/// [`IoError::Directory`], [`IoError::Unwritable`] for what the system or `write` says.
+/// [`IoError::Directory`], [`IoError::Unwritable`] for what the system or `write` states.
 ///
 /// ```
 /// let path = std::env::temp_dir().join("hoid-example.txt");
@@ -27,10 +27,10 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::R
     file.finish()
 }
 
-/// Makes a directory for results, and those above it, where they are not there yet.
+/// Makes a directory for results, and those above it, where they are not available yet.
 ///
 /// # Errors
-/// [`IoError::Unwritable`] for what the system says.
+/// [`IoError::Unwritable`] for errors that the operating system reports.
 pub fn make_directory(path: &Path) -> Result<(), IoError> {
     fs::create_dir_all(path).map_err(|source| IoError::Unwritable {
         file: path.display().to_string(),
@@ -44,10 +44,10 @@ pub(crate) struct WholeFile {
     /// As the user named it.
     name: String,
     /// Where the file is to be, and what it is until then; none for a pipe or a device.
-    beside: Option<Beside>,
+    part_file: Option<PartFile>,
 }
 
-struct Beside {
+struct PartFile {
     part: Part,
     place: PathBuf,
     permissions: Option<fs::Permissions>,
@@ -65,19 +65,19 @@ impl WholeFile {
                 let direct = fs::OpenOptions::new().write(true).open(&place);
                 direct.map(|file| (file, None))
             }
-            known => part(place, known.map(|k| k.permissions())).map(|(file, beside)| (file, Some(beside))),
+            known => part(place, known.map(|k| k.permissions())).map(|(file, part_file)| (file, Some(part_file))),
         };
         match opened {
-            Ok((file, beside)) => Ok(Self {
+            Ok((file, part_file)) => Ok(Self {
                 buffer: BufWriter::with_capacity(1 << 16, file),
                 name,
-                beside,
+                part_file,
             }),
             Err(source) => Err(IoError::Unwritable { file: name, source }),
         }
     }
 
-    /// Writes through `write`, behind what is there.
+    /// Writes through `write`, after the existing data.
     pub(crate) fn write<T>(&mut self, write: impl FnOnce(&mut dyn Write) -> io::Result<T>) -> Result<T, IoError> {
         write(&mut self.buffer).map_err(|source| IoError::Unwritable {
             file: self.name.clone(),
@@ -87,27 +87,31 @@ impl WholeFile {
 
     /// Puts the file in its place, when everything is on the disk.
     pub(crate) fn finish(self) -> Result<(), IoError> {
-        let Self { buffer, name, beside } = self;
+        let Self {
+            buffer,
+            name,
+            part_file,
+        } = self;
         let finished = buffer
             .into_inner()
             .map_err(io::IntoInnerError::into_error)
-            .and_then(|file| beside.map_or(Ok(()), |beside| beside.persist(file)));
+            .and_then(|file| part_file.map_or(Ok(()), |part_file| part_file.persist(file)));
         finished.map_err(|source| IoError::Unwritable { file: name, source })
     }
 }
 
-impl Beside {
+impl PartFile {
     fn persist(self, file: fs::File) -> io::Result<()> {
         file.sync_all()?;
         self.part.persist(file, &self.place, self.permissions)
     }
 }
 
-fn part(place: PathBuf, permissions: Option<fs::Permissions>) -> io::Result<(fs::File, Beside)> {
+fn part(place: PathBuf, permissions: Option<fs::Permissions>) -> io::Result<(fs::File, PartFile)> {
     let (file, part) = Part::create_in(&directory_of(&place)?)?;
     Ok((
         file,
-        Beside {
+        PartFile {
             part,
             place,
             permissions,

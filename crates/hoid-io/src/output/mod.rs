@@ -1,6 +1,6 @@
-//! What holds for each file and directory that is written, whatever is in it.
+//! Rules for each file and directory that is written.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `atomic` | [`write_atomically`]: files that are whole or not there |
 //! | `part_file` | files on their way, and what dead processes left of them |

@@ -1,10 +1,10 @@
-//! Files on their way: `.hoid-*.part` beside the place where they are to be.
+//! Files on their way: `.hoid-*.part` next to the place where they are to be.
 //!
-//! A part is locked for as long as its writer lives; the system drops the locks of a process that
-//! is gone, however it ended. A part that can be locked is therefore nobody's, and is removed by the
-//! next process that writes into its directory. A writer looks after locking whether its part is
-//! still there, so that a part is never swept between its making and its lock. Where a file system
-//! has no locks, parts are left alone.
+//! A part is locked for as long as its writer lives; the system drops the locks of a process that is
+//! gone, however it ended. A part that can be locked therefore belongs to no person, and is removed
+//! by the next process that writes into its directory. A writer looks after locking whether its part
+//! is still there, so that a part is never swept between its making and its lock. Where a file
+//! system has no locks, parts are left alone.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -20,26 +20,26 @@ const SUFFIX: &str = ".part";
 /// Attempts to make a part that another process sweeps before it is locked; one is the rule.
 const ATTEMPTS: usize = 16;
 
-/// What this process has on its way, and which directories it has swept.
-struct Known {
+/// Files in progress of this process, and the directories that it has cleaned.
+struct PartFiles {
     parts: BTreeSet<PathBuf>,
     swept: BTreeSet<PathBuf>,
 }
 
-static KNOWN: Mutex<Known> = Mutex::new(Known {
+static KNOWN: Mutex<PartFiles> = Mutex::new(PartFiles {
     parts: BTreeSet::new(),
     swept: BTreeSet::new(),
 });
 
-fn known() -> MutexGuard<'static, Known> {
+fn known() -> MutexGuard<'static, PartFiles> {
     KNOWN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes what this process has on its way, for the end at an interrupt: a process that exits drops
-/// nothing.
+/// Removes the partial output of this process, for the end at an interrupt: a process that exits
+/// drops nothing.
 pub fn remove_unfinished_files() {
     for part in std::mem::take(&mut known().parts) {
-        // What is in its place already, or cannot be removed, is swept later.
+        // Contents of its place already, or cannot be removed, is swept later.
         let _ = fs::remove_file(part);
     }
 }
@@ -88,8 +88,8 @@ impl Drop for Part {
     }
 }
 
-/// A file of the usual permissions (those of the umask), where temporary files are otherwise closed
-/// to all others.
+/// A file of the default permissions (those of the umask), where temporary files are otherwise
+/// closed to all others.
 fn make(directory: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(PREFIX).suffix(SUFFIX);
@@ -101,8 +101,8 @@ fn make(directory: &Path) -> io::Result<NamedTempFile> {
     builder.tempfile_in(directory).map_err(without_path)
 }
 
-/// The error of the system without the name of the part, which is nobody's business: the message
-/// names the place that was asked for.
+/// The error of the system without the name of the part, which belongs to no person business: the
+/// message names the place that was requested.
 fn without_path(error: io::Error) -> io::Error {
     let text = error.to_string();
     match text.split_once(" at path ") {
@@ -119,7 +119,7 @@ fn sweep_once(directory: &Path) {
     }
 }
 
-/// Removes the parts of processes that are gone. A part that cannot be looked at stays.
+/// Removes the parts of processes that are gone. A part that cannot be examined stays.
 fn sweep(directory: &Path) {
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();
     for entry in entries {
@@ -174,7 +174,7 @@ mod tests {
     fn an_interrupt_leaves_nothing_on_its_way() {
         let dir = tempfile::tempdir().unwrap();
         let (_file, part) = Part::create_in(dir.path()).unwrap();
-        // Of this directory alone: other tests have parts on their way.
+        // For this directory alone: other tests have parts on their way.
         let own = part.path.as_ref().unwrap().to_path_buf();
         assert!(known().parts.contains(&own) && own.exists());
         drop(part);

@@ -1,4 +1,4 @@
-//! Whether a result may be written to a place, asked before the work begins: a result never takes
+//! Whether a result may be written to a place, asked before the work starts: a result never takes
 //! the place of what it is made of, and a directory that takes nothing is known at once.
 //!
 //! Two paths name one file when the system gives them the same device and number (so that symbolic

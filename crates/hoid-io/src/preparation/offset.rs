@@ -1,7 +1,7 @@
-//! Channels that were recorded late are put beside the others.
+//! Channels that were recorded late are put next to the others.
 //!
 //! A channel with the offset d was recorded d samples later than it happened: its sample k + d goes
-//! beside sample k of the others, `x'(k) = x(k + d)`. An offset of whole samples moves rows and
+//! next to sample k of the others, `x'(k) = x(k + d)`. An offset of whole samples moves rows and
 //! changes no number. Between samples the band-limited signal is taken by the windowed sinc of
 //! [`Kernel`]: up to 0.8 of the Nyquist frequency its error is below 1e-4 of the amplitude (80 dB);
 //! above, the channel is not what it was. Rows for which a channel has no sample, or not all that
@@ -16,10 +16,10 @@ use super::step::Step;
 use crate::IoError;
 use crate::wording::decimal;
 
-/// Distance from a whole number of samples that is none.
+/// Distance from a whole number of samples that is invalid.
 const WHOLE: f64 = 1e-6;
 
-/// By how much a channel was recorded later than it happened; negative when earlier.
+/// Amount by which a channel was recorded later than it happened; negative when earlier.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Offset {
     /// In samples of the record as it was read.

@@ -3,13 +3,12 @@
 //! **Every M-th sample** is the decimation of [`hoid_model::resampling`]: no sample is lost, and the
 //! input is taken in the middle of its longer hold, so that the delay of a model stays.
 //!
-//! **A new sampling frequency** is taken from the record by the windowed sinc of [`Kernel`]. Its pass
-//! band ends at 0.8 of the lower one of the old and the new Nyquist frequency,
-//! where the ripple is below 1e-4 (0.001 dB). When the frequency falls, its stop band begins at the
-//! new Nyquist frequency: what would fold down is 80 dB below. The filter has linear phase, its
-//! delay is compensated, and it is the same for all channels, so that what is between e and u stays
-//! between them. New samples lie on the grid that begins with the first sample of the record; those
-//! whose filter would reach beyond the record are cut.
+//! **A new sampling frequency** is taken from the record by the windowed sinc of [`Kernel`]. Its pass band ends at 0.8
+//! of the lower one of the old and the new Nyquist frequency, where the ripple is below 1e-4 (0.001 dB). When the
+//! frequency falls, its stop band starts at the new Nyquist frequency: what would fold down is 80 dB below. The filter
+//! has linear phase, its delay is compensated, and it is the same for all channels, so that anything between e and u
+//! stays between them. New samples lie on the grid that starts with the first sample of the record; those whose filter
+//! would reach beyond the record are cut.
 //!
 //! A model with a hold (all of this project) sees an input that is held over the new sample time T,
 //! while the person saw one that was held over the old Ts, if any. A hold of T delays by T/2: to
@@ -26,13 +25,13 @@ use super::step::Step;
 use crate::IoError;
 use crate::wording::decimal;
 
-/// A new rate makes at most so many samples out of one.
+/// A new rate makes at most this many samples out of one.
 const LARGEST_FACTOR: f64 = 100.0;
 
 /// Another sampling rate.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum NewRate {
-    /// That of the record.
+    /// The value for the record.
     #[default]
     Kept,
     /// Every M-th sample.
@@ -101,7 +100,7 @@ impl RecordParts {
             Kernel::interpolating()
         };
         let half = kernel.half() as f64;
-        // On the grid that begins with the first sample of the record; a bound on a sample, up to
+        // On the grid that starts with the first sample of the record; a bound on a sample, up to
         // rounding, takes that sample.
         let first = ((half - 1e-10) / factor).ceil();
         let end = ((last - half + 1e-10) / factor).floor();

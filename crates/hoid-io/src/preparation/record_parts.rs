@@ -6,7 +6,7 @@ use super::step::Step;
 use crate::IoError;
 use crate::wording::list;
 
-/// A record taken apart, and what was done to it.
+/// A record taken apart, and the processing of it.
 pub(super) struct RecordParts {
     label: String,
     pub(super) start_s: f64,

@@ -6,7 +6,7 @@ use crate::IoError;
 use crate::wording::decimal;
 
 impl RecordParts {
-    /// Drops what lies before the end of the run-in.
+    /// Drops everything before the end of the run-in.
     pub(super) fn run_in(&mut self, begin_s: f64, run_in_s: f64) -> Result<(), IoError> {
         const STEP: &str = "run-in";
         if run_in_s == 0.0 {

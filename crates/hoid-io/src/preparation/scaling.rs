@@ -1,6 +1,6 @@
 //! Factors and units of channels: `u=12.5`, `u=12.5:deg`, `e=rad:deg`.
 //!
-//! A factor says by what the numbers of the file are multiplied; behind a colon stands the unit
+//! A factor reports by what the numbers of the file are multiplied; after a colon comes the unit
 //! that they then have. Two known units of one kind give the factor themselves, exactly: `rad:deg`
 //! is 180 / pi. Parameters of the operator are ratios of u and e: with e in deg and u in V the gain
 //! K_e is in V/deg.
@@ -48,23 +48,23 @@ const OTHER_NAMES: [(&[&str], &str); 9] = [
     (&["newton", "newtons"], "N"),
 ];
 
-/// A unit by its usual name; one that is not known as it is.
-fn usual(unit: &str) -> &str {
+/// A unit by its default name; one that is not known as it is.
+fn canonical(unit: &str) -> &str {
     let small = unit.to_lowercase();
     let other = OTHER_NAMES
         .into_iter()
         .find(|(names, _)| names.contains(&small.as_str()));
-    other.map_or(unit, |(_, usual)| usual)
+    other.map_or(unit, |(_, canonical)| canonical)
 }
 
-/// What a channel is multiplied by, and the unit that it has then.
+/// Factor of a channel, and the unit that it has then.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scaling {
     /// The factor, finite and not 0.
     factor: f64,
     /// The unit that the file must not contradict.
     from: Option<&'static str>,
-    /// The unit behind it; `None` keeps none, because the old one is no longer true.
+    /// The unit after it; `None` keeps none, because the old one is no longer true.
     to: Option<String>,
 }
 
@@ -77,13 +77,13 @@ impl Scaling {
         if factor == 0.0 || !factor.is_finite() {
             return Err(refused(
                 &factor.to_string(),
-                "a factor that is finite and not 0, since a channel times 0 says nothing",
+                "a factor that is finite and not 0, since a channel times 0 carries no information",
             ));
         }
         Ok(Self {
             factor,
             from: None,
-            to: unit.map(usual).map(str::to_owned),
+            to: unit.map(canonical).map(str::to_owned),
         })
     }
 
@@ -109,16 +109,16 @@ impl FromStr for Scaling {
             Some((left, right)) => (left.trim(), Some(right.trim())),
             None => (text.trim(), None),
         };
-        let known = |name: &str| UNITS.into_iter().find(|(unit, ..)| *unit == usual(name));
+        let known = |name: &str| UNITS.into_iter().find(|(unit, ..)| *unit == canonical(name));
         // A number is a number: "1:deg" names a unit and changes no value.
         if let Ok(factor) = left.parse::<f64>() {
             if right == Some("") {
-                return Err(refused(text, "a unit behind the colon, as 12.5:deg"));
+                return Err(refused(text, "a unit after the colon, as 12.5:deg"));
             }
             return Self::by(factor, right).map_err(|_| {
                 refused(
                     text,
-                    "a factor that is finite and not 0, since a channel times 0 says nothing",
+                    "a factor that is finite and not 0, since a channel times 0 carries no information",
                 )
             });
         }
@@ -157,14 +157,14 @@ fn refused(found: &str, expected: &str) -> IoError {
 }
 
 impl RecordParts {
-    /// Units that are declared beside the file; what the file says is not overruled.
+    /// Units that are declared next to the file; what the file states is not overruled.
     pub(super) fn declare_units(&mut self, units: &std::collections::BTreeMap<String, String>) -> Result<(), IoError> {
         const STEP: &str = "unit";
         let named = units.iter().map(|(name, unit)| (name.clone(), unit.as_str()));
         for (channel, unit) in self.find(STEP, named)? {
-            let unit = usual(unit);
+            let unit = canonical(unit);
             let known = self.channels[channel].unit.clone();
-            if !known.is_empty() && usual(&known) != unit {
+            if !known.is_empty() && canonical(&known) != unit {
                 let name = &self.channels[channel].name;
                 return Err(self.error(
                     STEP,
@@ -182,7 +182,10 @@ impl RecordParts {
         let named = scale.iter().map(|(name, scaling)| (name.clone(), scaling));
         for (channel, scaling) in self.find(STEP, named)? {
             let found = self.channels[channel].unit.clone();
-            if let Some(from) = scaling.from.filter(|from| !found.is_empty() && *from != usual(&found)) {
+            if let Some(from) = scaling
+                .from
+                .filter(|from| !found.is_empty() && *from != canonical(&found))
+            {
                 return Err(self.error(
                     STEP,
                     format!(

@@ -1,4 +1,5 @@
-//! The account of what was done to a record: for people in words, for programs with its numbers.
+//! The account of the processing applied to a record: for people as text, for programs with its
+//! numbers.
 
 use std::fmt;
 
@@ -12,7 +13,7 @@ use crate::wording::decimal;
 #[serde(tag = "step", rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Step {
-    /// Rows that were there twice, time included, were dropped.
+    /// Rows that were duplicated, time included, were dropped.
     DropRepeated {
         /// Rows dropped.
         rows: usize,
@@ -25,7 +26,7 @@ pub enum Step {
         what: Vec<&'static str>,
         /// Time of the first sample of the part, s.
         from_s: f64,
-        /// Time behind its last sample, s.
+        /// Time after its last sample, s.
         to_s: f64,
     },
     /// Missing values were bridged by straight lines.
@@ -54,14 +55,14 @@ pub enum Step {
         channel: String,
         /// The factor.
         factor: f64,
-        /// The unit behind it, where it is known.
+        /// The unit after it, where it is known.
         unit: Option<String>,
     },
-    /// A channel that was recorded late was put beside the others.
+    /// A channel that was recorded late was put next to the others.
     Offset {
         /// The channel.
         channel: String,
-        /// By how much it was late, samples.
+        /// Amount by which it was late, samples.
         samples: f64,
         /// The same in s.
         seconds: f64,
@@ -82,7 +83,7 @@ pub enum Step {
         to_hz: f64,
         /// End of the pass band, Hz.
         pass_hz: f64,
-        /// Begin of the stop band, Hz; none where the frequency rises.
+        /// Start of the stop band, Hz; none if the frequency rises.
         stop_hz: Option<f64>,
         /// Attenuation in the stop band, dB.
         stop_db: f64,
@@ -90,17 +91,17 @@ pub enum Step {
         taps: usize,
         /// Time without samples at the start and at the end, s.
         cut_s: (f64, f64),
-        /// By how much the delay of a model with a hold is shorter than at the old rate, s.
+        /// Amount by which the delay of a model with a hold is shorter than at the old rate, s.
         delay_s: f64,
-        /// By how much a sample of the input is taken later than that of the output beside it, so that
-        /// the delay is the same at both rates, s.
+        /// Amount by which a sample of the input is taken later than that of the output next to it, so that the delay
+        /// is the same at both rates, s.
         input_lead_s: f64,
     },
     /// The first seconds were dropped.
     RunIn {
         /// Length of the run-in, s.
         seconds: f64,
-        /// Samples dropped, beside those that a filter had cut.
+        /// Samples dropped, next to those that a filter had cut.
         samples: usize,
     },
     /// The mean or the straight line of input and output was taken out.
@@ -111,7 +112,7 @@ pub enum Step {
 }
 
 impl Step {
-    /// The step for what is taken out; none for nothing.
+    /// The processing step of the removed trend; none for nothing.
     pub(super) fn of_detrend(how: Detrend) -> Option<Self> {
         match how {
             Detrend::None => None,
@@ -222,7 +223,7 @@ impl fmt::Display for Step {
             } if *input_lead_s > 0.0 => write!(
                 f,
                 "{} Hz, filtered and decimated by {} to {} Hz: a linear-phase filter of {taps} samples on all channels, pass band to \
-                 {} Hz, {stop_db} dB from {} Hz; each sample of the input stands in the middle of its hold, {} s later, so that \
+                 {} Hz, {stop_db} dB from {} Hz; each sample of the input is in the middle of its hold, {} s later, so that \
                  the delay is that of the old rate",
                 decimal(*from_hz),
                 decimal(*factor),

@@ -124,7 +124,7 @@ fn scales_and_units() {
 
 #[test]
 fn whole_offsets_move_rows_and_change_no_number() {
-    // The output stands two samples late in the file.
+    // The output is two samples late in the file.
     let late = record(100, signal, |t| signal(t - 2.0 * TS));
     let preparation = moved("u", Offset::Samples(2.0));
     let (found, steps) = preparation.apply(late.clone()).unwrap();

@@ -1,6 +1,6 @@
-//! Channels that were recorded late, put beside the others without losing an end of the span.
+//! Channels that were recorded late, put next to the others without losing an end of the span.
 //!
-//! A channel that is moved by d samples has no value for d rows at one end of what was read. A span
+//! A channel that is moved by d samples has no value for d rows at one end of the read data. A span
 //! of whole periods would lose its last period with them. Where the file reaches beyond the span,
 //! as much of it is read as the offsets need, channels are moved, and the span is cut out
 //! afterwards: it keeps its length. Where it does not, or where the rate changes (whose filters cut
@@ -20,7 +20,7 @@ use crate::preparation::{NewRate, Offset, Preparation, Step};
 /// Rows beyond the span for the interpolation of an offset between samples.
 const FOR_INTERPOLATION: f64 = 64.0;
 
-/// The record in a file, prepared, its output moved earlier by `late_samples` besides.
+/// The record in a file, prepared, its output moved earlier by `late_samples` in addition.
 ///
 /// # Errors
 /// As [`read_prepared`](crate::read_prepared).
@@ -62,7 +62,7 @@ pub fn read_aligned(
     }
 }
 
-/// The record as it stands in the file.
+/// The record as it is in the file.
 pub(super) fn read_as_recorded(path: &Path, options: &ReadOptions, drop_repeated: bool) -> Result<ReadRecord, IoError> {
     let file = path.display().to_string();
     let (format, mut bytes) = bytes_of(path)?;
@@ -75,7 +75,7 @@ pub(super) fn read_as_recorded(path: &Path, options: &ReadOptions, drop_repeated
     })
 }
 
-/// Most samples by which a channel is moved, with what an interpolation needs besides.
+/// Most samples by which a channel is moved, with what an interpolation needs in addition.
 fn reach(preparation: &Preparation, late_samples: f64, ts_s: f64) -> f64 {
     let samples = |offset: &Offset| match offset {
         Offset::Samples(samples) => *samples,
@@ -88,7 +88,7 @@ fn reach(preparation: &Preparation, late_samples: f64, ts_s: f64) -> f64 {
 }
 
 /// Moves the channels of a wide record, cuts out the span of a narrow one, and does what comes
-/// after the offsets; `None` where that is not possible, and the narrow record says why.
+/// after the offsets; `None` if that is not possible, and the narrow record gives the reason.
 fn moved_within(
     wide: Record,
     narrow: &Record,

@@ -9,7 +9,7 @@ pub(crate) fn channels(record: &Record) -> Vec<&Channel> {
     target.into_iter().chain(others).collect()
 }
 
-/// What stands beside the columns: units and sample time.
+/// Files next to the columns: units and sample time.
 pub(crate) fn comments(record: &Record, channels: &[&Channel]) -> Vec<String> {
     let mut comments = Vec::new();
     if channels.iter().any(|c| !c.unit.is_empty()) {

@@ -1,9 +1,9 @@
 //! Records from files and into files.
 //!
-//! Reading takes the columns that are asked for, finds the sampling, checks every value in use and
+//! Reading takes the columns that are requested, finds the sampling, checks every value in use and
 //! gives a [`Record`], or the error that names the place. Nothing is repaired unless
-//! [`Repair`](crate::Repair) asks for it, and what was repaired is said in the notes. The format
-//! follows from the extension.
+//! [`Repair`](crate::Repair) asks for it, and what was repaired is reported in the notes. The
+//! format follows from the extension.
 
 use std::io::Write;
 use std::path::Path;
@@ -47,9 +47,9 @@ pub fn read_prepared(path: &Path, options: &ReadOptions, preparation: &Preparati
     read_aligned(path, options, preparation, 0.0)
 }
 
-/// Writes a record: t, then `f_t` where there is one, input, output, and the other channels in
-/// their order, all with the digits that give the same numbers back. Units and sample time are kept
-/// beside them as comments; the label is not written.
+/// Writes a record: t, then `f_t` if there is one, input, output, and the other channels in their
+/// order, all with the digits that give the same numbers back. Units and sample time are kept next
+/// to them as comments; the label is not written.
 ///
 /// # Errors
 /// [`IoError::UnknownFormat`], [`IoError::ChannelName`] for a channel that could not be read back,
@@ -84,7 +84,7 @@ fn write_columns(path: &Path, record: &Record) -> Result<(), IoError> {
 /// Writes a record as CSV into something that is open already, such as standard output.
 ///
 /// # Errors
-/// [`IoError::ChannelName`]; [`IoError::Unwritable`] for what `out` says. `name` stands for it in
+/// [`IoError::ChannelName`]; [`IoError::Unwritable`] for what `out` states. `name` represents it in
 /// both.
 pub fn write_record_csv(out: &mut dyn Write, name: &str, record: &Record) -> Result<(), IoError> {
     check_names(record, || name.to_owned())?;

@@ -12,21 +12,21 @@ use crate::preparation::{Preparation, Step};
 use crate::table::{ColumnExpression, Signal, Table};
 use crate::wording::{list, named};
 
-/// A record, what was done to it, and what else a person should know about how it was read.
+/// A record, the processing of it, and what else a person should know about how it was read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadRecord {
     /// The record, labelled with the name of the file without extension.
     pub record: Record,
-    /// What was not read or looks odd, such as columns left out; one sentence each.
+    /// Notes on parts that were not read or look wrong, one sentence each.
     pub notes: Vec<String>,
-    /// What was done to the numbers of the file, in this order.
+    /// Processing applied to the numbers of the file, in this order.
     pub steps: Vec<Step>,
-    /// What is wrong with the input, the output and their time in the file, before anything was
-    /// done; within the span that is read.
+    /// Problems with the input, the output and their time in the file, before anything was done;
+    /// within the span that is read.
     pub quality_issues: Vec<QualityIssue>,
 }
 
-/// The record in a table, without rows that are there twice where that is asked for.
+/// The record in a table, without rows that are duplicated where that is requested.
 pub(super) fn record_of(
     mut table: Table<'_>,
     options: &ReadOptions,
@@ -55,7 +55,7 @@ pub(super) fn record_of(
             steps.extend(step);
         }
         (true, None) => table.notes.push(String::from(
-            "there is no column t, so that a row written twice cannot be told from a value that holds: no row is dropped",
+            "there is no column t, so that a row written twice cannot be distinguished from a value that holds: no row is dropped",
         )),
         _ => {}
     }
@@ -73,7 +73,7 @@ pub(super) fn record_of(
 }
 
 impl ReadRecord {
-    /// The record prepared, and what was done to it behind what was done in reading.
+    /// The record prepared, and the processing of it after the actions taken in reading.
     pub(super) fn prepared(mut self, preparation: &Preparation) -> Result<Self, IoError> {
         let (record, steps) = preparation.apply(self.record)?;
         self.steps.extend(steps);
@@ -153,8 +153,8 @@ fn nothing() -> Channel {
     Channel::new("", "", Vec::new())
 }
 
-/// The signal that an expression makes of columns; nothing where it is a column by itself. Its name
-/// is the expression; a difference has a unit where both terms share it.
+/// The signal that an expression makes of columns; nothing if it is a column by itself. Its name is
+/// the expression; a difference has a unit where both terms share it.
 fn combine(signal: Signal, expression: &ColumnExpression, columns: &[Option<Channel>]) -> Channel {
     let nothing = nothing();
     let column = |index: usize| columns[index].as_ref().unwrap_or(&nothing);

@@ -1,9 +1,9 @@
 //! Records out of the columns of a file, and into files.
 //!
-//! A trial is chosen, its rows are put on an even grid, and each value in use is checked; what may be
-//! repaired is repaired only when that is asked for.
+//! A trial is chosen, its rows are put on an even grid, and each value in use is checked; what may be repaired is
+//! repaired only when that is requested.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `file` | [`read_record`], [`read_prepared`], [`write_record`] |
 //! | `read_options` | [`ReadOptions`], [`TrialChoice`]: what is read and how |
@@ -11,7 +11,7 @@
 //! | `from_table` | [`ReadRecord`]: from the columns of a file to a record |
 //! | `table_reader` | the columns on this way, one by one |
 //! | `time_grid` | the rows of a record, and its even grid |
-//! | `repair` | rows that are there twice, missing values, an uneven time: `--fill` and `--resample` |
+//! | `repair` | rows that are duplicated, missing values, an uneven time: `--fill` and `--resample` |
 //! | `alignment` | [`read_aligned`]: channels that were recorded late, within a span that keeps its length |
 //! | `segments` | [`read_segments`]: the records between faults of the recording |
 //! | `channels` | the channels of a record as the columns of a file |

@@ -8,14 +8,14 @@ use crate::IoError;
 use crate::table::ColumnExpression;
 use crate::time::TimeChoice;
 
-/// What may be mended in a damaged record. By default nothing is.
+/// Repairs of a damaged record. Default: none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Repair {
     /// Interpolate linearly from an uneven t, also over gaps, to an even grid. The grid starts at
     /// the first t; its sample time is that of the typical step, or of
     /// [`ReadOptions::sampling_hz`].
     pub resample: bool,
-    /// Bridge missing values (empty, NaN, NA) linearly between the values before and behind.
+    /// Bridge missing values (empty, NaN, NA) linearly between the values before and after.
     pub fill: bool,
 }
 
@@ -36,9 +36,9 @@ pub struct ReadOptions {
     /// first sample (0 when there is none); with [`Repair::resample`] it is the frequency of the
     /// new grid. By default the sampling is that of t.
     pub sampling_hz: Option<f64>,
-    /// The samples with `from <= t < to`, s; what lies outside is not looked at. By default all.
+    /// The samples with `from <= t < to`, s; anything outside is not used. By default all.
     pub span_s: (Option<f64>, Option<f64>),
-    /// What may be mended.
+    /// Permitted repairs.
     pub repair: Repair,
 }
 

@@ -1,4 +1,4 @@
-//! The remedies for damaged records, applied only when they are asked for: rows that were written
+//! The remedies for damaged records, applied only when they are requested: rows that were written
 //! twice are dropped, straight lines are drawn over missing values, and from an uneven t to an even
 //! grid.
 //!
@@ -10,14 +10,14 @@ use std::ops::Range;
 use crate::preparation::Step;
 use crate::table::{Table, kept};
 
-/// Why missing values could not be bridged: nothing stands on one side of them.
+/// Why missing values could not be bridged: nothing is on one side of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum OpenEnd {
     Start,
     End,
 }
 
-/// What was bridged.
+/// The bridged samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Bridged {
     /// Values in all.
@@ -26,7 +26,7 @@ pub(super) struct Bridged {
     pub(super) longest: usize,
 }
 
-/// Puts the straight line between its neighbours in place of each run of NaN, along `t` where it is
+/// Puts the straight line between its neighbours in place of each run of NaN, along `t` if it is
 /// known and else by rows.
 pub(super) fn fill(values: &mut [f64], t: Option<&[f64]>) -> Result<Bridged, OpenEnd> {
     let mut bridged = Bridged::default();
@@ -140,7 +140,7 @@ mod tests {
             assert!((value - (2.0 - 0.3 * k as f64)).abs() < 1e-14, "{k}");
         }
         assert_eq!(even[0], 2.0);
-        // A last sample that rounding puts behind the data takes the last value.
+        // A last sample that rounding puts after the data takes the last value.
         assert_eq!(resample(&t, &values, 0.0, 1.0 + 1e-12, 2)[1], values[5]);
     }
 }

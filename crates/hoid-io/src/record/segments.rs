@@ -1,8 +1,8 @@
-//! Records between faults of the recording: a file is cut where samples are missing, stand still or
-//! are clipped, and each segment is a record.
+//! Records between faults of the recording: a file is cut where samples are missing, stay constant
+//! or are clipped, and each segment is a record.
 //!
 //! Nothing is invented, and each segment has initial states of its own in a fit. But what is left
-//! out is chosen by what was recorded: without the samples at a rail the largest answers are gone,
+//! out is chosen by the recorded data: without the samples at a rail the largest answers are gone,
 //! which biases what is left (the lead of C1 clipped at 1.5 standard deviations by 9 %, where the
 //! clipped record itself has its gain 12 % too small).
 
@@ -20,13 +20,13 @@ use crate::preparation::{Preparation, Step};
 use crate::wording::{decimal, list};
 
 /// Reads the segments of a file between faults of these kinds that last `shortest_s` or more, in
-/// their order; the whole record where no kind is named. The first carries what is wrong with the
-/// file as a whole.
+/// their order; the whole record where no kind is named. The first carries the problems of the file
+/// as a whole.
 ///
-/// Of a file with several trials each is read so, one behind the other.
+/// For a file with several trials each is read so, one after the other.
 ///
 /// # Errors
-/// As [`read_prepared`]; [`IoError::Preparation`] for kinds that are no places (a clock, a
+/// As [`read_prepared`]; [`IoError::Preparation`] for kinds that are not places (a clock, a
 /// constant), for a run-in, and where no segment is left.
 pub fn read_segments(
     path: &Path,
@@ -58,7 +58,7 @@ pub fn read_segments(
                     list_of(&trials)
                 ));
             } else {
-                // What is said of the file was said of its first trial.
+                // Report about the file was reported about its first trial.
                 read.notes.clear();
             }
             all.push(read);
@@ -94,7 +94,7 @@ fn read_trial(
         return Err(refuse(kind.name().to_owned(), &format!("some of {names}")));
     }
     if preparation.run_in_s != 0.0 {
-        return Err(refuse("a run-in".to_owned(), "a span that begins behind it (--from)"));
+        return Err(refuse("a run-in".to_owned(), "a span that starts after it (--from)"));
     }
     if !(shortest_s >= 0.0 && shortest_s.is_finite()) {
         return Err(refuse(
@@ -132,7 +132,7 @@ fn read_trial(
             span_s: (Some(from), to),
             ..options.clone()
         };
-        // What is masked stands beside it: nothing beyond it is taken for an offset.
+        // What is masked is next to it: nothing beyond it is taken for an offset.
         let read = read_as_recorded(path, &span, preparation.drop_repeated)?.prepared(preparation)?;
         let to_s = to.unwrap_or(last);
         let mut steps = vec![Step::Mask {

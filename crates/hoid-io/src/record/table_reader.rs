@@ -11,7 +11,7 @@ use crate::preparation::Step;
 use crate::table::Table;
 use crate::wording::named;
 
-/// The table, and what was done to it.
+/// The table, and the processing of it.
 pub(super) struct TableReader<'a> {
     pub(super) table: Table<'a>,
     pub(super) options: &'a ReadOptions,
@@ -29,8 +29,8 @@ impl TableReader<'_> {
         }
     }
 
-    /// The part of these rows in which all signals have values on both sides, where missing ones are bridged: two topics in
-    /// one table do not begin and end in the same row.
+    /// The part of these rows in which all signals have values on both sides, where missing ones are bridged: two
+    /// topics in one table do not start and end in the same row.
     pub(super) fn between_values(&mut self, rows: Range<usize>, time: Option<usize>) -> Range<usize> {
         if !self.options.repair.fill {
             return rows;
@@ -65,7 +65,7 @@ impl TableReader<'_> {
         first..last + 1
     }
 
-    /// The value of a column that is missing in a row, on the line between its neighbours; `None` where it is not missing,
+    /// The value of a column that is missing in a row, on the line between its neighbours; `None` if it is not missing,
     /// or there is none on a side.
     fn between(&self, column: usize, at: usize, rows: &Range<usize>, time: Option<usize>) -> Option<f64> {
         let source = &self.table.columns[column];
@@ -94,8 +94,8 @@ impl TableReader<'_> {
         (densest.len() > 2 && densest.len() + 2 < t.len()).then_some(densest)
     }
 
-    /// The values of a column in use: all finite, the missing ones bridged where that was asked
-    /// for.
+    /// The values of a column in use: all finite, the missing ones bridged where that was
+    /// requested.
     pub(super) fn values(&mut self, column: usize, rows: Range<usize>, t: Option<&[f64]>) -> Result<Vec<f64>, IoError> {
         let source = &mut self.table.columns[column];
         let may_fill = self.options.repair.fill;
@@ -105,7 +105,7 @@ impl TableReader<'_> {
         if let Some(row) = rows.clone().find(bad) {
             return Err(self.table.bad_value(column, row, rows));
         }
-        // Nobody reads a column twice: what a file of hours fills is not copied.
+        // No one reads a column twice: what a file of hours fills is not copied.
         let mut values = std::mem::take(&mut source.values);
         values.truncate(rows.end);
         values.drain(..rows.start);

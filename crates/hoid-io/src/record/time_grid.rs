@@ -11,7 +11,7 @@ use crate::table::Precision;
 use crate::time::sampling::{self, Uneven};
 use crate::wording::list;
 
-/// Resampling makes at most so many samples out of one.
+/// Resampling makes at most this many samples out of one.
 const LARGEST_FACTOR: usize = 100;
 
 /// Where the samples of the record come from.
@@ -72,7 +72,7 @@ impl TableReader<'_> {
             (Some(_), _) => {
                 let place = self.table.source.place(0);
                 self.table.notes.push(format!(
-                    "t is no number on {place}: the time of the first sample is taken as 0 s"
+                    "t is not a number on {place}: the time of the first sample is taken as 0 s"
                 ));
             }
             _ => {}
@@ -129,7 +129,7 @@ impl TableReader<'_> {
         sample_time: SampleTime,
         precision: Precision,
     ) -> Result<TimeGrid, IoError> {
-        // A sample alone has no line to stand on.
+        // A sample alone has no line to be on.
         if t.len() < 2 {
             return Err(self.uneven(Uneven::TooFew, &rows, &t));
         }

@@ -1,11 +1,11 @@
 //! Trials in one file: a column that counts them, a time that starts again, or an array of
 //! structures in MATLAB.
 //!
-//! Each trial is a record of its own, with initial states of its own; one record over all of them
-//! would answer at each seam to what was never seen. A part begins where the value of the column
-//! changes or where t falls. Without `--trial` parts are only looked for where t falls: each must
-//! have [`SHORTEST`] rows, and t must fall by half of what it rose at least, which no clock does that
-//! is set. The column that steps with the parts, if there is one, gives them their names.
+//! Each trial is a record of its own, with initial states of its own; one record over all of them would answer at each
+//! seam to what was never seen. A part starts where the value of the column changes or where t falls. Without `--trial`
+//! parts are only searched for where t falls: each must have [`SHORTEST`] rows, and t must fall by at least half of its
+//! rise, which no clock does that is set. The column that steps with the parts, if there is one, gives them their
+//! names.
 
 use std::ops::Range;
 
@@ -21,7 +21,7 @@ const SHORTEST: usize = 8;
 /// Trials that were found: their names and rows.
 type Parts = Vec<(String, Range<usize>)>;
 
-/// The trial of a table that was asked for; the table itself where it holds one only.
+/// The trial of a table that was requested; the table itself where it holds one only.
 pub(crate) fn of_table<'a>(table: Table<'a>, choice: Option<&TrialChoice>) -> Result<Table<'a>, IoError> {
     let file = || table.source.file().to_owned();
     let (by, parts) = match choice {
@@ -69,14 +69,14 @@ fn falls(table: &Table<'_>) -> Vec<usize> {
     time.map_or_else(Vec::new, falls)
 }
 
-/// The rows between the places at which something begins.
+/// The rows between the places at which something starts.
 fn between(begins: &[usize], rows: usize) -> Vec<Range<usize>> {
     let from = std::iter::once(0).chain(begins.iter().copied());
     let to = begins.iter().copied().chain([rows]);
     from.zip(to).map(|(from, to)| from..to).collect()
 }
 
-/// What a cell says; nothing where it is empty.
+/// Content of a cell; nothing if it is empty.
 fn cell(table: &Table<'_>, at: usize, row: usize) -> Option<String> {
     let value = table.columns[at].values[row];
     if value.is_finite() {
@@ -126,8 +126,8 @@ fn named(parts: Vec<Range<usize>>, label: impl Fn(usize) -> Option<String>) -> P
     found.into_iter().map(name).collect()
 }
 
-/// The parts between the places where t starts again, and the column that counts them; `t` where
-/// there is none.
+/// The parts between the places where t starts again, and the column that counts them; `t` if there
+/// is none.
 fn restarts(table: &Table<'_>) -> Option<(String, Parts)> {
     let begins = falls(table);
     let t = &table.columns.iter().find(|column| column.name == "t")?.values;
@@ -162,7 +162,7 @@ fn restarts(table: &Table<'_>) -> Option<(String, Parts)> {
     })
 }
 
-/// The trial of an array of structures, `trial(3).e`, and whether that was what was asked for.
+/// The trial of an array of structures, `trial(3).e`, and whether that was the request.
 pub(crate) fn of_contents(
     mut contents: Contents,
     choice: Option<&TrialChoice>,
@@ -205,7 +205,7 @@ pub(crate) fn of_contents(
                 available: list(&numbers),
             });
         }
-        // Of one array the paths are as clear as without a choice.
+        // For one array the paths are as clear as without a choice.
         None if numbers.len() < 2 => return Ok((contents, asked.is_some())),
         None => return Err(several(file.to_owned(), &array, numbers)),
     };

@@ -1,7 +1,7 @@
 //! A fit of a person as `hoid identify --json` prints it: read again as a prior or a start.
 //!
-//! The object has more than what is read here; keys that are not known are left alone, so that a file
-//! of a later version is read too.
+//! The object has more than the data read here; keys that are not known are left alone, so that a file of a later
+//! version is read too.
 
 use std::path::Path;
 
@@ -17,11 +17,11 @@ pub struct FitParameter {
     pub name: String,
     /// Its value with its standard error.
     pub estimate: Estimate,
-    /// True where the data determine it.
+    /// True if the data determine it.
     pub determined: bool,
 }
 
-/// What a file of a fit holds.
+/// Contents of a file of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitFile {
     /// The parameters that have a value.
@@ -59,7 +59,7 @@ pub fn read_fit(path: &Path) -> Result<FitFile, IoError> {
 /// Reads a fit from the text of its file.
 ///
 /// # Errors
-/// [`IoError::NoFit`] for what is no such object.
+/// [`IoError::NoFit`] for any other object.
 pub fn parse_fit(text: &str, source: &str) -> Result<FitFile, IoError> {
     let found: FitObject = serde_json::from_str(text).map_err(|error| no_fit(source, error.to_string()))?;
     let of = |p: &ParameterObject| {

@@ -1,6 +1,6 @@
-//! What hoid has found, in files and out of them.
+//! Files of results of hoid: writing and reading.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `output_table` | [`OutputTable`]: columns of results, and how each format keeps them |
 //! | `table_file` | [`write_table`], [`read_table`]: tables of results |

@@ -7,9 +7,9 @@
 //! | text | quoted where that is needed | BYTE_ARRAY in UTF-8 |
 //! | comments | lines above the header, behind `# ` | lines under the key `hoid.comments` |
 //!
-//! Parquet gives back what was written. CSV keeps no types: a column is whole where each cell is,
-//! real where each cell is a number or empty, else text. What hoid writes comes back the same but
-//! for a column of text that looks like numbers, and one of no rows.
+//! Parquet gives back the written data. CSV keeps no types: a column is whole where each cell is, real where each cell
+//! is a number or empty, else text. What hoid writes comes back the same except for a column of text that looks like
+//! numbers, and one of no rows.
 
 use std::ops::Range;
 
@@ -18,7 +18,7 @@ use crate::IoError;
 /// Columns to be written.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OutputTable {
-    /// What to know about the table, a line each.
+    /// Notes on the table, a line each.
     pub comments: Vec<String>,
     /// The columns, all of one length.
     pub columns: Vec<OutputColumn>,
@@ -44,7 +44,7 @@ pub enum ColumnValues {
     Text(Vec<String>),
 }
 
-/// What a column holds.
+/// Contents of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ColumnKind {
     /// Real numbers.
@@ -58,7 +58,7 @@ pub enum ColumnKind {
 /// A table without its rows.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct TableSchema {
-    /// What to know about the table, a line each.
+    /// Notes on the table, a line each.
     pub comments: Vec<String>,
     /// The columns.
     pub columns: Vec<ColumnSchema>,
@@ -69,7 +69,7 @@ pub struct TableSchema {
 pub struct ColumnSchema {
     /// Its name.
     pub name: String,
-    /// What it holds.
+    /// Contents of it.
     pub kind: ColumnKind,
 }
 
@@ -125,7 +125,7 @@ impl ColumnValues {
         self.len() == 0
     }
 
-    /// What the values are.
+    /// Definition of the values.
     #[must_use]
     pub fn kind(&self) -> ColumnKind {
         match self {

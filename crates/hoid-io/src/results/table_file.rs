@@ -1,4 +1,4 @@
-//! Tables of results into files and out of them, in the format that the extension stands for.
+//! Tables of results into files and out of them, in the format that the extension represents.
 
 use std::path::Path;
 
@@ -7,10 +7,11 @@ use super::table_writer::write_values;
 use crate::IoError;
 use crate::formats::{bytes_of, format_to_write};
 
-/// Whether a table can be written to a place of this name; to be asked before long work.
+/// Whether a table can be written to a place of this name; checked before long computations.
 ///
 /// # Errors
-/// [`IoError::UnknownFormat`] for an extension that stands for no format, [`IoError::Directory`].
+/// [`IoError::UnknownFormat`] for an extension that does not correspond to any format,
+/// [`IoError::Directory`].
 pub fn check_table_path(path: &Path) -> Result<(), IoError> {
     format_to_write(path).map(drop)
 }
@@ -19,8 +20,8 @@ pub fn check_table_path(path: &Path) -> Result<(), IoError> {
 /// (`.parquet`, `.pq`), NPZ (`.npz`) or for MATLAB (`.mat`). The same table gives the same bytes.
 ///
 /// # Errors
-/// Those of [`check_table_path`]; [`IoError::ColumnLength`], [`IoError::NoColumns`],
-/// [`IoError::DuplicateColumn`] or [`IoError::ChannelName`] for what cannot be written; those of
+/// The errors of [`check_table_path`]; [`IoError::ColumnLength`], [`IoError::NoColumns`],
+/// [`IoError::DuplicateColumn`] or [`IoError::ChannelName`] for failures of writing; those of
 /// [`write_atomically`](crate::write_atomically).
 ///
 /// ```

@@ -18,7 +18,7 @@ enum Sink {
     Columns(WaitingColumns),
 }
 
-/// Columns that wait for their end, since an array says its length first.
+/// Columns that wait for their end, since an array reports its length first.
 struct WaitingColumns {
     write: ColumnsWriter,
     schema: TableSchema,
@@ -88,7 +88,7 @@ pub struct TableWriter {
     file: WholeFile,
     name: String,
     columns: Vec<ColumnSchema>,
-    /// None after an error of the system: half a group may stand in the file then.
+    /// None after an error of the system: half a group may be in the file then.
     sink: Option<Sink>,
     /// Rows that do not yet make a group.
     waiting: Vec<ColumnValues>,
@@ -103,12 +103,12 @@ impl std::fmt::Debug for TableWriter {
 }
 
 impl TableWriter {
-    /// Begins a file of a format by its extension, as in [`write_table`](crate::write_table).
+    /// Starts a file of a format by its extension, as in [`write_table`](crate::write_table).
     ///
     /// # Errors
     /// [`IoError::UnknownFormat`]; [`IoError::NoColumns`], [`IoError::DuplicateColumn`] or
     /// [`IoError::ChannelName`] for a schema that cannot be written; [`IoError::Unwritable`] for
-    /// what the system says.
+    /// errors that the operating system reports.
     pub fn create(path: &Path, schema: &TableSchema) -> Result<Self, IoError> {
         let format = format_to_write(path)?;
         let name = path.display().to_string();
@@ -125,7 +125,7 @@ impl TableWriter {
         })
     }
 
-    /// Appends the rows of a table of the same columns; its comments are not looked at.
+    /// Appends the rows of a table of the same columns; its comments are not examined.
     ///
     /// # Errors
     /// [`IoError::ColumnsDiffer`] and [`IoError::ColumnLength`], after which other rows may be
@@ -159,7 +159,7 @@ impl TableWriter {
     /// Ends the file and puts it in its place.
     ///
     /// # Errors
-    /// [`IoError::Unwritable`] for what the system says.
+    /// [`IoError::Unwritable`] for errors that the operating system reports.
     pub fn finish(mut self) -> Result<(), IoError> {
         if self.waiting.iter().any(|waiting| !waiting.is_empty()) {
             self.group()?;

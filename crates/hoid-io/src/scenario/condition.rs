@@ -14,7 +14,7 @@ use super::error::ScenarioFileError;
 use super::keys::{DefinitionKey, File, RealisationKey, RemnantTable, ScheduleTable, SinusoidTable, StateTable};
 use super::values::{Limits, Source};
 
-/// Most lines of a forcing function.
+/// Largest number of lines of a forcing function.
 pub(super) const MOST_LINES: usize = 10_000;
 
 impl Source<'_> {

@@ -12,7 +12,7 @@ pub enum ScenarioFileError {
     Unreadable {
         /// The file.
         path: String,
-        /// What the system says.
+        /// Error reported by the operating system.
         reason: String,
     },
     /// No TOML, or keys and types that do not belong to a scenario.
@@ -22,7 +22,7 @@ pub enum ScenarioFileError {
         path: String,
         /// Line, from 1.
         line: usize,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// A value without meaning.
@@ -36,7 +36,7 @@ pub enum ScenarioFileError {
         key: String,
         /// The value found.
         found: String,
-        /// What has a meaning, and the remedy.
+        /// The valid values, and the remedy.
         expected: String,
     },
     /// Keys that are missing or contradict each other.
@@ -44,7 +44,7 @@ pub enum ScenarioFileError {
     Keys {
         /// The file.
         path: String,
-        /// What is missing or too much, and the remedy.
+        /// Missing or surplus parts, and the remedy.
         reason: String,
     },
     /// Values that have a meaning each, but not together.
@@ -52,7 +52,7 @@ pub enum ScenarioFileError {
     Model {
         /// The file.
         path: String,
-        /// What is wrong.
+        /// The problem.
         source: ModelError,
     },
 }

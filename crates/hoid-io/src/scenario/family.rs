@@ -33,7 +33,7 @@ impl Source<'_> {
             (Some(ts), None) => SampleTime::new(ts).map_err(|error| self.model(error))?,
             (None, Some(rate)) => SampleTime::new(1.0 / rate).map_err(|error| self.model(error))?,
             (Some(_), Some(_)) => {
-                return Err(self.keys("sample_time_s and sampling_rate_hz say the same: give one of them"));
+                return Err(self.keys("sample_time_s and sampling_rate_hz state the same: give one of them"));
             }
         };
         let initial = self.family_state(form, file.neuromuscular, "initial", &file.initial)?;
@@ -171,7 +171,7 @@ impl Source<'_> {
             .find(|(key, value)| value.is_some() && !used.contains(key))
         {
             return Err(self.keys(&format!(
-                "[{table}] has {}, which the form {form} has not, or which says what another key says; it takes {}",
+                "[{table}] has {}, which the form {form} has not, or which reports what another key states; it takes {}",
                 key.0,
                 used.join(", ")
             )));
@@ -246,13 +246,13 @@ impl Source<'_> {
                     self.checked(&format!("{name}.{key}"), value, limits)?;
                 }
             }
-            let usual = MultiSine::default();
+            let default = MultiSine::default();
             let sum = MultiSine {
-                period_s: given.period_s.unwrap_or(usual.period_s),
-                largest: given.largest_multiple.unwrap_or(usual.largest),
-                rms: given.rms.unwrap_or(usual.rms),
+                period_s: given.period_s.unwrap_or(default.period_s),
+                largest: given.largest_multiple.unwrap_or(default.largest),
+                rms: given.rms.unwrap_or(default.rms),
                 interleaved: match &given.interleaved {
-                    None => usual.interleaved,
+                    None => default.interleaved,
                     Some(word) => word.get_ref().parse().map_err(|error: hoid_model::UnknownName| {
                         let key = format!("{name}.interleaved");
                         self.value(&key, word.span().start, word.get_ref(), &error.to_string())
@@ -326,7 +326,9 @@ impl Source<'_> {
                 initial,
                 last: given.gain_last.unwrap_or(initial),
             },
-            _ => return refuse("give share (of the variance of u) or gain, and gain_last beside gain only".to_owned()),
+            _ => {
+                return refuse("give share (of the variance of u) or gain, and gain_last next to gain only".to_owned());
+            }
         };
         let mut used = Vec::new();
         let shape = match given.shape {
@@ -406,7 +408,7 @@ impl Source<'_> {
     }
 }
 
-/// What a number of an operator may be.
+/// Admissible values of a number of an operator.
 fn limits_of(key: &str) -> Limits {
     match key {
         "T_L_s" | "T_I_s" | "c_1_s" | "c_2_s2" | "tau_e_s" | "K_d_s" => Limits::LEAD_S,
@@ -434,7 +436,8 @@ impl FamilyStateTable {
         ]
     }
 
-    /// What this leaves out is that of `base`. Of two ways to say the gain it is the one said here.
+    /// Missing settings are those of `base`. Of two ways to state the gain, the one stated here
+    /// counts.
     fn over(&self, base: &Self) -> Self {
         let says_gain = self.k.is_some() || self.k_over_t_i.is_some();
         let gain = |own: Option<f64>, of_base: Option<f64>| if says_gain { own } else { of_base };

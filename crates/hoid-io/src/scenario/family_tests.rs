@@ -94,14 +94,14 @@ fn what_does_not_fit_is_refused_with_its_remedy() {
         (with("T_L_s = 0.6\n", "T_L_s = 0.6\nc_1_s = 1\n"), "[initial] has c_1_s"),
         (with("1/1,0", "1,0,0/1,0"), "higher degree"),
         (with("1/1,0", "one"), "line 9: initial.controlled_element is one"),
-        (with("1/1,0", "90/s(s+6)"), "at character 5 stands '('"),
+        (with("1/1,0", "90/s(s+6)"), "at character 5 there is '('"),
         (with("1/1,0", "1e13/s"), "controlled_element is 10000000000000"),
         (with("1/1,0", "exp(-0.1s)/s"), "the delay of a task is the operator's"),
         (with("controlled_element = \"1/1,0\"\n", ""), "lacks controlled_element"),
         (with("form", "sample_time_s = 0\nform"), "line 1: sample_time_s is 0"),
         (
             with("form", "sample_time_s = 0.01\nsampling_rate_hz = 100\nform"),
-            "say the same",
+            "state the same",
         ),
         (more("K_e = 1"), "unknown field `K_e`"),
         (more("[last]\nT_L_s = 0.5"), "add [schedule]"),
@@ -128,7 +128,7 @@ fn what_does_not_fit_is_refused_with_its_remedy() {
             "{message} lacks {part}"
         );
     }
-    // Studies take the operator of the reference text.
+    // Studies take the operator of the thesis.
     let message = parse_scenario(SHORT, "x.toml", "x").unwrap_err().to_string();
     assert!(message.contains("key form"), "{message}");
     assert!(matches!(

@@ -32,10 +32,10 @@
 //! A file with the key `form` describes an operator of the family around any controlled element
 //! ([`AnyScenario`]); its keys are in `family_keys`.
 //!
-//! What the file leaves out is that of the condition; without one, the parameters of `[last]` are
-//! those of `[initial]`, and all else is as in C1.
+//! Missing keys have the values of the condition; without one, the parameters of `[last]` are those of `[initial]`, and
+//! all else is as in C1.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `reading` | [`read_scenario`]: from a file or its text to a scenario; the schemas of both kinds |
 //! | `keys` | the keys of a scenario |

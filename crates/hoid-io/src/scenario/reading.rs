@@ -10,10 +10,10 @@ use super::keys::File;
 use super::values::{Source, line_of};
 use crate::wording::printable;
 
-/// What a scenario file describes.
+/// A scenario of either kind.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AnyScenario {
-    /// The task of the reference text, or one near it.
+    /// The task of the thesis, or one near it.
     Reference(Box<Scenario>),
     /// An operator of the family: a file with the key `form`.
     Family(Box<FamilyScenario>),
@@ -79,7 +79,7 @@ pub fn parse_scenario(text: &str, path: &str, name: &str) -> Result<Scenario, Sc
     if has_form(text) {
         return Err(Source { text, path }.keys(
             "the key form describes an operator of the family, which is simulated by itself (hoid simulate --scenario) and \
-             is no scenario of a study; leave form out for the operator K_e (T_L s + 1)",
+             is not a scenario of a study; leave form out for the operator K_e (T_L s + 1)",
         ));
     }
     let file: File = toml::from_str(text).map_err(|error| syntax(text, path, &error))?;

@@ -9,7 +9,8 @@ use crate::wording::printable;
 /// Most samples of a run, so that a slip of the unit does not ask for all memory.
 const MOST_SAMPLES: f64 = 1e7;
 
-/// What a number of a scenario may be, so that a slip of the unit is told and not simulated.
+/// Admissible values of a number of a scenario, so that a slip of the unit is reported and not
+/// simulated.
 #[derive(Clone, Copy)]
 pub(super) struct Limits(f64, f64);
 
@@ -105,7 +106,7 @@ impl Source<'_> {
         Err(match given {
             Some(given) => self.value(key, given.span().start, &in_short(time_s), &expected),
             None => self.keys(&format!(
-                "{key} is {time_s} where the file does not give it, expected {expected}"
+                "{key} is {time_s} if the file does not give it, expected {expected}"
             )),
         })
     }

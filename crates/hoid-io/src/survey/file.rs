@@ -1,5 +1,4 @@
-//! What is inside of a file, before anything is chosen: columns, their sampling and ranges, and
-//! what is suspicious in them.
+//! Contents of a file before any choice: columns, their sampling and ranges, and suspicious values.
 //!
 //! Nothing is judged finally here: a channel may rightly be constant. What is suspicious is found
 //! by `data_quality`, in columns that belong to one time together; a column that is constant is
@@ -7,7 +6,7 @@
 
 use std::path::Path;
 
-use super::read::{Read, of_arrays, of_table};
+use super::read::{RawColumn, of_arrays, of_table};
 use super::sampling::{SamplingSurvey, sampling};
 use super::values::{ValueSurvey, values};
 use crate::IoError;
@@ -16,7 +15,7 @@ use crate::formats::arrays::TIMES;
 use crate::formats::{Reading, bytes_of};
 use crate::time::with_time;
 
-/// What a file holds.
+/// Contents of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FileSurvey {
     /// Its format, as in "Parquet".
@@ -25,9 +24,9 @@ pub struct FileSurvey {
     pub columns: Vec<ColumnSurvey>,
     /// The sampling of each structure with a time, one for a flat table.
     pub samplings: Vec<SamplingSurvey>,
-    /// What is wrong with the sampling, structure by structure.
+    /// Problems with the sampling, structure by structure.
     pub quality_issues: Vec<QualityIssue>,
-    /// What to know about how it was read.
+    /// Notes on reading.
     pub notes: Vec<String>,
 }
 
@@ -42,14 +41,14 @@ pub struct ColumnSurvey {
     pub kind: String,
     /// The number of its rows; 0 for what is not read.
     pub rows: usize,
-    /// What its numbers are, where it holds any finite one.
+    /// Statistics of its finite numbers, if there are any.
     pub values: Option<ValueSurvey>,
 }
 
 /// Looks into a file of any format that is read.
 ///
 /// # Errors
-/// Those of reading: [`IoError`], naming the place in the file.
+/// The errors of reading: [`IoError`], naming the place in the file.
 pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
     let file = path.display().to_string();
     let (format, mut bytes) = bytes_of(path)?;
@@ -57,14 +56,14 @@ pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
         Reading::Table { record, .. } => of_table(with_time(record(&mut bytes, &file)?, None)?),
         Reading::Arrays(read) => of_arrays(&read(bytes, &file)?),
     };
-    let is_time = |column: &&Read| TIMES.contains(&column.name.as_str()) && column.rows > 1;
+    let is_time = |column: &&RawColumn| TIMES.contains(&column.name.as_str()) && column.rows > 1;
     let samplings = columns
         .iter()
         .filter(is_time)
         .filter_map(|time| sampling(time, &columns))
         .collect();
     let quality_issues = quality_issues(&columns);
-    let survey = |column: Read| ColumnSurvey {
+    let survey = |column: RawColumn| ColumnSurvey {
         values: column.values.as_deref().and_then(values),
         path: column.path,
         unit: column.unit,
@@ -80,15 +79,15 @@ pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
     })
 }
 
-fn signal(column: &Read) -> Signal<'_> {
+fn signal(column: &RawColumn) -> Signal<'_> {
     Signal {
         name: &column.path,
         values: column.values.as_deref().unwrap_or_default(),
     }
 }
 
-/// What is wrong with the columns that stand beside each other, by structure and length.
-fn quality_issues(columns: &[Read]) -> Vec<QualityIssue> {
+/// Problems with the columns that are next to each other, by structure and length.
+fn quality_issues(columns: &[RawColumn]) -> Vec<QualityIssue> {
     let mut seen: Vec<(&str, usize)> = Vec::new();
     let mut found = Vec::new();
     for column in columns.iter().filter(|column| column.rows > 1) {
@@ -101,9 +100,9 @@ fn quality_issues(columns: &[Read]) -> Vec<QualityIssue> {
         let time = TIMES
             .iter()
             .find_map(|name| beside().find(|c| c.name == *name && c.values.is_some()));
-        let is_time = |c: &Read| time.is_some_and(|time| time.path == c.path);
+        let is_time = |c: &RawColumn| time.is_some_and(|time| time.path == c.path);
         let numbers = || beside().filter(|c| c.values.is_some() && !is_time(c));
-        let is_clock = |c: &&Read| names_a_clock(&c.name) || TIMES.contains(&c.name.as_str());
+        let is_clock = |c: &&RawColumn| names_a_clock(&c.name) || TIMES.contains(&c.name.as_str());
         found.extend(issues_of(&Signals {
             columns: numbers().filter(|c| !is_clock(c)).map(signal).collect(),
             time: time.map(signal),

@@ -1,6 +1,6 @@
-//! What is inside of a file, before anything is chosen: its columns, their sampling and ranges.
+//! Contents of a file before any choice: columns, their sampling and ranges.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `file` | [`survey()`]: all that is found in a file |
 //! | `read` | its columns, as they were read |

@@ -5,7 +5,7 @@ use crate::table::{Column, DECIMAL_COMMA, Precision, Table, UNITS_ROW, has_decim
 use crate::wording::named;
 
 /// A column as it was read.
-pub(super) struct Read {
+pub(super) struct RawColumn {
     pub(super) path: String,
     pub(super) parent: String,
     pub(super) name: String,
@@ -16,8 +16,8 @@ pub(super) struct Read {
     pub(super) precision: Precision,
 }
 
-/// Those of a flat table, with what a reader of it should know.
-pub(super) fn of_table(mut table: Table<'_>) -> (Vec<Read>, Vec<String>) {
+/// The entries of a flat table, with what a reader of it should know.
+pub(super) fn of_table(mut table: Table<'_>) -> (Vec<RawColumn>, Vec<String>) {
     let rows = table.rows;
     let commas = decimal_commas(&table);
     table.notes.extend(commas);
@@ -29,7 +29,7 @@ pub(super) fn of_table(mut table: Table<'_>) -> (Vec<Read>, Vec<String>) {
     }
     let read = |column: Column| {
         let text = column.texts.len() == rows;
-        Read {
+        RawColumn {
             path: column.name.clone(),
             parent: String::new(),
             name: column.name,
@@ -57,7 +57,8 @@ fn decimal_commas(table: &Table<'_>) -> Vec<String> {
     table.columns.iter().enumerate().filter_map(first_text).collect()
 }
 
-/// Columns of numbers in which some cells are text, or infinite: they are refused when read, and told as they are then.
+/// Columns of numbers in which some cells are text, or infinite: they are refused when read, and reported as they are
+/// then.
 fn unusable(table: &Table<'_>) -> Vec<String> {
     let first = |(at, column): (usize, &Column)| {
         let numbers = column.values.iter().any(|value| value.is_finite());
@@ -70,8 +71,8 @@ fn unusable(table: &Table<'_>) -> Vec<String> {
     table.columns.iter().enumerate().filter_map(first).collect()
 }
 
-/// Those of a file of named arrays.
-pub(super) fn of_arrays(contents: &Contents) -> (Vec<Read>, Vec<String>) {
+/// The entries of a file of named arrays.
+pub(super) fn of_arrays(contents: &Contents) -> (Vec<RawColumn>, Vec<String>) {
     let column_paths = contents.column_paths();
     let read = |column_path: ColumnPath| {
         let (values, single) = match &column_path.holds {
@@ -79,7 +80,7 @@ pub(super) fn of_arrays(contents: &Contents) -> (Vec<Read>, Vec<String>) {
             Holds::Texts(_) | Holds::Unread(_) => (None, false),
         };
         let times = values.as_deref().filter(|_| TIMES.contains(&column_path.name()));
-        Read {
+        RawColumn {
             parent: column_path.parent.clone(),
             name: column_path.name().to_owned(),
             unit: column_path.unit.clone(),

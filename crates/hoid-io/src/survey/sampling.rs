@@ -1,6 +1,6 @@
 //! The sampling of columns that belong together, as it is found.
 
-use super::read::Read;
+use super::read::RawColumn;
 use crate::data_quality::Grid;
 
 /// The sampling of columns that belong together.
@@ -12,7 +12,7 @@ pub struct SamplingSurvey {
     pub rows: usize,
     /// First and last finite time, s.
     pub span_s: (f64, f64),
-    /// Sample time of the even grid behind the time, s.
+    /// Sample time of the even grid after the time, s.
     pub sample_time_s: f64,
     /// Largest deviation of a time from the even grid, s.
     pub jitter_s: f64,
@@ -22,14 +22,14 @@ pub struct SamplingSurvey {
     pub missing: u64,
     /// Time of the row before the first gap, s.
     pub first_gap_s: Option<f64>,
-    /// Rows in which the time stands still or runs back.
+    /// Rows in which the time stays constant or runs back.
     pub not_increasing: usize,
     /// Rows in which each other column that is not constant repeats the row before.
     pub repeated: usize,
 }
 
-/// The sampling by a time; none where it holds fewer than two finite values.
-pub(super) fn sampling(time: &Read, columns: &[Read]) -> Option<SamplingSurvey> {
+/// The sampling by a time; none if it holds fewer than two finite values.
+pub(super) fn sampling(time: &RawColumn, columns: &[RawColumn]) -> Option<SamplingSurvey> {
     let t: Vec<f64> = time
         .values
         .as_ref()?
@@ -82,7 +82,7 @@ mod tests {
 
     #[test]
     fn time_and_its_faults() {
-        let read = |name: &str, values: Vec<f64>| Read {
+        let read = |name: &str, values: Vec<f64>| RawColumn {
             path: name.into(),
             parent: String::new(),
             name: name.into(),
@@ -102,7 +102,7 @@ mod tests {
         let columns = [read("t", t), read("x", x), read("c", vec![1.0; 100])];
         let found = sampling(&columns[0], &columns).unwrap();
         assert!((found.sample_time_s - 0.01).abs() < 1e-5 && (found.jitter_s - 0.002).abs() < 2e-4);
-        // The row behind the one that stands still is two steps late.
+        // The row after the one that stays constant is two steps late.
         assert_eq!(
             (found.gaps, found.missing, found.not_increasing, found.repeated),
             (2, 4, 1, 1)

@@ -23,15 +23,15 @@ pub struct ValueSurvey {
     pub constant: bool,
     /// The step of a quantised column.
     pub quantum: Option<f64>,
-    /// Rows in which a saturated column stands at its smallest value.
+    /// Rows in which a saturated column is at its smallest value.
     pub saturated_low: usize,
-    /// Rows in which a saturated column stands at its largest value.
+    /// Rows in which a saturated column is at its largest value.
     pub saturated_high: usize,
     /// The course of the values in block characters.
     pub sketch: String,
 }
 
-/// The numbers of a column; none where no value is finite.
+/// The numbers of a column; none if no value is finite.
 pub(super) fn values(all: &[f64]) -> Option<ValueSurvey> {
     let finite: Vec<f64> = all.iter().copied().filter(|value| value.is_finite()).collect();
     let (min, max) = finite.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), v| {

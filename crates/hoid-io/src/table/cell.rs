@@ -1,8 +1,8 @@
-//! What the text of a cell means: a number, with a point or a comma, nothing, or something else.
+//! Meaning of the text of a cell: a number, with a point or a comma, nothing, or something else.
 
 use std::borrow::Cow;
 
-/// What stands in a cell.
+/// Contents of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Cell {
     /// A number, finite or infinite.
@@ -21,7 +21,7 @@ const MISSING: [&str; 16] = [
 ];
 
 impl Cell {
-    /// What the text of a cell means: empty, NaN and the words of [`MISSING`] are missing values.
+    /// Meaning of the text of a cell: empty, NaN and the words of [`MISSING`] are missing values.
     pub(crate) fn parse(text: &str) -> Self {
         let text = text.trim();
         match text.parse::<f64>() {

@@ -106,7 +106,7 @@ impl ColumnExpression {
             ([one], _) => Ok(*one),
             ([], splits) => {
                 // With one hyphen it is clear which of the two names is wrong; otherwise the text
-                // is named as it stands.
+                // is named unchanged.
                 let parts = match splits {
                     [(left, right)] => vec![*left, *right],
                     _ => vec![self.text.strip_prefix('-').unwrap_or(&self.text)],

@@ -1,8 +1,8 @@
-//! Columns of numbers as they stand in a file, before anything is chosen, checked or repaired.
+//! Columns of numbers as they are in a file, before anything is chosen, checked or repaired.
 //!
-//! Each format fills a [`Table`]; everything behind it (choice of columns, sampling, repair) is the
+//! Each format fills a [`Table`]; everything after it (choice of columns, sampling, repair) is the
 //! same for all formats. A value that is missing or no number is NaN here; the file is asked again
-//! what stood there only when an error has to say so, which keeps a million rows cheap.
+//! what was there only when an error has to report it, which keeps a million rows cheap.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -19,7 +19,7 @@ pub(crate) struct Column {
     pub(crate) name: String,
     /// Unit; empty when unknown.
     pub(crate) unit: String,
-    /// One value a row, NaN where there is no number.
+    /// One value a row, NaN if there is no number.
     pub(crate) values: Vec<f64>,
     /// Rows that hold text, in increasing order.
     pub(crate) texts: Vec<usize>,
@@ -35,7 +35,7 @@ pub(crate) trait Source {
     fn file(&self) -> &str;
     /// "line 12" or "row 12".
     fn place(&self, row: usize) -> String;
-    /// What stands in a cell, cut to a readable length.
+    /// Contents of a cell, cut to a readable length.
     fn cell(&self, row: usize, column: usize) -> String;
     /// Whether the file ends in the middle of this row, as far as can be seen.
     fn is_open(&self, _row: usize) -> bool {
@@ -47,7 +47,7 @@ pub(crate) trait Source {
 pub(crate) struct Table<'a> {
     pub(crate) columns: Vec<Column>,
     pub(crate) rows: usize,
-    /// Sample time that the file states beside its columns, s.
+    /// Sample time that the file states next to its columns, s.
     pub(crate) sample_time_s: Option<f64>,
     pub(crate) source: Box<dyn Source + 'a>,
     pub(crate) notes: Vec<String>,
@@ -76,7 +76,7 @@ impl Table<'_> {
         let found = self.source.cell(row, column);
         let is_last_cell = column + 1 == self.columns.len();
         let column = named(name);
-        // At the end of a file that is cut a sign or a point is the beginning of a number.
+        // At the end of a file that is cut a sign or a point is the start of a number.
         let begun = is_last_cell && self.source.is_open(row) && matches!(found.as_str(), "-" | ".");
         if begun || texts.binary_search(&row).is_ok() {
             let remedy = if has_decimal_comma(&found) {
@@ -123,7 +123,7 @@ impl Table<'_> {
 
 /// The remedy for a first row without numbers.
 pub(crate) const UNITS_ROW: &str =
-    "no column has a number there: where that line names the units, remove it and say them with --unit e=deg,u=deg";
+    "no column has a number there: where that line names the units, remove it and report them with --unit e=deg,u=deg";
 
 /// Checks that the names differ, and notes the columns without one.
 pub(crate) fn check_names(names: &[String], file: &str, notes: &mut Vec<String>) -> Result<(), IoError> {
@@ -144,7 +144,7 @@ pub(crate) fn check_names(names: &[String], file: &str, notes: &mut Vec<String>)
     Ok(())
 }
 
-/// Most columns of a table: a recording has some tens.
+/// Largest number of columns of a table: a recording has some tens.
 const MOST_COLUMNS: usize = 10_000;
 
 /// Checks the number of columns, before anything is made of them.

@@ -1,23 +1,23 @@
 //! The columns of a file of any format, before a record is made of them: what their cells mean, and
-//! which of them are asked for.
+//! which of them are requested.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `columns` | [`Table`]: the columns of a file, and why a value of them cannot be used |
 //! | `cell` | [`Cell`]: numbers with a point or a comma, the words for a missing value |
 //! | `precision` | [`Precision`]: how exactly a column is printed |
 //! | `column_expression` | [`ColumnExpression`]: which columns are the input and the output |
-//! | `usual_names` | error and control by the names that people give their columns |
+//! | `common_names` | error and control by the names that people give their columns |
 
 mod cell;
 pub(crate) mod column_expression;
 mod columns;
+mod common_names;
 mod precision;
-mod usual_names;
 
 pub(crate) use cell::{Cell, DECIMAL_COMMA, has_decimal_comma, with_decimal_point};
 pub use column_expression::ColumnExpression;
 pub(crate) use column_expression::Signal;
 pub(crate) use columns::{Column, Source, Table, UNITS_ROW, asides, check_names, check_number, kept};
+pub use common_names::{control_among, error_among};
 pub(crate) use precision::Precision;
-pub use usual_names::{control_among, error_among};

@@ -1,6 +1,6 @@
 //! How exactly the numbers of a column are printed.
 
-/// Most decimals of rounded times that are looked for: a µs.
+/// Most decimals of rounded times that are searched for: a µs.
 const MOST_DECIMALS: i32 = 6;
 
 /// How exactly a column of decimal numbers is printed.
@@ -13,7 +13,7 @@ pub(crate) struct Precision {
 }
 
 impl Precision {
-    /// That of binary numbers in single precision, seven digits.
+    /// The value for binary numbers in single precision, seven digits.
     pub(crate) fn single() -> Self {
         Self {
             decimals: Some(45),
@@ -21,10 +21,9 @@ impl Precision {
         }
     }
 
-    /// That of times in a file of binary numbers. A recorder that rounds what it saves, as to tenths of
-    /// a ms, leaves times that are all whole multiples of its last digit, and is known by that. The rest
-    /// of a rounded number is below two units of its last binary digit; as many digits as are looked
-    /// for here leave no such rest by chance.
+    /// The value for times in a file of binary numbers. A recorder that rounds its values, as to tenths of a ms, leaves
+    /// times that are all whole multiples of its last digit, and is known by that. The rest of a rounded number is
+    /// below two units of its last binary digit; as many digits as are searched for here leave no such rest by chance.
     pub(crate) fn of_times(values: &[f64], single: bool) -> Self {
         if single {
             return Self::single();
@@ -76,12 +75,12 @@ impl Precision {
         self.significant = self.significant.max(other.significant);
     }
 
-    /// Takes one more number with so many decimals into account.
+    /// Takes one more number with a given number of decimals into account.
     pub(crate) fn add_decimals(&mut self, decimals: usize) {
         self.decimals = Some(self.decimals.unwrap_or(0).max(decimals as i32));
     }
 
-    /// That of the same numbers times a power of ten.
+    /// The value for the same numbers times a power of ten.
     pub(crate) fn shifted(self, power: i32) -> Self {
         Self {
             decimals: self.decimals.map(|decimals| decimals - power),
@@ -126,7 +125,7 @@ mod tests {
         assert_eq!(precision(&["0", "1", "120"]).unit(3.0), 1.0);
         assert!(precision(&["0.30000000000000004"]).unit(0.3) < 1e-15);
         assert_eq!(Precision::default().unit(3.0), 0.0);
-        // Nothing that can stand in a file gives anything but a number of s.
+        // Nothing that can be in a file gives anything but a number of s.
         assert!(precision(&["1e-99999999999", ".", "-", "e"]).unit(1e300) >= 0.0);
     }
 

@@ -1,6 +1,6 @@
 //! The time of a recording: which column it is, what its numbers mean, and whether it is even.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `time_choice` | [`TimeChoice`]: the column and its unit as a person types them |
 //! | `time_column` | the time under another name, in another unit |

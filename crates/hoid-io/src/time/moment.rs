@@ -11,14 +11,14 @@ use crate::table::{Column, Precision};
 /// ns in a s.
 const NS_PER_S: i64 = 1_000_000_000;
 
-/// A moment and the digits behind the point of its seconds.
+/// A moment and the digits after the point of its seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Moment {
     ns: i64,
     decimals: usize,
 }
 
-/// The moment that a cell says; `None` where it is none. A date without a time is one of midnight.
+/// The moment that a cell states; `None` if it is none. A date without a time is one of midnight.
 fn parse(cell: &str) -> Option<Moment> {
     let cell = cell.trim();
     if !cell.starts_with(|c: char| c.is_ascii_digit()) || cell.len() > 40 {
@@ -38,7 +38,7 @@ fn parse(cell: &str) -> Option<Moment> {
     })
 }
 
-/// What the texts of a column are, row by row: moments as long as none is anything else.
+/// Definition of the texts of a column, row by row: moments as long as none is anything else.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum Moments {
     /// Only missing values so far.
@@ -51,7 +51,7 @@ pub(crate) enum Moments {
 }
 
 impl Moments {
-    /// Takes a cell that is text, and puts what it is worth behind the values of its column.
+    /// Takes a cell that is text, and puts its reliability after the values of its column.
     pub(crate) fn push(&mut self, column: &mut Column, cell: &str) {
         let moment = parse(cell).filter(|_| *self != Self::No);
         let row = column.values.len();
@@ -106,7 +106,7 @@ fn days_of(date: &str) -> Option<i64> {
         _ => (c, a, b),
     };
     let (year, month, day) = (year.len() == 4).then_some((number(year)?, number(month)?, number(day)?))?;
-    // With slashes the day may stand first.
+    // With slashes the day may be first.
     let (month, day) = if mark == '/' && month > 12 {
         (day, month)
     } else {

@@ -2,7 +2,7 @@
 //!
 //! `Ts = (t_last - t_first) / (N - 1)`, and each t must lie on the grid `t_first + k Ts` within the
 //! larger of `1e-3 Ts` and one unit of the last printed decimal of t: files print t rounded (0.0167
-//! at 60 Hz), and a rounded t is no uneven one. When `1 / Ts` is a whole number of Hz within
+//! at 60 Hz), and a rounded t is not an uneven one. When `1 / Ts` is a whole number of Hz within
 //! `1e-4`, or within the rounding of t, it is taken as that number, so that runs of one laboratory
 //! have one sample time.
 
@@ -55,7 +55,7 @@ pub fn even_times(t: &[f64]) -> Result<f64, usize> {
     }
 }
 
-/// The sample time of an even t. A sample time that the file states beside its columns counts when
+/// The sample time of an even t. A sample time that the file states next to its columns counts when
 /// t agrees with it.
 pub(crate) fn even(t: &[f64], precision: Precision, stated_s: Option<f64>) -> Result<Sampling, Uneven> {
     let (&[first, .., last], steps) = (t, t.len().saturating_sub(1) as f64) else {
@@ -149,13 +149,13 @@ impl Rounding {
     }
 
     /// One unit of the last digit of t, but no more than the median step: a t coarser than that
-    /// would have stood still.
+    /// would have stayed constant.
     fn unit(self, t: f64) -> f64 {
         self.precision.unit(t).min(self.median_step_s)
     }
 }
 
-/// The mean of the steps that are no gaps: of those below 1.5 times the median step, plus one unit
+/// The mean of the steps that are not gaps: of those below 1.5 times the median step, plus one unit
 /// for the rounding of t.
 fn typical_step(t: &[f64], rounding: Rounding) -> f64 {
     let median = rounding.median_step_s;
@@ -214,7 +214,7 @@ mod tests {
         assert_eq!(even_times(&[0.0]), Err(0));
     }
 
-    /// Times as a file with so many decimals prints them.
+    /// Times as a file with a given number of decimals prints them.
     fn printed(times: impl Iterator<Item = f64>, decimals: usize) -> (Vec<f64>, Precision) {
         let mut precision = Precision::default();
         let t = times

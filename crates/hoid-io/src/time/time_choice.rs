@@ -14,7 +14,7 @@ pub(super) enum Unit {
     Hours,
     /// Dates and times of a clock.
     Iso,
-    /// Whole seconds, and nanoseconds in a column beside.
+    /// Whole seconds, and nanoseconds in a column alongside.
     SecondsAndNanoseconds,
 }
 
@@ -80,7 +80,7 @@ impl FromStr for TimeChoice {
                 None if unit.starts_with([')', ',', ']']) => (text, None),
                 None => {
                     return Err(refuse(
-                        "expected the column of the time, and behind a colon s, ms, us, ns, min, h, iso or sec+nanosec",
+                        "expected the column of the time, and after a colon s, ms, us, ns, min, h, iso or sec+nanosec",
                     ));
                 }
             },

@@ -6,13 +6,12 @@
 //! 2. the only one that holds stamps: dates and times of a clock in text or as such, or numbers that
 //!    count from 1970 in a column `timestamp`, `header.stamp`;
 //! 3. whole seconds with nanoseconds in the next column: `stamp.sec`, `stamp.nanosec`;
-//! 4. a first column without a name, or the first line of a matrix, that increases from row to row
-//!    and is no row number.
+//! 4. a first column without a name, or the first line of a matrix, that increases from row to row and is not a row
+//!    number.
 //!
-//! `--time COLUMN[:unit]` wins over all of them. A unit is that of the name; else that of the size of
-//! numbers that count from 1970 (1e11 s would be the year 5138); else that of the steps: whole numbers
-//! at least 5 apart are no s but the unit in which 2 to 2000 of them are in a second. What is taken
-//! is said.
+//! `--time COLUMN[:unit]` wins over all of them. A unit is that of the name; else that of the size of numbers that
+//! count from 1970 (1e11 s would be the year 5138); else that of the steps: whole numbers at least 5 apart are not s
+//! but the unit in which 2 to 2000 of them are in a second. What is taken is reported.
 
 use super::time_choice::{TimeChoice, Unit};
 use crate::IoError;
@@ -41,15 +40,15 @@ const WORDS: [&str; 9] = [
 /// Words for a moment, which may as well be the time of day, or a count.
 const STAMPS: [&str; 5] = ["timestamp", "stamp", "datetime", "date time", "date"];
 
-/// What a name says about a column.
+/// Statement of a name about a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Meaning {
+enum ColumnRole {
     Time(Option<Unit>),
     Stamp,
     Other,
 }
 
-fn meaning(name: &str) -> Meaning {
+fn column_role(name: &str) -> ColumnRole {
     let name = name.trim().trim_start_matches(['%', '#']).to_lowercase();
     let words: Vec<&str> = name
         .split([' ', '_', '-', '.', ',', '/', '(', ')', '[', ']'])
@@ -59,18 +58,18 @@ fn meaning(name: &str) -> Meaning {
     let unit = unit.filter(|unit| !matches!(unit, Unit::Iso | Unit::SecondsAndNanoseconds));
     let base = words[..words.len() - usize::from(unit.is_some())].join(" ");
     if WORDS.contains(&base.as_str()) {
-        return Meaning::Time(unit);
+        return ColumnRole::Time(unit);
     }
     match (words.last(), unit) {
-        _ if STAMPS.contains(&base.as_str()) && unit.is_some() => Meaning::Time(unit),
-        (Some(last), None) if STAMPS.contains(last) || STAMPS.contains(&base.as_str()) => Meaning::Stamp,
-        _ => Meaning::Other,
+        _ if STAMPS.contains(&base.as_str()) && unit.is_some() => ColumnRole::Time(unit),
+        (Some(last), None) if STAMPS.contains(last) || STAMPS.contains(&base.as_str()) => ColumnRole::Stamp,
+        _ => ColumnRole::Other,
     }
 }
 
 /// Whether the values of a column may become the time.
 pub(crate) fn is_time(name: &str) -> bool {
-    meaning(name) != Meaning::Other
+    column_role(name) != ColumnRole::Other
 }
 
 /// The table with a column t in s, where it has one column that is a time or was named as such.
@@ -87,7 +86,7 @@ pub(crate) fn with_time<'a>(mut table: Table<'a>, choice: Option<&TimeChoice>) -
     if let Some((at, unit)) = found {
         take(&mut table, at, unit);
     }
-    // Moments that are not the time are no numbers.
+    // Moments that are not the time are not numbers.
     for column in table.columns.iter_mut().filter(|column| column.moments) {
         column.values.fill(f64::NAN);
         column.texts = (0..table.rows).collect();
@@ -95,7 +94,7 @@ pub(crate) fn with_time<'a>(mut table: Table<'a>, choice: Option<&TimeChoice>) -
     Ok(table)
 }
 
-/// The column that was asked for.
+/// The column that was requested.
 fn chosen(table: &Table<'_>, choice: &TimeChoice) -> Result<(usize, Option<Unit>), IoError> {
     let position = |name: &str| table.columns.iter().position(|column| column.name == name);
     let unit = choice.unit;
@@ -137,15 +136,15 @@ fn found(table: &Table<'_>) -> Option<(usize, Option<Unit>)> {
     let columns = &table.columns;
     let is_constant = |column: &Column| column.values.iter().all(|value| *value == column.values[0]);
     let of = |meant: &dyn Fn(&Column) -> bool| only((0..columns.len()).filter(|at| meant(&columns[*at])));
-    let unit = |at: usize| match meaning(&columns[at].name) {
-        Meaning::Time(unit) => unit,
-        Meaning::Stamp | Meaning::Other => None,
+    let unit = |at: usize| match column_role(&columns[at].name) {
+        ColumnRole::Time(unit) => unit,
+        ColumnRole::Stamp | ColumnRole::Other => None,
     };
-    let by_name = || of(&|column| matches!(meaning(&column.name), Meaning::Time(_)) && column.texts.is_empty());
+    let by_name = || of(&|column| matches!(column_role(&column.name), ColumnRole::Time(_)) && column.texts.is_empty());
     let by_type = || of(&|column| column.moments && !is_constant(column));
     let by_stamp = || {
         of(&|column| {
-            meaning(&column.name) == Meaning::Stamp
+            column_role(&column.name) == ColumnRole::Stamp
                 && column.values.iter().all(|value| *value >= STAMP || value.is_nan())
         })
     };
@@ -302,7 +301,7 @@ fn take(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
             format!("{name} is {taken}in s{origin}, from {unit}")
         }
     };
-    // What is in s, as t is, needs no unit.
+    // Contents of s, as t is, needs no unit.
     time.unit = String::from(if unit == Unit::Power(0) { "" } else { "s" });
     table
         .notes
@@ -316,7 +315,7 @@ mod tests {
 
     #[test]
     fn names_of_times_and_their_units() {
-        use Meaning::{Other, Stamp, Time};
+        use ColumnRole::{Other, Stamp, Time};
         let power = |power| Time(Some(Unit::Power(power)));
         for (name, meant) in [
             ("t", Time(None)),
@@ -341,7 +340,7 @@ mod tests {
             ("s", Other),
             ("", Other),
         ] {
-            assert_eq!(meaning(name), meant, "{name}");
+            assert_eq!(column_role(name), meant, "{name}");
         }
     }
 

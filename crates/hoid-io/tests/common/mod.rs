@@ -29,7 +29,7 @@ impl Desk {
         read_record(&path, options)
     }
 
-    /// What is said of a file with this text, which must name it.
+    /// Report about a file with this text, which must name it.
     pub fn error(&self, text: impl AsRef<[u8]>, options: &ReadOptions) -> String {
         let message = self.read(text, options).unwrap_err().to_string();
         assert!(message.contains("run.csv"), "{message}");

@@ -1,4 +1,4 @@
-//! A run as the server has it: sent, begun, taken batch by batch, ended.
+//! A run as the server has it: sent, started, taken batch by batch, ended.
 
 use std::{collections::BTreeMap, sync::Arc, thread};
 
@@ -10,7 +10,7 @@ use crate::{
     live::{LiveRun, Samples, start},
     record::record,
     reports,
-    session::{Batch, Begun, How, Logged, RunLog, Session},
+    session::{Batch, How, Logged, RunLog, RunStart, Session},
     task::{TICKS_PER_SAMPLE, Task},
     utc,
     verify::Measures,
@@ -20,7 +20,7 @@ use crate::{
 impl Shared {
     pub(super) fn send_run(&self, state: &mut Current, id: u64) -> Result<(), LabError> {
         if state.run.is_some() {
-            return Err(LabError::Order("a run goes on".to_owned()));
+            return Err(LabError::Order("a run continues".to_owned()));
         }
         let session = session_of(state)?;
         let Some(planned) = session.next() else {
@@ -90,7 +90,7 @@ impl Shared {
         let plan = &session.facts.plan[planned];
         let condition = session.facts.config.condition[plan.condition].clone();
         let stem = session.stem(&condition.name, number);
-        let begun = Begun {
+        let begun = RunStart {
             hoid: env!("CARGO_PKG_VERSION").to_owned(),
             number,
             planned,
@@ -184,7 +184,7 @@ impl Shared {
         Ok(())
     }
 
-    /// Ends the run that goes on, if one does.
+    /// Ends the run that continues, if one does.
     pub(super) fn end_run(
         &self,
         state: &mut Current,
@@ -204,7 +204,7 @@ impl Shared {
         Ok(())
     }
 
-    /// Writes what stands behind a run: first its record, so that a run that was told as verified has one.
+    /// Writes the end of a run: first its record, so that a run that was reported as verified has one.
     fn close(
         &self,
         state: &mut Current,
@@ -257,7 +257,7 @@ impl Shared {
     }
 }
 
-/// What the disk does not take cannot be verified: the run is over, and the session goes on.
+/// A run that cannot be written cannot be verified: it ends, and the session continues.
 fn not_taken(error: LabError) -> LabError {
     let what = match &error {
         LabError::File { file, source } => format!("{file}: {source}"),
@@ -265,7 +265,7 @@ fn not_taken(error: LabError) -> LabError {
         _ => return error,
     };
     LabError::Order(format!(
-        "{what}. The run was ended and does not count; make room on the disk and begin it again"
+        "{what}. The run was ended and does not count; make room on the disk and start it again"
     ))
 }
 

@@ -1,4 +1,4 @@
-//! What the pages are told: how the session stands, and the live estimate.
+//! Report of the pages are: the state of the session, and the live estimate.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ use crate::{
 impl Shared {
     /// Sends to the pages that `wants` picks.
     pub(super) fn tell(&self, message: &ToPage<'_>, wants: impl Fn(u64, &Page) -> bool) {
-        // Everything that is said can be written as JSON.
+        // Everything that is reported can be written as JSON.
         let Ok(text) = serde_json::to_string(message) else {
             return;
         };
@@ -36,7 +36,7 @@ impl Shared {
         });
     }
 
-    /// Sessions that can go on, as `sub-P01/ses-01`.
+    /// Sessions that can be resumed, as `sub-P01/ses-01`.
     pub(super) fn open_sessions(&self) -> Vec<String> {
         if self.mode != Mode::Sessions {
             return Vec::new();

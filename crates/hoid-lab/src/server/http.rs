@@ -7,14 +7,14 @@ use std::{
 
 /// Longest head of a request, bytes.
 const LONGEST: usize = 16 * 1024;
-/// Most lines of a head.
+/// Largest number of lines of a head.
 const MOST_LINES: usize = 64;
 
-/// What of a request matters here.
+/// The used parts of a request.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Request {
     pub method: String,
-    /// Without what is behind a question mark.
+    /// Without the query.
     pub path: String,
     pub host: Option<String>,
     pub origin: Option<String>,
@@ -32,7 +32,7 @@ impl Request {
         Some(Self::parse(head).ok_or_else(|| Reply::refused(400, "not a request of HTTP")))
     }
 
-    /// The token that it shows, and the path behind it.
+    /// The token that it shows, and the path after it.
     pub fn token(&self) -> (&str, &str) {
         let path = self.path.trim_start_matches('/');
         path.split_once('/').unwrap_or((&self.path, ""))
@@ -46,7 +46,7 @@ impl Request {
         }
         let path = parsed.path?.split('?').next()?.to_owned();
         let method = parsed.method?.to_owned();
-        // A header that stands there twice is nobody's honest one.
+        // A header that is duplicated belongs to no person honest one.
         let header = |name: &str| {
             let mut all = parsed.headers.iter().filter(|h| h.name.eq_ignore_ascii_case(name));
             let value = std::str::from_utf8(all.next()?.value).ok()?.trim().to_owned();
@@ -99,7 +99,7 @@ impl Reply {
         }
     }
 
-    /// A refusal in words.
+    /// A refusal as text.
     pub fn refused(status: u16, words: &str) -> Self {
         Self {
             status,

@@ -1,9 +1,9 @@
 //! Those who have not shown the token: one thread for all of them, that never waits for any.
 //!
-//! While there are none it waits for the next one. Else it takes what comes, looks at each once
-//! (a head that is whole, one that is too long or too late, a peer that is gone), and pauses for [`PAUSE`] where
-//! nothing has happened. Who has come is looked at before anybody gives way: so the page, whose head comes at once,
-//! is heard however many others come and go, and the oldest of [`MOST`] that say nothing is closed for the next.
+//! While there are none it waits for the next one. Else it takes what comes, looks at each once (a head that is whole,
+//! one that is too long or too late, a peer that is gone), and pauses for [`PAUSE`] where nothing has happened. Who has
+//! come is examined before anyone gives way: so the page, whose head comes at once, is heard however many others come
+//! and go, and the oldest of [`MOST`] that carry no information is closed for the next.
 
 use std::{
     collections::VecDeque,
@@ -15,7 +15,7 @@ use std::{
 
 use super::http::{Reply, Request};
 
-/// Most of them at once, and those that are taken before all are looked at.
+/// Most of them at once, and those that are taken before all are examined.
 const MOST: usize = 256;
 const AT_ONCE: usize = 64;
 /// Longest time that the head of a request may take to come, all of it.
@@ -31,7 +31,7 @@ struct Stranger {
     came: Instant,
 }
 
-/// What is known of a stranger after a look.
+/// Known properties of a stranger after a look.
 enum Look {
     Waits,
     Gone,
@@ -60,13 +60,13 @@ impl Stranger {
     }
 }
 
-/// Receives for as long as the program runs; `admitted` takes a request with its connection, or says why not.
+/// Receives for as long as the program runs; `admitted` takes a request with its connection, or gives the reason not.
 pub fn receive(listener: &TcpListener, mut admitted: impl FnMut(Request, TcpStream) -> Result<(), (Reply, TcpStream)>) {
     let mut all: VecDeque<Stranger> = VecDeque::new();
     loop {
         let mut idle = match take(listener, &mut all) {
             Ok(came) => came == 0,
-            // No descriptor is left: who says nothing makes room.
+            // No descriptor is left: who carries no information makes room.
             Err(_) => {
                 drop(all.pop_front());
                 thread::sleep(BACK_OFF);

@@ -1,5 +1,5 @@
-//! The socket of a page: what it says goes to the lab, what the lab says goes to it. One thread does
-//! both: it waits for the page a hundredth of a second at a time.
+//! The socket of a page: what it reports goes to the lab, what the lab reports goes to it. One
+//! thread does both: it waits for the page a hundredth of a second at a time.
 
 use std::{
     io::{ErrorKind, Write as _},

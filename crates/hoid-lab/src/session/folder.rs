@@ -24,7 +24,7 @@ pub(super) fn check_subject(subject: &str) -> Result<(), LabError> {
     )))
 }
 
-/// What the names of all files of a run begin with.
+/// Common start of the names of all files of a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Stem {
     folder: PathBuf,
@@ -32,7 +32,7 @@ pub struct Stem {
 }
 
 impl Stem {
-    /// Of the run with this number in a session.
+    /// For the run with this number in a session.
     pub fn new(folder: &Path, subject: &str, session: usize, condition: &str, number: usize) -> Self {
         Self {
             folder: folder.to_owned(),
@@ -55,7 +55,7 @@ impl Stem {
         self.folder.join("reports").join(&self.stem)
     }
 
-    /// All runs of a folder that have begun, by their number.
+    /// All runs of a folder that have started, by their number.
     ///
     /// # Errors
     /// [`LabError::Io`].

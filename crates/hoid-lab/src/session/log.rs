@@ -1,4 +1,4 @@
-//! What is appended while a run goes on: a journal, of which each line is whole or not there.
+//! Journal of a run in progress: each line is complete or absent.
 //!
 //! A line is whole with its end. A batch that cannot be written to its end is taken back: the files
 //! are cut to the last whole batch, and its ticks count only once all three have them. A disk that
@@ -18,7 +18,7 @@ use std::{
 
 use serde::Deserialize;
 
-use super::{begun::APPENDED, folder::Stem};
+use super::{folder::Stem, run_start::APPENDED};
 use crate::LabError;
 
 /// Longest time until the disk has what was appended.
@@ -34,7 +34,7 @@ pub struct Event {
     pub stamp_ms: f64,
     /// When the page had it, ms from tick 0.
     pub handled_ms: f64,
-    /// What the device said.
+    /// Report of the device.
     pub raw: f64,
 }
 
@@ -74,7 +74,7 @@ impl From<(f64, f64, f64, f64)> for Frame {
     }
 }
 
-/// What a page sends at once.
+/// One message of a page.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Batch {
@@ -90,7 +90,7 @@ pub struct Batch {
     pub frames: Vec<Frame>,
 }
 
-/// The files of a run that goes on.
+/// The files of a run that continues.
 #[derive(Debug)]
 pub struct RunLog {
     files: [(PathBuf, File); 3],
@@ -105,7 +105,7 @@ impl RunLog {
     /// Makes the files with their headers.
     ///
     /// # Errors
-    /// [`LabError::File`]; a file that is there already is not written over.
+    /// [`LabError::File`]; a file that is already present is not written over.
     pub fn create(stem: &Stem, ticks: usize) -> Result<Self, LabError> {
         let headers = [
             "tick,u,e\n",
@@ -128,7 +128,7 @@ impl RunLog {
         })
     }
 
-    /// Whether a batch continues what is logged; the tick behind its last.
+    /// Whether a batch continues the log; the tick after its last.
     ///
     /// # Errors
     /// [`LabError::Message`] for one that does not continue the last one or is beyond the end.
@@ -149,7 +149,7 @@ impl RunLog {
     /// Appends a batch, all of it or nothing.
     ///
     /// # Errors
-    /// Those of [`RunLog::continued_by`]; [`LabError::File`], behind which the files hold the batches before.
+    /// The errors of [`RunLog::continued_by`]; [`LabError::File`], after which the files hold the batches before.
     pub fn append(&mut self, batch: &Batch) -> Result<(), LabError> {
         let end = self.continued_by(batch)?;
         let mut texts = [String::new(), String::new(), String::new()];
@@ -242,7 +242,7 @@ mod tests {
         assert!(log.append(&batch(10)).unwrap_err().to_string().contains("frames.csv"));
         assert_eq!(log.ticks(), 10);
         assert_eq!(std::fs::read(stem.file("ticks.csv")).unwrap(), before);
-        // Once there is room it goes on where it was.
+        // Once there is room it continues where it was.
         log.files[2].1 = frames;
         log.append(&batch(10)).unwrap();
         assert_eq!(log.ticks(), 20);

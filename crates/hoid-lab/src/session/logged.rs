@@ -1,4 +1,4 @@
-//! What was appended, read back.
+//! The journal, read back.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use crate::{LabError, task::Signals};
 /// The log of a run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Logged {
-    /// The number of each tick, as it stands there.
+    /// The number of each tick, as it is there.
     pub numbers: Vec<f64>,
     /// u and e of each.
     pub signals: Signals,
@@ -19,16 +19,16 @@ pub struct Logged {
     pub events: Vec<Event>,
     /// Frames.
     pub frames: Vec<Frame>,
-    /// What is wrong with the files.
+    /// Problems with the files.
     pub faults: Vec<String>,
 }
 
 impl Logged {
-    /// Reads it, as far as it is whole: to the end of the last line, in the words of a line that is none,
-    /// and nothing of a file that is not there, which says so in `faults`.
+    /// Reads it, as far as it is whole: to the end of the last line, in the words of a line that is invalid, and
+    /// nothing of a file that does not exist, which reports it in `faults`.
     ///
     /// # Errors
-    /// [`LabError::Io`] for what the system says of a file that is there.
+    /// [`LabError::Io`] for errors that the operating system reports of a file that is there.
     pub fn read(stem: &Stem) -> Result<Self, LabError> {
         let mut logged = Self::default();
         let mut faults = Vec::new();
@@ -48,15 +48,15 @@ impl Logged {
     }
 }
 
-/// Calls `each` with the numbers of every whole line behind the header, up to one that is none; what is
-/// wrong with the file, if something is.
+/// Calls `each` with the numbers of every whole line after the header, up to one that is invalid; the problems of the
+/// file, if something is.
 fn rows<const N: usize>(path: &Path, mut each: impl FnMut([f64; N])) -> Result<Option<String>, LabError> {
     let name = || {
         path.file_name()
             .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
     };
     if !path.exists() {
-        return Ok(Some(format!("{} is not there", name())));
+        return Ok(Some(format!("{} is missing", name())));
     }
     let bytes = hoid_io::read_bytes(path)?;
     let whole = whole_lines(&bytes);

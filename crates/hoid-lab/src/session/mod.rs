@@ -19,22 +19,22 @@
 //! each second. What is written at once is whole or not there. A folder therefore shows at any
 //! instant how far the session is: a run without `end.json` was interrupted.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `folder` | the names of files and folders |
-//! | `begun` | [`Begun`]: what is known before a run; [`Ended`]: what is known behind it |
+//! | `run_start` | [`RunStart`]: what is known before a run; [`Ended`]: what is known after it |
 //! | `log` | [`RunLog`]: what is appended |
 //! | `logged` | [`Logged`]: what was appended, read back |
 //! | `state` | [`Session`]: the session as a whole |
 
-mod begun;
 mod folder;
 mod log;
 mod logged;
+mod run_start;
 mod state;
 
-pub use begun::{Begun, Ended, How, digest};
 pub use folder::{Stem, session_folder};
 pub use log::{Batch, Event, Frame, RunLog};
 pub use logged::Logged;
+pub use run_start::{Ended, How, RunStart, digest};
 pub use state::{Done, Facts, Session};

@@ -1,4 +1,4 @@
-//! The session as a whole: what is planned, what is done, and how it goes on after whatever ended it.
+//! The session as a whole: what is planned, what is done, and how it continues after whatever ended it.
 
 use std::{
     collections::BTreeMap,
@@ -10,9 +10,9 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use super::{
-    begun::{APPENDED, Begun, Ended, How},
     folder::{Stem, check_subject, session_folder},
     log::{RunLog, whole_lines},
+    run_start::{APPENDED, Ended, How, RunStart},
 };
 use crate::{
     LabError,
@@ -31,7 +31,7 @@ fn is_session(folder: &Path) -> bool {
     [FACTS, FACTS_AGAIN].iter().any(|name| folder.join(name).exists())
 }
 
-/// What `lab.toml` of a session holds.
+/// Contents of `lab.toml` in a session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Facts {
@@ -41,18 +41,18 @@ pub struct Facts {
     pub subject: String,
     /// Which session of this person, from 1.
     pub session: usize,
-    /// When it began, in UTC.
+    /// When it started, in UTC.
     pub began: String,
     /// That the consent was confirmed, and when.
     pub consent: String,
-    /// `CC0-1.0` where the person gives the data away; empty otherwise.
+    /// `CC0-1.0` if the person gives the data away; empty otherwise.
     pub licence: String,
     /// Row of the Latin square.
     pub row: usize,
     /// True when all runs are done.
     #[serde(default)]
     pub finished: bool,
-    /// Browser and screen, as the page tells them.
+    /// Browser and screen, as the page reports them.
     #[serde(default)]
     pub browser: BTreeMap<String, String>,
     /// All runs that are to be.
@@ -97,7 +97,7 @@ pub struct Done {
     pub verdict: String,
     /// Why not.
     pub reasons: String,
-    /// What is worth knowing besides.
+    /// Additional notes.
     pub notes: String,
     /// Root mean square of e.
     pub rms_e: f64,
@@ -110,17 +110,17 @@ pub struct Done {
 pub struct Session {
     /// The folder.
     pub folder: PathBuf,
-    /// What its `lab.toml` holds.
+    /// Contents of its `lab.toml`.
     pub facts: Facts,
     /// The runs that ended, in their order.
     pub done: Vec<Done>,
 }
 
 impl Session {
-    /// Begins a session of a person who has confirmed the consent.
+    /// Starts a session of a person who has confirmed the consent.
     ///
     /// # Errors
-    /// [`LabError::Order`] for a pseudonym that is none; those of files.
+    /// [`LabError::Order`] for a pseudonym that is invalid; those of files.
     pub fn begin(out: &Path, config: &Config, subject: &str, cc0: bool) -> Result<Self, LabError> {
         check_subject(subject)?;
         hoid_io::make_directory(out)?;
@@ -162,7 +162,7 @@ impl Session {
             if session.done.iter().any(|done| done.number == number) {
                 continue;
             }
-            if Begun::read(&stem).is_err() {
+            if RunStart::read(&stem).is_err() {
                 session.lost(number, &stem)?;
             } else if Ended::read(&stem).is_ok_and(|ended| ended.is_some()) {
                 session.note(&stem, &check(&stem)?)?;
@@ -178,7 +178,7 @@ impl Session {
     /// # Errors
     /// [`LabError::Damaged`].
     pub fn read(folder: &Path) -> Result<Self, LabError> {
-        // What the copy says is taken only where the file says nothing: it is one change behind at most.
+        // What the copy shows is taken only where the file carries no information: it is one change behind at most.
         let facts = match Facts::read(&folder.join(FACTS)) {
             Ok(facts) => facts,
             Err(damaged) => Facts::read(&folder.join(FACTS_AGAIN)).map_err(|_| damaged)?,
@@ -229,7 +229,7 @@ impl Session {
     /// Ends a run: seals its files, checks it and writes down what came out.
     ///
     /// # Errors
-    /// Those of files.
+    /// The errors of files.
     pub fn end(&mut self, stem: &Stem, how: How, counted: BTreeMap<String, f64>) -> Result<Checked, LabError> {
         if !APPENDED.iter().any(|end| stem.file(end).exists()) {
             // It was ended before its first tick.
@@ -253,7 +253,7 @@ impl Session {
 
     /// Appends a run that has ended to `runs.csv`.
     fn note(&mut self, stem: &Stem, checked: &Checked) -> Result<(), LabError> {
-        let begun = Begun::read(stem)?;
+        let begun = RunStart::read(stem)?;
         let done = Done {
             number: begun.number,
             planned: begun.planned,
@@ -292,7 +292,7 @@ impl Session {
         })
     }
 
-    /// Appends a line, whole or not at all, behind the last whole one.
+    /// Appends a line, whole or not at all, after the last whole one.
     fn write_down(&mut self, done: Done) -> Result<(), LabError> {
         let path = self.folder.join("runs.csv");
         let whole = if path.exists() {
@@ -337,7 +337,7 @@ impl Session {
     }
 }
 
-/// The directories in one whose names begin so, sorted.
+/// The directories in one whose names start so, sorted.
 fn directories(of: &Path, prefix: &str) -> Result<Vec<PathBuf>, LabError> {
     if !of.exists() {
         return Ok(Vec::new());

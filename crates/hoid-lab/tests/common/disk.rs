@@ -11,7 +11,7 @@ use std::{
 pub struct Disk<'a>(&'a Path);
 
 impl<'a> Disk<'a> {
-    /// None where none can be mounted.
+    /// None if none can be mounted.
     pub fn mount(at: &'a Path, kilobytes: usize) -> Option<Self> {
         let size = format!("size={kilobytes}k");
         let mount = Command::new("mount")
@@ -39,7 +39,7 @@ pub fn fill(ballast: &Path) {
     }
 }
 
-/// All that stands there, elsewhere.
+/// All that is there, elsewhere.
 pub fn copied(from: &Path, to: &Path) {
     fs::create_dir_all(to).unwrap();
     for entry in fs::read_dir(from).unwrap().map(Result::unwrap) {

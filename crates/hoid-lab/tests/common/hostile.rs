@@ -1,5 +1,5 @@
-//! What nobody says to a lab, files of sessions as nobody wrote them, and trackers restored from numbers that were changed
-//! and sealed again: each has an answer, and none panics, not even where it is caught.
+//! What no one reports to a lab, files of sessions as no one wrote them, and trackers restored from numbers that were
+//! changed and sealed again: each has an answer, and none panics, not even where it is caught.
 //!
 //! Case `k` of a seed is the same on every machine.
 #![allow(clippy::unwrap_used)]
@@ -58,7 +58,7 @@ const EXTREMES: [f64; 16] = [
     f64::NEG_INFINITY,
 ];
 
-/// The same, and what is no number, as JSON has them.
+/// The same, and a value that is not a number, as JSON has them.
 fn extreme(draw: &mut Draw) -> Value {
     match draw.below(12) {
         0 => Value::Null,
@@ -167,14 +167,14 @@ impl Hostile {
             if draw.below(8) == 0 {
                 bytes(&mut text, draw);
             }
-            // What is no message ends at the door.
+            // What is not a message ends at the door.
             if let Ok(message) = serde_json::from_slice::<FromPage>(&text) {
                 let _ = self.person.lab.hear(self.person.page, message);
             }
         }
     }
 
-    /// A session one file of which is another, opened, judged and shown.
+    /// A session with one changed file, opened, judged and shown.
     fn damaged(&mut self, draw: &mut Draw) {
         let at = self.directory.path().join("damaged/sub-P01/ses-01");
         let _ = fs::remove_dir_all(&at);
@@ -233,9 +233,9 @@ impl Hostile {
         let Some((options, _)) = self.trackers.get(which) else {
             if let Some(warm_up) = WarmUp::restored(sample_time, &numbers) {
                 let mut live = Live::Collecting(warm_up);
-                let usual = TrackOptions::usual(Method::adaptive(), 29);
+                let default = TrackOptions::default_for(Method::adaptive(), 29);
                 for k in from..from + SAMPLES {
-                    live.update(sample(k), &|_| Ok((usual.clone(), None)));
+                    live.update(sample(k), &|_| Ok((default.clone(), None)));
                 }
                 live.saved();
             }
@@ -268,7 +268,7 @@ fn saved(record: &Record) -> (Vec<(TrackOptions, Vec<f64>)>, Vec<f64>) {
             .with(&[("track_delay", "0.2..0.35")])
             .unwrap(),
         of(hoid_survey::multiple_model()),
-        TrackOptions::usual(Method::adaptive(), 29)
+        TrackOptions::default_for(Method::adaptive(), 29)
             .with(&[("replay", "5")])
             .unwrap(),
         of(hoid_survey::ekf()),
@@ -289,10 +289,10 @@ fn saved(record: &Record) -> (Vec<(TrackOptions, Vec<f64>)>, Vec<f64>) {
         let numbers = tracker.saved();
         (options, numbers)
     };
-    let usual = of(hoid_survey::physical());
-    let mut live = Live::new(&usual, 2000, record.sample_time()).unwrap();
+    let default = of(hoid_survey::physical());
+    let mut live = Live::new(&default, 2000, record.sample_time()).unwrap();
     for k in 0..100 {
-        live.update(sample(k), &|_| Ok((usual.clone(), None)));
+        live.update(sample(k), &|_| Ok((default.clone(), None)));
     }
     (all.into_iter().map(run).collect(), live.saved().1)
 }

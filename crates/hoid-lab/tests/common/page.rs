@@ -43,7 +43,7 @@ impl Engine {
         writeln!(self.input, "{question}").unwrap();
         let mut line = String::new();
         self.output.read_line(&mut line).unwrap();
-        serde_json::from_str(&line).unwrap_or_else(|error| panic!("the engine said {line:?}: {error}"))
+        serde_json::from_str(&line).unwrap_or_else(|error| panic!("the engine reported {line:?}: {error}"))
     }
 }
 
@@ -64,7 +64,7 @@ impl Generator {
     }
 }
 
-/// A run of random plant, tables and events through the page; true where every bit is that of Rust.
+/// A run of random plant, tables and events through the page; true if every bit is that of Rust.
 pub fn same_bits(engine: &mut Engine, seed: u32) -> bool {
     let mut own = Generator(seed ^ 0x5bd1_e995);
     let mut any = |low: f64, high: f64| low + (high - low) * (own.next() + 0.5);

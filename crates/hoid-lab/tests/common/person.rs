@@ -22,7 +22,7 @@ pub struct Person {
 }
 
 impl Person {
-    /// Who has said yes.
+    /// Who has agreed.
     pub fn begin(out: &Path, config: Config) -> Self {
         let lab = Lab::open(out, config, Mode::Sessions, None).unwrap();
         let (sender, heard) = channel();
@@ -44,7 +44,7 @@ impl Person {
         self.lab.hear(self.page, message).map_err(|error| error.to_string())
     }
 
-    /// Begins the next run, which has this number.
+    /// Starts the next run, which has this number.
     pub fn next(&mut self, number: usize) -> Result<(), String> {
         self.say(json!({"type": "next"}))?;
         let tables = self.heard.try_iter().filter_map(|outgoing| match outgoing {
@@ -67,7 +67,7 @@ impl Person {
         self.say(json!({"type": "finish", "number": number}))
     }
 
-    /// How the session stands, as the page was told last.
+    /// State of the session, as the page was reported last.
     pub fn state(&self) -> Value {
         let states = self.heard.try_iter().filter_map(|outgoing| match outgoing {
             Outgoing::Text(text) => serde_json::from_str::<Value>(&text).ok(),

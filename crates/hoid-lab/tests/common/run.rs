@@ -1,18 +1,18 @@
-//! A run of a session as its page begins it.
+//! A run of a session as its page starts it.
 
 use hoid_lab::{
     config::Limits,
     plant::InputMap,
-    session::{Begun, Session},
+    session::{RunStart, Session},
     task::Task,
 };
 
 /// The next run, under a number.
-pub fn begun(session: &Session, number: usize, input: InputMap) -> Option<(Begun, Task)> {
+pub fn begun(session: &Session, number: usize, input: InputMap) -> Option<(RunStart, Task)> {
     let planned = session.next()?;
     let condition = session.facts.config.condition[0].clone();
     let task = Task::new(&condition, 0, number as u64).ok()?;
-    let begun = Begun {
+    let begun = RunStart {
         hoid: "test".to_owned(),
         number,
         planned,

@@ -4,9 +4,9 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::ContinuousTransferFunction;
 
-/// The system behind a hold with a delay of a `fraction` of a sample, by ascending powers of
-/// `z^-1`; a fraction other than zero makes the numerator one longer. `None` when the matrix
-/// exponential is not finite.
+/// The system after a hold with a delay of a `fraction` of a sample, by ascending powers of `z^-1`;
+/// a fraction other than zero makes the numerator one longer. `None` when the matrix exponential is
+/// not finite.
 pub(super) fn hold(
     h: &ContinuousTransferFunction,
     ts: f64,

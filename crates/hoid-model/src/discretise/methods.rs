@@ -33,8 +33,8 @@ const LONGEST_DELAY_SAMPLES: f64 = 1e6;
 /// with as many zeros as there are samples of delay.
 ///
 /// # Errors
-/// [`ModelError::OutOfRange`] when the delay is no whole number of samples (the two holds take any
-/// delay) or the prewarping frequency does not lie between 0 and pi/Ts;
+/// [`ModelError::OutOfRange`] when the delay is not a whole number of samples (the two holds take
+/// any delay) or the prewarping frequency does not lie between 0 and pi/Ts;
 /// [`ModelError::TransferFunction`] when the method sends a pole to infinity or the result is not
 /// finite.
 pub fn discretise(

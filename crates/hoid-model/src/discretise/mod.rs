@@ -1,4 +1,4 @@
-//! Discretisation of general transfer functions (Table 5.2 of the reference text).
+//! Discretisation of general transfer functions (Table 5.2 of the thesis).
 //!
 //! | method | rule |
 //! |---|---|
@@ -21,8 +21,8 @@
 //! polynomials is the Faddeev-LeVerrier recursion on `Phi - I`, in powers of `delta = z - 1`, and a
 //! Taylor shift: in powers of z the coefficients of a finely sampled system are differences of
 //! binomials, in powers of delta they are not, so that numerators of size `(Ts/T)^n / n!` keep
-//! their digits. Holds take any delay: what is left of whole samples moves the instant at which the
-//! output is read (the modified z-transform, Jury 1964).
+//! their digits. Holds take any delay: the remainder of whole samples moves the instant at which
+//! the output is read (the modified z-transform, Jury 1964).
 //!
 //! **Matched.** Of the r zeros at infinity r - 1 go to z = -1 and one stays at infinity, which
 //! leaves one sample of delay: the modified matched method of Franklin, Powell and Workman (section

@@ -3,14 +3,14 @@
 //!
 //! `e = f - y`, `u = Y e + F f + n`, `y = P (u + d)`: a target f, which the person may see (F, [`Feedforward`]), a disturbance d at the input of the
 //! controlled element P. What changes goes along the sigmoid of eq. 5 as in
-//! [`Scenario`](crate::scenario::Scenario), which is the task of the reference text and stays apart:
-//! its operator is the lead, its element `K_c/(s(s + omega_b))`.
+//! [`Scenario`](crate::scenario::Scenario), which is the task of the thesis and stays apart: its
+//! operator is the lead, its element `K_c/(s(s + omega_b))`.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `state` | [`FamilyState`]: operator and controlled element at one instant |
 //! | `multi_sine` | [`MultiSine`], [`Excitation`]: targets and disturbances as in recorded tasks |
-//! | `remnant` | [`RemnantPart`], [`Stick`]: what u holds beside the response |
+//! | `remnant` | [`RemnantPart`], [`Stick`]: what u holds next to the response |
 //! | `scenario` | [`FamilyScenario`] and what a simulation needs of it |
 
 mod multi_sine;

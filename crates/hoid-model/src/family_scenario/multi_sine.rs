@@ -5,7 +5,7 @@
 //! the power lies where people follow (D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in
 //! Electronics 8 (1967) 231-249; M. M. van Paassen and M. Mulder, *Identification of Human Control
 //! Behaviour*, 2006; M. Yamagami et al., IEEE Trans. Cybernetics 53 (2023) 2039-2050 with primes
-//! times 0.05 Hz). Phases are random in each run, so that nobody learns the signal by heart.
+//! times 0.05 Hz). Phases are random in each run, so that no one learns the signal by heart.
 
 use std::f64::consts::TAU;
 
@@ -17,9 +17,9 @@ use crate::{
 /// A target or a disturbance.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Excitation {
-    /// Its sinusoids; none is no signal.
+    /// Its sinusoids; none is not a signal.
     pub function: ForcingFunction,
-    /// True where each run draws its phases anew, uniform over the circle.
+    /// True if each run draws its phases again, uniform over the circle.
     pub random_phases: bool,
 }
 
@@ -73,7 +73,7 @@ impl MultiSine {
         (2..=self.largest).filter(is_prime).skip(from).step_by(step).collect()
     }
 
-    /// The excitation, its phases drawn anew in each run.
+    /// The excitation, its phases drawn again in each run.
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] for a period that is not positive, an rms that is not finite, or
@@ -146,11 +146,17 @@ mod tests {
 
     #[test]
     fn senseless_ones_are_refused() {
-        let usual = MultiSine::default();
+        let default = MultiSine::default();
         for bad in [
-            MultiSine { period_s: 0.0, ..usual },
-            MultiSine { rms: f64::NAN, ..usual },
-            MultiSine { largest: 1, ..usual },
+            MultiSine {
+                period_s: 0.0,
+                ..default
+            },
+            MultiSine {
+                rms: f64::NAN,
+                ..default
+            },
+            MultiSine { largest: 1, ..default },
         ] {
             assert!(bad.excitation().is_err(), "{bad:?}");
         }

@@ -1,4 +1,4 @@
-//! What u holds beside the response to the error: the remnant, and a stick that is not at rest.
+//! Components of u other than the response to the error: the remnant, and a stick that is not at rest.
 //!
 //! The remnant is a sum of independent parts. Each part is a sequence of unit variance through a
 //! shaping filter and a gain,
@@ -13,7 +13,7 @@
 //!
 //! | part | source |
 //! |---|---|
-//! | broad band, `1/(T_n s + 1)^m` | eq. 3 of the reference text; W. H. Levison, S. Baron and D. L. Kleinman, IEEE Trans. Man-Machine Systems 10 (1969) 101-108 |
+//! | broad band, `1/(T_n s + 1)^m` | eq. 3 of the thesis; W. H. Levison, S. Baron and D. L. Kleinman, IEEE Trans. Man-Machine Systems 10 (1969) 101-108 |
 //! | peak near omega_nm | the tremor that the neuromuscular loop lets through: R. E. Magdaleno and D. T. McRuer, NASA CR-1757 (1971) |
 //! | slow drift | `1/(T_n s + 1)` with T_n of many seconds |
 //! | signal-dependent | C. M. Harris and D. M. Wolpert, Nature 394 (1998) 780-784; Levison et al. for the scaling with the signals |
@@ -62,7 +62,7 @@ pub enum PartStrength {
     },
 }
 
-/// What the strength of a signal-dependent remnant follows.
+/// Signal that drives a signal-dependent remnant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Followed {
     /// The running rms of u.
@@ -76,7 +76,7 @@ crate::named_choice!(Followed, "signal that a remnant follows", 2, { Control => 
 /// A standard deviation that follows u.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SignalDependence {
-    /// What is followed.
+    /// The signal followed.
     pub follows: Followed,
     /// c: part of the variance that follows it, 0 to 1.
     pub part: f64,
@@ -236,7 +236,7 @@ impl RemnantPart {
         if self.signal_dependence.is_some() && self.intermittence.is_some() {
             return Err(ModelError::Operator {
                 reason: "a part of the remnant follows u and is there at times only: u is larger while it is there, and its \
-                         strength would not be what is asked for; make two parts of it"
+                         strength would not be what is requested; make two parts of it"
                     .to_owned(),
             });
         }

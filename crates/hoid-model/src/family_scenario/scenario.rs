@@ -134,7 +134,7 @@ impl FamilyScenario {
             *delay = if changes {
                 (tau.round() as usize, 0.0)
             } else {
-                // What is left of a whole number is rounding.
+                // The remainder of a whole number is rounding.
                 let late = tau - whole as f64;
                 (whole, if late < 1e-9 { 0.0 } else { late })
             };

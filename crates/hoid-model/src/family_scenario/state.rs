@@ -6,7 +6,7 @@ use crate::{
     operator_family::Coordinate,
 };
 
-/// A state of adaptation: an operator of the family and what they control.
+/// A state of adaptation: an operator of the family and the controlled element.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FamilyState {
     /// The operator.

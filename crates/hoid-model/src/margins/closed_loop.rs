@@ -13,23 +13,23 @@ const MOST_EVALUATIONS: usize = 4_000_000;
 /// True when unit negative feedback around the open loop gives a stable loop: all closed-loop poles
 /// in the open left half plane. Poles of the open loop may lie anywhere, also at the origin.
 ///
-/// Stable means proven stable. A closed-loop pole nearer to the imaginary axis than rounding can
-/// tell counts as not stable, and so do a biproper open loop with delay whose gain at infinite
-/// frequency is one or more (it has infinitely many poles in the right half plane) and a delay of
-/// millions of radians at the frequencies where the gain exceeds 1/2.
+/// Stable means proven stable. A closed-loop pole nearer to the imaginary axis than rounding allows
+/// counts as not stable, and so do a biproper open loop with delay whose gain at infinite frequency
+/// is one or more (it has infinitely many poles in the right half plane) and a delay of millions of
+/// radians at the frequencies where the gain exceeds 1/2.
 pub fn closed_loop_is_stable(open_loop: &ContinuousTransferFunction) -> bool {
     Characteristic::new(open_loop).and_then(|f| f.zeros_in_right_half_plane()) == Some(0)
 }
 
 /// Lowest frequency at which a closed loop is followed, over the size of the controlled element's poles and 1 rad/s.
 const LOWEST: f64 = 1e-4;
-/// Distance in rad from a whole number of half turns that is no rounding any more.
+/// Distance in rad from a whole number of half turns that is not rounding any more.
 const NO_HALF_TURN_RAD: f64 = 0.5;
 
 /// Number of closed-loop poles in the right half plane of a stable operator with the frequency response `operator`
 /// around a controlled element, in a loop with unit negative feedback.
 ///
-/// `None` where that cannot be told: the response is not finite, `|L|` is not below one at `highest_rad_s`, or a
+/// `None` if that cannot be determined: the response is not finite, `|L|` is not below one at `highest_rad_s`, or a
 /// closed-loop pole lies on the imaginary axis.
 pub fn unstable_poles(
     operator: impl Fn(f64) -> Complex64,
@@ -135,7 +135,7 @@ impl<'a> Characteristic<'a> {
     }
 
     /// Zeros of F in the open right half plane; `None` when one lies on the imaginary axis, as far
-    /// as rounding can tell, or the delay turns too often to follow.
+    /// as rounding allows, or the delay turns too often to follow.
     pub(super) fn zeros_in_right_half_plane(&self) -> Option<usize> {
         let tau = self.open_loop.delay_s();
         let mut grid = vec![0.0];

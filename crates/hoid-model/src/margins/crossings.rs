@@ -23,7 +23,7 @@ pub const MANUAL_CONTROL_RANGE_RAD_S: (f64, f64) = (1e-3, 1e3);
 pub struct Crossing {
     /// The frequency, rad/s.
     pub omega_rad_s: f64,
-    /// What is left there: of unit gain the phase margin in deg, of the axis the gain margin in dB.
+    /// The margin there: phase margin in deg at unit gain, gain margin in dB at the axis.
     pub margin: f64,
 }
 
@@ -32,7 +32,7 @@ pub struct Crossing {
 pub struct Crossings {
     /// Of unit gain, each with its phase margin in deg, between -180 and 180.
     pub gain: Vec<Crossing>,
-    /// Of the negative real axis, each with its gain margin in dB.
+    /// For the negative real axis, each with its gain margin in dB.
     pub phase: Vec<Crossing>,
 }
 
@@ -110,8 +110,8 @@ pub fn crossings(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) 
     found
 }
 
-/// Sum of the turns of a response from the lower to the upper end of a range, rad, with its values at both ends.
-/// `None` where it is not finite, or turns too fast to be followed.
+/// Sum of the turns of a response from the lower to the upper end of a range, rad, with its values at both ends. `None`
+/// if it is not finite, or turns too fast to be followed.
 pub(super) fn turn(of: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> Option<(f64, Complex64, Complex64)> {
     let points = scan(&of, range_rad_s);
     let (first, last) = (points.first()?.l, points.last()?.l);

@@ -9,7 +9,7 @@
 //!
 //! Where there are several, the phase margin nearest to 0 deg and the gain margin nearest to 0 dB
 //! are given, each with its frequency. MATLAB's `margin` and python-control's `margin` choose in
-//! the same way. Margins say nothing about a loop that is not stable, nor whether it is:
+//! the same way. Margins carry no information about a loop that is not stable, nor whether it is:
 //! [`closed_loop_is_stable`] does.
 //!
 //! **Scan.** A logarithmic grid, halved wherever the phase turns by more than 0.5 rad between
@@ -24,7 +24,7 @@
 //! omega, omega from 0 to infinity, Z the number of zeros (Cauchy's argument principle; Mikhailov's
 //! form of the Nyquist criterion). F has no poles, so that open-loop poles at the origin or on the
 //! axis need no detour, and common factors of N and D in the right half plane count as they should.
-//! Of an operator of which only the frequency response Y is known ([`unstable_poles`]), stable and
+//! For an operator of which only the frequency response Y is known ([`unstable_poles`]), stable and
 //! sampled, `F = D + N Y e^{-s tau}` is followed up to a frequency beyond which `|L| < 1`.
 
 mod closed_loop;

@@ -262,7 +262,7 @@ fn marginal_and_hidden_modes_are_not_stable() {
     }
 }
 
-/// 2.5/s behind an operator with a neuromuscular resonance that lifts |L| above one again: three crossings, and the
+/// 2.5/s after an operator with a neuromuscular resonance that lifts |L| above one again: three crossings, and the
 /// margin nearest to zero is not that of the lowest one.
 #[test]
 fn all_crossings_are_given() {

@@ -1,7 +1,7 @@
 //! Numbers with their derivatives: `x + sum_i x_i eps_i`, `eps_i eps_j = 0`.
 //!
-//! What is computed with them carries its exact partial derivatives along (forward differentiation;
-//! A. Griewank and A. Walther, *Evaluating Derivatives*, 2008, chapter 3).
+//! Results computed with them carry their exact partial derivatives (forward differentiation; A.
+//! Griewank and A. Walther, *Evaluating Derivatives*, 2008, chapter 3).
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

@@ -1,4 +1,4 @@
-//! An operator as a fit left it: where another estimate of the same person may begin.
+//! An operator as a fit left it: where another estimate of the same person may start.
 
 use super::operator::FamilyOperator;
 use crate::{ModelError, SampleTime};
@@ -16,7 +16,7 @@ pub struct FittedOperator {
     pub innovation_variance: f64,
     /// Sample time of the records.
     pub sample_time: SampleTime,
-    /// Units of e and u; empty where they were not declared.
+    /// Units of e and u; empty if they were not declared.
     pub units: [String; 2],
     /// Where it is from, for messages: the name of a file.
     pub source: String,
@@ -59,7 +59,7 @@ impl FittedOperator {
     /// declared on both sides and differ. `units` are those of e and u.
     ///
     /// # Errors
-    /// [`ModelError::Operator`] with what was found and the remedy.
+    /// [`ModelError::Operator`] with the findings and the remedy.
     pub fn check_samples(&self, sample_time: SampleTime, units: [&str; 2]) -> Result<(), ModelError> {
         let wrong = |reason: String| Err(ModelError::Operator { reason });
         if !self.sample_time.matches(sample_time) {

@@ -47,7 +47,7 @@ crate::named_choice!(Form, "form of the operator", 10, {
 const LEAK: f64 = 1e-4;
 
 /// A coordinate in which an operator is fitted. Lag and neuromuscular part are fitted in
-/// coordinates whose estimates are nearly normal also where the data say little.
+/// coordinates whose estimates are nearly normal also where the data carry little information.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub enum Coordinate {
     /// K without a lag, `K/T_I` with one, K_d of a derivative in s.
@@ -101,7 +101,7 @@ impl Coordinate {
     }
 
     /// The coordinate of a parameter by its name; `None` for K_e_dot, which is a product of two,
-    /// and for what is no parameter.
+    /// and for what is not a parameter.
     pub fn of_parameter(name: &str) -> Option<Self> {
         match name {
             "K_over_T_I" | "K_I" | "K_e" | "K_d" => Some(Self::Gain),
@@ -167,18 +167,18 @@ impl Form {
         }
     }
 
-    /// True where the form has a pole of its own: a lag or an integration.
+    /// True if the form has a pole of its own: a lag or an integration.
     pub fn has_pole(self) -> bool {
         !matches!(self, Self::Gain | Self::Lead | Self::Lead2) && !self.is_derivative()
     }
 
-    /// True where the pole is a lag with a time constant T_I.
+    /// True if the pole is a lag with a time constant T_I.
     pub fn has_lag(self) -> bool {
         matches!(self, Self::Lag | Self::LeadLag | Self::Lead2Lag)
     }
 
-    /// True where the numerator is of no higher degree than the denominator, so that the operator
-    /// has no pure derivative.
+    /// True if the numerator is of no higher degree than the denominator, so that the operator has
+    /// no pure derivative.
     pub fn is_proper(self, neuromuscular: bool) -> bool {
         self.degree() <= usize::from(self.has_pole()) + if neuromuscular { 2 } else { 0 }
     }
@@ -201,8 +201,8 @@ impl Form {
         all
     }
 
-    /// Number of coordinates of the numerator beside the gain: T_L, or c_1 and c_2, or T_L and
-    /// alpha. They stand behind the gain in [`Form::coordinates`], before those of the poles.
+    /// Number of coordinates of the numerator next to the gain: T_L, or c_1 and c_2, or T_L and
+    /// alpha. They are after the gain in [`Form::coordinates`], before those of the poles.
     pub fn varying_beside_gain(self) -> usize {
         match self {
             Self::Gain | Self::Lag | Self::Derivative => 0,
@@ -212,7 +212,7 @@ impl Form {
     }
 
     /// The numerator over its gain, `m_0 + m_1 s + m_2 s^2`, from the coordinates of the numerator
-    /// behind the gain, and the derivatives of its coefficients along them.
+    /// after the gain, and the derivatives of its coefficients along them.
     pub fn shape(self, x: &[f64]) -> ([f64; 3], [[f64; 3]; 2]) {
         let none = [0.0; 3];
         match self {

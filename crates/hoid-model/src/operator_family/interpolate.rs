@@ -4,9 +4,9 @@
 //! (relative degree 1), the model has a kink at every delay of a whole number of samples, and a
 //! search over the delay of a recorded person ends in one. A person sees no staircase. Here the
 //! error runs straight from sample to sample, `e(t)`, and the operator acts on `e(t - tau - Ts/2)`:
-//! half a sample later, as behind a hold, so that tau means the same in both. At frequency omega
-//! the two differ by the factor `sin(x)/x`, `x = omega Ts/2` (0.5 % at 20 rad/s and 60 Hz), and in
-//! no phase.
+//! half a sample later, as after a hold, so that tau means the same in both. At frequency omega the
+//! two differ by the factor `sin(x)/x`, `x = omega Ts/2` (0.5 % at 20 rad/s and 60 Hz), and in no
+//! phase.
 //!
 //! With `tau + Ts/2 = l Ts + delta`, `0 <= delta < Ts`, and times in samples,
 //!
@@ -21,9 +21,9 @@
 
 use super::{
     dual::Dual,
-    hold::HeldFamily,
     matrices::{SIZE, Vector, characteristic, companion, exponential, product, times},
     operator::FamilyOperator,
+    zoh::HeldFamily,
 };
 use crate::{ModelError, SampleTime, delayed_operator::whole_samples};
 
@@ -123,7 +123,7 @@ mod tests {
                     let expected = operator.response(omega) * smooth;
                     let error = (response(&model, omega, ts) - expected).norm() / expected.norm();
                     // The aliases of a straight line fall with the square of their frequency; what
-                    // the operator passes on of them is its direct part, beside its response here.
+                    // the operator passes on of them is its direct part, next to its response here.
                     let aliases = 0.3 + operator.response(1e7).norm() / expected.norm();
                     assert!(
                         error < aliases * (omega * ts).powi(2) + 1e-9,

@@ -1,21 +1,21 @@
 //! The family of operators that people are found to be.
 //!
 //! `Y(s) = K (T_L s + 1)^p / (T_I s + 1)^q e^{-tau s} omega^2/(s^2 + 2 zeta omega s + omega^2)`,
-//! p = 0, 1, 2, q = 0, 1 (eq. 2.2 of the reference text; D. T. McRuer and H. R. Jex, IEEE Trans.
-//! Human Factors in Electronics 8 (1967) 231-249), with or without the neuromuscular part, and two
-//! rivals for controlled elements of second order ([`Form`]).
+//! p = 0, 1, 2, q = 0, 1 (eq. 2.2 of the thesis; D. T. McRuer and H. R. Jex, IEEE Trans. Human
+//! Factors in Electronics 8 (1967) 231-249), with or without the neuromuscular part, and two rivals
+//! for controlled elements of second order ([`Form`]).
 //!
-//! A person who integrates slow errors has a lag with a long T_I. Then K and T_I cannot be told
-//! apart, `K/T_I` can; an operator is therefore held by the coordinates
+//! A person who integrates slow errors has a lag with a long T_I. Then K and T_I cannot be
+//! distinguished, `K/T_I` can; an operator is therefore held by the coordinates
 //! `[K/T_I, T_L, 1/T_I, ln omega, ln zeta, tau]` ([`Coordinate`]), in which `1/T_I = 0`, the pure
 //! integration, is a point like others.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `form` | [`Form`], [`Coordinate`] |
 //! | `operator` | [`FamilyOperator`]: one operator, its response, its named parameters |
 //! | `fitted` | [`FittedOperator`]: an operator as a fit left it |
-//! | `hold` | its exact discrete model for a held input, with the derivatives |
+//! | `zoh` | its exact discrete model for a held input, with the derivatives |
 //! | `interpolate` | the same for an error that is smooth between samples |
 //! | `matrices` | the matrix exponential |
 //! | `dual` | numbers with their derivatives |
@@ -25,13 +25,13 @@ mod dual;
 mod examples;
 mod fitted;
 mod form;
-mod hold;
 mod interpolate;
 mod matrices;
 mod operator;
+mod zoh;
 
 pub use dual::PARTIALS;
 pub use fitted::FittedOperator;
 pub use form::{Coordinate, Form};
-pub use hold::HeldFamily;
 pub use operator::{FamilyOperator, FamilyResponse, NamedParameter, PARAMETERS};
+pub use zoh::HeldFamily;

@@ -152,8 +152,8 @@ impl FamilyOperator {
     /// is there when omega_nm is named. A missing tau_e is zero.
     ///
     /// # Errors
-    /// [`ModelError::Operator`] for a name that is unknown, lacking, or said twice, and for values
-    /// without a meaning; else as [`FamilyOperator::new`].
+    /// [`ModelError::Operator`] for a name that is unknown, lacking, or reported twice, and for
+    /// values without a meaning; else as [`FamilyOperator::new`].
     pub fn of_names(form: Form, pairs: &[(String, f64)]) -> Result<Self, ModelError> {
         let wrong = |reason: String| ModelError::Operator { reason };
         let find = |name: &str| pairs.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
@@ -409,7 +409,7 @@ impl FamilyOperator {
 mod tests {
     use super::{super::examples::operator, *};
 
-    fn usual(form: Form) -> FamilyOperator {
+    fn typical(form: Form) -> FamilyOperator {
         operator(form, true, 0.1837)
     }
 
@@ -430,7 +430,7 @@ mod tests {
     fn the_names_are_those_of_all_forms() {
         let mut seen = Vec::new();
         for form in Form::ALL {
-            for named in usual(form).named() {
+            for named in typical(form).named() {
                 assert!(PARAMETERS.contains(&(named.name, named.unit)), "{form} {}", named.name);
                 seen.push(named.name);
                 // K with a lag is a product, and individual by its gain.
@@ -450,7 +450,7 @@ mod tests {
     #[test]
     fn gradient_agrees_with_finite_differences() {
         for form in Form::ALL {
-            let operator = usual(form);
+            let operator = typical(form);
             for omega in [0.3, 2.0, 9.0, 25.0] {
                 let exact = operator.response_and_gradient(omega);
                 for i in 0..operator.coordinates.len() {
@@ -471,7 +471,7 @@ mod tests {
     #[test]
     fn response_is_that_of_the_transfer_function() {
         for form in Form::ALL {
-            let operator = usual(form);
+            let operator = typical(form);
             let transfer = operator.transfer_function().unwrap();
             for omega in [0.5, 3.0, 20.0] {
                 let difference = (operator.response(omega) - transfer.response(omega)).norm();
@@ -483,7 +483,7 @@ mod tests {
     #[test]
     fn names_and_coordinates_are_inverse() {
         for form in Form::ALL {
-            let operator = usual(form);
+            let operator = typical(form);
             let pairs: Vec<(String, f64)> = operator
                 .named()
                 .iter()
@@ -507,7 +507,7 @@ mod tests {
     #[test]
     fn gradients_of_names_agree_with_finite_differences() {
         for form in Form::ALL {
-            let operator = usual(form);
+            let operator = typical(form);
             for (k, (parameter, gradient)) in operator.named_gradients().into_iter().enumerate() {
                 for i in 0..operator.coordinates.len() {
                     let at = |by: f64| {

@@ -11,7 +11,7 @@ pub enum RemnantDiscretisation {
     /// Exact for noise held over each sample.
     #[default]
     ZeroOrderHold,
-    /// `s = (1 - z^-1)/Ts`, the form of the reference text (eq. 13, B.11).
+    /// `s = (1 - z^-1)/Ts`, the form of the thesis (eq. 13, B.11).
     BackwardEuler,
 }
 

@@ -1,4 +1,4 @@
-//! The numerator of the filter behind a zero-order hold, and its factors with all zeros inside the
+//! The numerator of the filter after a zero-order hold, and its factors with all zeros inside the
 //! unit circle.
 
 use num_complex::Complex64;

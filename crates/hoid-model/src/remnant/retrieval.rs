@@ -17,9 +17,9 @@ pub struct RetrievedRemnant {
 /// deviation of the innovation.
 ///
 /// # Errors
-/// [`NotConvertible::NotFinite`] for coefficients that are no numbers;
+/// [`NotConvertible::NotFinite`] for coefficients that are not numbers;
 /// [`NotConvertible::NotARemnantFilter`] when m is not 1 to 4, a coefficient has the wrong sign, it
-/// implies a pole outside (0, 1), or T_n is nothing beside a sample.
+/// implies a pole outside (0, 1), or T_n is nothing compared with a sample.
 pub fn retrieve(
     d: &[f64],
     innovation_sd: f64,

@@ -1,4 +1,4 @@
-//! By how much a record is decimated: a choice of the user, or of the rate.
+//! Amount by which a record is decimated: a choice of the user, or of the rate.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,7 +6,7 @@ use std::str::FromStr;
 use super::kernel::{Kernel, PASS, STOP_DB};
 use crate::{ModelError, SampleTime};
 
-/// Rates above it are decimated by themselves, Hz.
+/// Rates above it are decimated automatically, Hz.
 const HIGHEST_HZ: f64 = 200.0;
 /// The rate that they are brought near to, Hz.
 const WANTED_HZ: f64 = 100.0;
@@ -87,7 +87,7 @@ impl fmt::Display for Decimation {
     }
 }
 
-/// What a decimation did.
+/// Action of a decimation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Decimated {
     /// New sample time by the old one.
@@ -98,21 +98,21 @@ pub struct Decimated {
     pub to_hz: f64,
     /// End of the pass band, Hz.
     pub pass_hz: f64,
-    /// Begin of the stop band, Hz: what lies between folds down above the pass band.
+    /// Start of the stop band, Hz: what lies between folds down above the pass band.
     pub stop_hz: f64,
     /// Attenuation in the stop band, dB.
     pub stop_db: f64,
     /// Length of the filter, samples of the old rate.
     pub taps: usize,
-    /// By how much a sample of the input is taken later than that of the output beside it, s.
+    /// Amount by which a sample of the input is taken later than that of the output next to it, s.
     pub lead_s: f64,
-    /// By how much a stream is behind, s.
+    /// Amount by which a stream is behind, s.
     pub lag_s: f64,
 }
 
 impl Decimated {
-    /// By a factor from a sample time, with its filter and the new sample time; none where the filter
-    /// would be longer than `longest` samples to each side.
+    /// By a factor from a sample time, with its filter and the new sample time; none if the filter would be longer than
+    /// `longest` samples to each side.
     pub(super) fn by(factor: usize, old: SampleTime, longest: usize) -> Option<(Self, Kernel, SampleTime)> {
         let kernel = Kernel::folding(1.0 / factor as f64, longest)?;
         let new = SampleTime::new(factor as f64 * old.s()).ok()?;

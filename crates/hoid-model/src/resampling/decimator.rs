@@ -4,8 +4,8 @@
 //! half the filter and half of M, about 15 samples of the new rate ([`Decimated::lag_s`]). Up to the
 //! end of what has come its values are those of the decimated record, digit for digit.
 //!
-//! **Values that are not finite** (missing, faulty) are held at the last good one within the filter;
-//! a new sample among whose M old ones is such a one is NaN, so that it is nobody's.
+//! **Values that are not finite** (missing, faulty) are held at the last good one within the filter; a new sample among
+//! whose M old ones is such a one is NaN, so that it belongs to no person.
 
 use std::collections::VecDeque;
 
@@ -36,11 +36,11 @@ pub struct Decimator<const C: usize> {
 struct Lane {
     /// Samples from its old sample to the whole one before a new value: 0, or the middle of M.
     lead: i64,
-    /// Place of the first weight beside that sample, and the weights.
+    /// Place of the first weight next to that sample, and the weights.
     offset: i64,
     weights: Vec<f64>,
-    /// What the filter needs; the first stands at `first` old samples, which the reflection of the
-    /// beginning makes negative.
+    /// Requirements of the filter; the first is at `first` old samples, which the reflection of the
+    /// start makes negative.
     past: VecDeque<f64>,
     first: i64,
     /// The last good value.
@@ -52,7 +52,7 @@ struct Lane {
 }
 
 impl<const C: usize> Decimator<C> {
-    /// A decimator by a factor of 2 or more; `held` says which channels are inputs that a model holds.
+    /// A decimator by a factor of 2 or more; `held` states which channels are inputs that a model holds.
     ///
     /// # Errors
     /// [`ModelError::Decimation`] for a factor without meaning.
@@ -91,18 +91,18 @@ impl<const C: usize> Decimator<C> {
         })
     }
 
-    /// What it does.
+    /// Its behaviour.
     pub fn done(&self) -> Decimated {
         self.done
     }
 
-    /// The sample time behind it.
+    /// The sample time after it.
     pub fn sample_time(&self) -> SampleTime {
         self.sample_time
     }
 
-    /// How many samples the last one given lies behind the last one taken.
-    pub fn behind(&self) -> u64 {
+    /// How many samples the last one given lies after the last one taken.
+    pub fn lag_samples(&self) -> u64 {
         let at = self.given.saturating_sub(1) * self.done.factor as u64;
         self.came.saturating_sub(1).saturating_sub(at)
     }
@@ -114,7 +114,7 @@ impl<const C: usize> Decimator<C> {
         numbers
     }
 
-    /// Goes on where the one was that [`Decimator::saved`] was asked of; false for numbers of another.
+    /// Continues where the one was that [`Decimator::saved`] was asked of; false for numbers of another.
     #[must_use]
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
         let (mut left, mut lacking) = (numbers.iter(), false);
@@ -155,7 +155,7 @@ impl Lane {
         if value.is_finite() {
             self.last = value;
             if !self.seen {
-                // What came before is not known: as the first that is.
+                // The data before is not known: as the first that is.
                 self.past.iter_mut().for_each(|past| *past = value);
                 self.seen = true;
             }
@@ -165,11 +165,11 @@ impl Lane {
         self.past.push_back(self.last);
     }
 
-    /// The reflection of the beginning in the first sample.
+    /// The reflection of the start in the first sample.
     fn reflect(&mut self, half: usize) {
         let begin = self.past[0];
         for k in 1..=half {
-            // What was put before it stands in front of the k-th.
+            // What was put before it is in front of the k-th.
             let value = 2.0 * begin - self.past[2 * k - 1];
             self.past.push_front(value);
         }
@@ -190,7 +190,7 @@ impl Lane {
             .sum()
     }
 
-    /// Lets go what the value at `next` and those behind it do not need.
+    /// Lets go what the value at `next` and those after it do not need.
     fn forget(&mut self, next: u64, half: usize) {
         while self.first < next as i64 - half as i64 && self.past.pop_front().is_some() {
             self.first += 1;

@@ -48,7 +48,7 @@ impl Kernel {
     }
 
     /// Passes up to 0.8 `ratio` and stops from `ratio`, the new Nyquist frequency as a share of the
-    /// old one; none where the filter would be longer than `longest` to each side.
+    /// old one; none if the filter would be longer than `longest` to each side.
     pub fn limiting(ratio: f64, longest: usize) -> Option<Self> {
         let half = half_length(2.0 * HALF_TRANSITION * ratio);
         // Written so that NaN is none.
@@ -61,7 +61,7 @@ impl Kernel {
     /// Passes up to 0.8 `ratio` and stops from 1.2 `ratio`, with 6 dB at `ratio`, the new Nyquist
     /// frequency as a share of the old one: what folds down falls between 0.8 and 1 of it, where it
     /// takes the place of what the filter has taken, so that noise keeps a spectrum without a hole.
-    /// None where it would be longer than `longest` to each side.
+    /// None if it would be longer than `longest` to each side.
     pub fn folding(ratio: f64, longest: usize) -> Option<Self> {
         let half = half_length(2.0 * (1.0 - PASS) * ratio);
         // Written so that NaN is none.
@@ -71,7 +71,7 @@ impl Kernel {
         })
     }
 
-    /// Samples that it reaches to each side of the one asked for.
+    /// Samples that it reaches to each side of the requested one.
     pub fn half(self) -> usize {
         self.half
     }
@@ -98,7 +98,7 @@ impl Kernel {
     /// Values at `t_k = first + k step` for k = 0 .. n, in samples; every t lies [`Kernel::half`]
     /// samples inside.
     pub fn values(self, samples: &[f64], first: f64, step: f64, n: usize) -> Vec<f64> {
-        // Of a whole step all fractions are one, and the weights are made once.
+        // For a whole step all fractions are one, and the weights are made once.
         let (mut known, mut offset, mut weights) = (f64::NAN, 0, Vec::new());
         (0..n)
             .map(|k| {
@@ -162,8 +162,8 @@ mod tests {
         }
     }
 
-    /// Amplitude and delay in samples of a wave of so many cycles a sample, taken at this fraction
-    /// between two samples.
+    /// Amplitude and delay in samples of a wave of a given number of cycles a sample, taken at this
+    /// fraction between two samples.
     fn response((offset, weights): &(isize, Vec<f64>), frequency: f64, fraction: f64) -> (f64, f64) {
         let omega = 2.0 * PI * frequency;
         let (mut re, mut im) = (0.0, 0.0);
@@ -214,7 +214,7 @@ mod tests {
                         (gain - 1.0).abs() < 5e-5 && leak < 5e-5,
                         "{factor}, {share}: {gain}, {leak:e}"
                     );
-                    // Linear phase: symmetric about the place asked for.
+                    // Linear phase: symmetric about the requested place.
                     assert!(delay.abs() < 1e-10, "{delay:e}");
                 }
                 let (gain, _) = response(&weights, nyquist, fraction);

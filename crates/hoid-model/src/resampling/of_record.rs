@@ -5,7 +5,7 @@ use super::kernel::Kernel;
 use crate::{Channel, ModelError, Record};
 
 impl Decimation {
-    /// The record at its new rate, and what was done; none where nothing was.
+    /// The record at its new rate, and the actions taken; none if nothing was.
     ///
     /// # Errors
     /// As [`Record::decimated`].
@@ -18,7 +18,7 @@ impl Decimation {
 }
 
 impl Record {
-    /// Every M-th sample of all channels behind the same filter of linear phase, the input taken in
+    /// Every M-th sample of all channels after the same filter of linear phase, the input taken in
     /// the middle of the M samples over which it is held.
     ///
     /// # Errors

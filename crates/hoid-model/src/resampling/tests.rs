@@ -25,7 +25,7 @@ fn record(hz: f64, n: usize, e: impl Fn(f64) -> f64, u: impl Fn(f64) -> f64) -> 
         .starting_at(-2.0)
 }
 
-/// Largest distance from a function of time behind the reach of the ends, s.
+/// Largest distance from a function of time after the reach of the ends, s.
 fn farthest(values: &[f64], ts: f64, lead: f64, f: impl Fn(f64) -> f64) -> f64 {
     let edge = 30;
     (edge..values.len() - edge)
@@ -167,7 +167,7 @@ fn a_stream_has_the_digits_of_the_record() {
 fn missing_values_are_nobodys() {
     let value = |k: usize| waves(k as f64 * 1e-3);
     let samples = |k: usize| match k {
-        // A gap in both, a value of u alone, and a start that is not there.
+        // A gap in both, a value of u alone, and a start that does not exist.
         0..7 | 1500..1523 => (f64::NAN, f64::NAN),
         2000 => (value(k), f64::INFINITY),
         _ => (value(k), value(k)),
@@ -176,7 +176,7 @@ fn missing_values_are_nobodys() {
     for (k, [e, u]) in found.iter().enumerate() {
         let gone = k == 0 || (150..153).contains(&k);
         assert_eq!((e.is_nan(), u.is_nan()), (gone, gone || k == 200), "{k}");
-        // What is held within the filter leaves traces beside the gap, no larger than the step at its end.
+        // What is held within the filter leaves traces next to the gap, no larger than the step at its end.
         assert!(gone || (e - value(10 * k)).abs() < 0.5, "{k}");
     }
     let nothing = streamed(1000.0, 10, (0..1000).map(|_| (f64::NAN, f64::NAN)));

@@ -17,7 +17,7 @@
 //! programs (`90/s(s+6)`), and is refused with both remedies. Common factors of numerator and
 //! denominator stay: `s/s^2` has a pole that it hides. A delay is a factor of the whole.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `coefficients` | the list of coefficients |
 //! | `reader` | the expression |
@@ -49,8 +49,8 @@ impl FromStr for ContinuousTransferFunction {
     ///
     /// # Errors
     /// [`ModelError::TransferFunction`] with the character at which the text stops being one, or
-    /// with what is wrong with the whole: a numerator of higher degree than the denominator, a
-    /// delay that is negative.
+    /// with the problems of the whole: a numerator of higher degree than the denominator, a delay
+    /// that is negative.
     fn from_str(text: &str) -> Result<Self, ModelError> {
         let read = if text.contains(',') {
             coefficients(text)

@@ -45,7 +45,7 @@ pub fn tick(value: f64, step: f64) -> String {
     format!("{value:.digits$e}")
 }
 
-/// A layout with the ticks of an ordinate of this height in `unit`; their numbers stand there where
+/// A layout with the ticks of an ordinate of this height in `unit`; their numbers are there where
 /// `labelled`.
 pub fn with_ordinate(
     layout: Layout,

@@ -1,8 +1,8 @@
 //! Bode pair: magnitude and phase of models with their 95 % bands, and of the true operator where
 //! it is known.
 //!
-//! The estimators see the operator behind the zero-order hold of their sampling, `B q^-nk/(A F)`;
-//! the truth is drawn behind the same hold, so that both curves lie on each other when the
+//! The estimators see the operator after the zero-order hold of their sampling, `B q^-nk/(A F)`;
+//! the truth is drawn after the same hold, so that both curves lie on each other when the
 //! parameters agree. The phase is unwrapped with the delay `nk Ts omega` taken out, which turns
 //! fastest, and put back.
 
@@ -63,7 +63,7 @@ pub struct TrueResponse {
 /// frequency that the longest record resolves, to 50 rad/s or half the sampling frequency.
 ///
 /// Bands are 1.96 standard errors to either side; a model without standard errors has none. A truth
-/// that no discrete model stands for (a delay of no whole number of samples) is drawn without the
+/// that no discrete model represents (a delay of no whole number of samples) is drawn without the
 /// hold.
 pub fn bode(id: &str, models: &[BodeModel<'_>], truths: &[TrueResponse]) -> String {
     bode_with_points(id, models, truths, &[])

@@ -17,7 +17,7 @@ use crate::numbers::Z_95;
 /// One frequency response.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BodeCurve {
-    /// Its name in the legend, where equal names of one look stand once; empty for none.
+    /// Its name in the legend, where equal names of one look are once; empty for none.
     pub name: String,
     /// How it is drawn: [`LineKind::Truth`] for the response that the others are compared with.
     pub kind: LineKind,
@@ -68,7 +68,7 @@ impl BodeCurve {
         }
     }
 
-    /// Points with error bars of 1.96 standard errors, none where there is no standard error.
+    /// Points with error bars of 1.96 standard errors, none if there is no standard error.
     pub fn of_points(points: &BodePoints, shade: Shade) -> Self {
         let ends = |values: &[Estimate]| {
             let bar = |v: &Estimate| {
@@ -130,7 +130,7 @@ impl BodeCurve {
 /// Bode pairs of one column.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BodeColumn {
-    /// Text above it; empty for none. After `_` or `^` stands one sign, or several in braces.
+    /// Text above it; empty for none. After `_` or `^` comes one sign, or several in braces.
     pub title: String,
     /// Its curves.
     pub curves: Vec<BodeCurve>,
@@ -143,8 +143,8 @@ pub struct BodeGrid {
     pub columns: Vec<BodeColumn>,
 }
 
-/// Magnitude over phase as one figure, with logarithmic frequency in rad/s. `title` is what a
-/// screen reader says.
+/// Magnitude over phase as one figure, with logarithmic frequency in rad/s. `title` is the text for
+/// screen readers.
 pub fn bode_grid(id: &str, title: &str, grid: &BodeGrid) -> String {
     let row = |name: &str, unit: &str, of: fn(&BodeCurve) -> Curve| -> Vec<CurvePanel> {
         let panel = |column: &BodeColumn| CurvePanel {

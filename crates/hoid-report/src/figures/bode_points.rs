@@ -1,9 +1,9 @@
-//! Points with error bars over a Bode pair: describing functions beside the models that were fitted
-//! to the same records.
+//! Points with error bars over a Bode pair: describing functions next to the models that were
+//! fitted to the same records.
 //!
-//! The phase of a point is known but for whole turns. It is drawn on the branch that is nearest to
-//! the first curve, and without a curve unwrapped from point to point with the delay of the points
-//! taken out.
+//! The phase of a point is known except for whole turns. It is drawn on the branch that is nearest
+//! to the first curve, and without a curve unwrapped from point to point with the delay of the
+//! points taken out.
 
 use hoid_ident::frequency::{DescribingFunction, unwrapped_deg};
 use hoid_model::uncertainty::Estimate;

@@ -1,7 +1,7 @@
 //! The numbers of a box plot.
 //!
 //! A box reaches from the first to the third quartile with a line at the median; whiskers end at
-//! the last value within 1.5 interquartile ranges of the box, and what lies beyond is a point
+//! the last value within 1.5 interquartile ranges of the box, and anything beyond is a point
 //! (Tukey, *Exploratory Data Analysis*, 1977).
 
 use hoid_numerics::statistics::{finite_sorted, quantile};
@@ -11,10 +11,10 @@ use super::style;
 /// Longest whiskers, in interquartile ranges.
 const REACH: f64 = 1.5;
 
-/// What a box shows of a sample.
+/// Content of a box for a sample.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BoxStatistics {
-    /// Number of values; zero where there is none, and a cross is drawn in the place of the box.
+    /// Number of values; zero if there is none, and a cross is drawn in the place of the box.
     pub count: usize,
     /// The smallest value within 1.5 interquartile ranges of the box.
     pub lower_whisker: f64,
@@ -31,7 +31,7 @@ pub struct BoxStatistics {
 }
 
 impl BoxStatistics {
-    /// Of the values that are finite; quartiles by linear interpolation between ranks.
+    /// For the values that are finite; quartiles by linear interpolation between ranks.
     pub fn of(values: &[f64]) -> Self {
         let values = finite_sorted(values.iter().copied());
         let quartile = |q| quantile(&values, q).unwrap_or_default();

@@ -1,5 +1,5 @@
 //! Box plots of the results of many runs: groups on the abscissa, in each group one box for each
-//! series. [`BoxStatistics`] says what a box shows.
+//! series. [`BoxStatistics`] describes the boxes.
 
 use kuva::{
     prelude::Plot,
@@ -54,18 +54,18 @@ pub struct BoxSeries {
 /// One panel of box plots.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BoxPanel {
-    /// Name of the quantity, such as `B_r(b_0)`; after `_` or `^` stands one sign, or several in
+    /// Name of the quantity, such as `B_r(b_0)`; after `_` or `^` comes one sign, or several in
     /// braces.
     pub name: String,
     /// Its unit; empty for none.
     pub unit: String,
-    /// The boxes by group and, in each, by series; a place that is not there is one without a
+    /// The boxes by group and, in each, by series; a place that does not exist is one without a
     /// value.
     pub boxes: Vec<Vec<BoxStatistics>>,
     /// Size up to which the ordinate is linear, and logarithmic beyond; linear throughout where it
     /// is `None`.
     pub linear_within: Option<f64>,
-    /// What stands above the panel, such as the largest of its numbers; empty for nothing.
+    /// Text above the panel, such as the largest of its numbers; empty for nothing.
     pub note: String,
 }
 
@@ -79,7 +79,7 @@ pub struct BoxGrid {
     pub columns: usize,
     /// Text above each column, or above each panel; empty for none.
     pub titles: Vec<String>,
-    /// Name of what the groups differ in, such as `n_k^*`.
+    /// Name of the difference between the groups, such as `n_k^*`.
     pub abscissa: String,
     /// Names of the groups.
     pub groups: Vec<String>,
@@ -91,12 +91,11 @@ pub struct BoxGrid {
     pub shared_ordinates: bool,
     /// True when zero is in every range, with a line.
     pub with_zero: bool,
-    /// What every range reaches to both sides of its middle at least, so that rounding is not drawn
-    /// as a spread; zero for none.
+    /// Least half width of every range, so that rounding is not drawn as a spread; zero for none.
     pub least_reach: f64,
 }
 
-/// Box plots as one figure. `title` is what a screen reader says.
+/// Box plots as one figure. `title` is the text for screen readers.
 pub fn box_plots(id: &str, title: &str, grid: &BoxGrid) -> String {
     let columns = grid.columns.max(1);
     let n = grid.panels.len();
@@ -272,7 +271,7 @@ impl BoxGrid {
         if missing {
             entries.push(Entry::new("no value", INK, Sample::Cross));
         }
-        // Levels of one method stand in one row.
+        // Levels of one method are in one row.
         let levels = self.series.first().map_or(1, |s| s.shade.levels);
         add_legend_by(scene, &entries, levels);
     }

@@ -26,7 +26,7 @@ const LINE: f64 = 1.4;
 const RADIUS: f64 = 2.2;
 /// Half of the end of an error bar.
 const CAP: f64 = 2.5;
-/// Beside the first and the last stem or marker, part of the abscissa.
+/// Next to the first and the last stem or marker, part of the abscissa.
 const ROOM: f64 = 0.03;
 
 /// How a curve is drawn.
@@ -52,7 +52,7 @@ pub enum LineKind {
 /// One curve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    /// Its name in the legend, where equal names of one look stand once; empty for none.
+    /// Its name in the legend, where equal names of one look are once; empty for none.
     pub name: String,
     /// How it is drawn.
     pub kind: LineKind,
@@ -72,7 +72,7 @@ pub struct Curve {
 /// One panel of curves.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CurvePanel {
-    /// Name of the ordinate; after `_` or `^` stands one sign, or several in braces.
+    /// Name of the ordinate; after `_` or `^` comes one sign, or several in braces.
     pub name: String,
     /// Its unit; empty for none. An ordinate in `deg` has ticks at parts of the circle.
     pub unit: String,
@@ -102,7 +102,7 @@ pub struct CurveGrid {
     pub shared_ordinates: bool,
 }
 
-/// Curves as one figure. `title` is what a screen reader says.
+/// Curves as one figure. `title` is the text for screen readers.
 pub fn curves(id: &str, title: &str, grid: &CurveGrid) -> String {
     let columns = grid.columns.max(1);
     let n = grid.panels.len();
@@ -192,7 +192,7 @@ impl CurveGrid {
                 entries.push(entry);
             }
         }
-        // The truth stands last, so that the levels of a method stay in one row.
+        // The truth is last, so that the levels of a method stay in one row.
         entries.sort_by_key(|entry| entry.sample == Sample::Dashed && entry.colour == BLACK);
         entries
     }
@@ -287,8 +287,8 @@ impl Curve {
         runs(n, known).into_iter().filter(|r| r.len() > 1).map(line).collect()
     }
 
-    /// Stems, error bars and markers, and the values that stand alone between gaps; none outside
-    /// the axes.
+    /// Stems, error bars and markers, and the values that are alone between gaps; none outside the
+    /// axes.
     fn draw_marks(&self, scene: &mut Scene, scale: &Scale) {
         let colour = self.colour();
         let n = self.y.len().min(self.x.len());

@@ -16,7 +16,7 @@ use super::{
 };
 use crate::numbers::Z_95;
 
-/// In the legend; equal names stand there once.
+/// In the legend; equal names are there once.
 const NAME: &str = "describing function, bars 95 %";
 /// The same where a bar is not drawn to its end.
 const NAME_OF_CUT: &str = "describing function, bars 95 %, cut at 180 deg";
@@ -75,7 +75,7 @@ impl ModelCurve {
         }
     }
 
-    /// The band of 1.96 standard errors around magnitude (0) or phase (1); empty where there is none.
+    /// The band of 1.96 standard errors around magnitude (0) or phase (1); empty if there is none.
     fn band(&self, part: usize, around: &[f64]) -> Vec<(f64, f64)> {
         let ends = |(value, errors): (&f64, &[f64; 2])| {
             let whole = Z_95 * errors[part];
@@ -116,7 +116,7 @@ fn frequencies(found: &Description) -> Vec<f64> {
 }
 
 /// The describing function as points with error bars of 1.96 standard errors, and models as lines.
-/// `title` is what a screen reader says.
+/// `title` is the text for screen readers.
 pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCurve]) -> String {
     let lines = &found.function.lines;
     let omega: Vec<f64> = lines.iter().map(|line| line.omega_rad_s).collect();
@@ -161,7 +161,7 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
     phase.push(points(&phases, name));
     let mut panels = vec![panel("magnitude", "dB", magnitude), panel("phase", "deg", phase)];
     let coherences: Vec<Estimate> = lines.iter().filter_map(|l| l.coherence).map(Estimate::fixed).collect();
-    // Without the excitation it is that of u with e, which says little in a loop.
+    // Without the excitation it is that of u with e, which carries little information in a loop.
     let shown = found.channel.is_some() && coherences.len() == omega.len();
     if let Some(chance) = chance_coherence(found.function.runs.len()).filter(|_| shown) {
         let ends = models.iter().flat_map(|m| m.omega_rad_s.iter()).chain(&omega);
@@ -203,7 +203,7 @@ fn kind_of(model: usize) -> LineKind {
 /// known, and a longer bar would press all others together.
 const LONGEST_BAR: f64 = 180.0;
 
-/// Half of the error bar, NaN where there is no error.
+/// Half of the error bar, NaN if there is no error.
 fn half_bar(v: &Estimate) -> f64 {
     v.standard_error.map_or(f64::NAN, |s| Z_95 * s)
 }

@@ -11,11 +11,11 @@ use super::{
     style::{GREY, TEXT},
 };
 
-/// Outlines, whiskers, and the marks of what is missing.
+/// Outlines, whiskers, and the marks of missing values.
 pub const INK: &str = "#333333";
 /// Size of labels that would be too long.
 const SMALL: u32 = 10;
-/// Of bands around lines.
+/// For bands around lines.
 pub const BAND_OPACITY: f64 = 0.2;
 
 /// Distance of the lines of a hatching.

@@ -1,4 +1,4 @@
-//! A figure as a file: its width on paper, and the format that the name of the file says.
+//! A figure as a file: its width on paper, and the format that the name of the file states.
 //!
 //! Every figure is drawn as SVG. PDF, whose lines and letters stay such, and PNG, of [`DPI`] dots an
 //! inch, are made of it with the fonts of the system (feature `pdf-png`).
@@ -22,7 +22,7 @@ pub enum FigureFormat {
 }
 
 impl FigureFormat {
-    /// The format that the ending of a name says; none for another ending.
+    /// The format that the ending of a name states; none for another ending.
     pub fn of(path: &Path) -> Option<Self> {
         let ending = path.extension()?.to_str()?.to_ascii_lowercase();
         match ending.as_str() {
@@ -190,7 +190,7 @@ mod tests {
         assert!(text.contains("/MediaBox [0 0 240.9"), "{text}");
         assert!(text.contains("/Font"), "letters are letters");
         let png = FigureFormat::Png.bytes(&svg).unwrap();
-        // Width and height stand in the first chunk: 85 mm at 300 dots an inch.
+        // Width and height are in the first chunk: 85 mm at 300 dots an inch.
         let dots = |at: usize| u32::from_be_bytes(png[at..at + 4].try_into().unwrap());
         assert!(
             dots(16).abs_diff(1004) <= 4 && dots(20).abs_diff(502) <= 4,

@@ -1,5 +1,5 @@
-//! The grid that figures of several panels stand in: widths, heights and margins of its cells,
-//! labels of rows, titles of columns or panels.
+//! The grid that figures of several panels are in: widths, heights and margins of its cells, labels
+//! of rows, titles of columns or panels.
 //!
 //! One column is as wide as a column of text, several as a page. Axes are equally wide in all
 //! columns. Only the lowest panel of a column has the ticks and the name of the abscissa.
@@ -18,14 +18,14 @@ use super::{
     svg,
 };
 
-/// Above the axes of a panel, and below where no abscissa stands.
+/// Above the axes of a panel, and below where there is no abscissa.
 const SPACE: f64 = 8.0;
 /// Before a panel that shares the ordinate of its neighbour.
 const GAP: f64 = 16.0;
 /// Before a panel with ticks of its own, but no label.
 const TICKS: f64 = 50.0;
-/// After such a panel, but for the last: less than the half of a tick's label, which reaches into
-/// the space of the next.
+/// After such a panel, except for the last: less than the half of a tick's label, which reaches
+/// into the space of the next.
 const NARROW: f64 = 5.0;
 const TITLE: f64 = 18.0;
 /// Centre of the label of the ordinate.
@@ -229,7 +229,7 @@ impl Frame {
             let (middle, y) = (area.left + 0.5 * area.width, area.top - SPACE - self.above);
             scene.add(draw::fitted(middle, y, marked(title), area.width + SPACE, None));
         }
-        // The widths of the cells add up to it but for rounding.
+        // The widths of the cells add up to it except for rounding.
         scene.width = (scene.width + beside).round();
         scene
     }

@@ -4,10 +4,10 @@
 //! area of Unicode, which become tags in the finished SVG ([`tagged`]). What the readers of SVG
 //! agree on is little: they add up or replace the shifts of tags within tags, drop tags without
 //! text, trim spaces at the edges of a tag, and place each tag for itself where a text is centred.
-//! So the tags stand one after the other, each with text and with the whole step from the one
-//! before, and spaces at their edges do not break. Where a text with tags begins says `svg`.
+//! So the tags follow one after the other, each with text and with the whole step from the one
+//! before, and spaces at their edges do not break. Where a text with tags starts reports `svg`.
 
-/// Stand in the text of labels for the begin and end of a subscript and of a superscript; they
+/// Stand in the text of labels for the start and end of a subscript and of a superscript; they
 /// become tags.
 const SUB: char = '\u{e000}';
 const BACK: char = '\u{e001}';
@@ -16,7 +16,7 @@ const DOWN: char = '\u{e004}';
 const SIGNS: [char; 4] = [SUB, BACK, SUPER, DOWN];
 const NO_BREAK_SPACE: char = '\u{a0}';
 
-/// Where a part of a label stands.
+/// Position of a part of a label.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Level {
     Line,
@@ -40,7 +40,7 @@ impl Level {
     }
 }
 
-/// Size of subscripts in units of the figure, and beside that of the line.
+/// Size of subscripts in units of the figure, and next to that of the line.
 const SUBSCRIPT: &str = "12.2";
 const SMALLER: f64 = 12.2 / 13.0;
 
@@ -66,7 +66,7 @@ pub fn panel_label(name: &str, unit: &str) -> String {
 }
 
 /// Text of a label with its subscripts and superscripts: `n_k^*`, `B_r(b_0^{d,0})`. After `_` or
-/// `^` stands one sign or several in braces; words such as `my_model` and `run_2` stay as they are.
+/// `^` comes one sign or several in braces; words such as `my_model` and `run_2` stay as they are.
 pub fn marked(text: &str) -> String {
     literal(&marks(text))
 }
@@ -103,7 +103,7 @@ fn marks(text: &str) -> String {
     result
 }
 
-/// The parts of a label and where they stand, none without text.
+/// The parts of a label and its position, none without text.
 pub fn parts(text: &str) -> Vec<(Level, String)> {
     let mut parts: Vec<(Level, String)> = Vec::new();
     let mut level = Level::Line;

@@ -39,7 +39,7 @@ pub enum Sample {
 /// One entry.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
-    /// What it says; see [`marked`] for subscripts.
+    /// What it reports; see [`marked`] for subscripts.
     pub name: String,
     /// Colour `#rrggbb`.
     pub colour: String,

@@ -20,7 +20,7 @@ use super::{
 /// Height of a cell, and the least of a panel.
 const CELL: f64 = 26.0;
 const LEAST_HEIGHT: f64 = 78.0;
-/// Where the name of the ordinate stands before its axis.
+/// Where the name of the ordinate is before its axis.
 const NAME_AT: f64 = 26.0;
 /// Between the names of places.
 const APART: f64 = 5.0;
@@ -28,7 +28,8 @@ const APART: f64 = 5.0;
 /// One map.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MapPanel {
-    /// What the rows of panels differ in, such as `P_n = 0.1`; that of the first of a row is shown.
+    /// Differences between the rows of panels, such as `P_n = 0.1`; that of the first of a row is
+    /// shown.
     pub name: String,
     /// Values by ordinate, the lowest first, and in each by abscissa. What is not finite or not
     /// there is hatched.
@@ -47,7 +48,7 @@ pub struct MapGrid {
     pub columns: usize,
     /// Text above each column, or above each panel; empty for none.
     pub titles: Vec<String>,
-    /// Name of the abscissa, such as `n_k^*`; after `_` or `^` stands one sign, or several in
+    /// Name of the abscissa, such as `n_k^*`; after `_` or `^` comes one sign, or several in
     /// braces.
     pub abscissa: String,
     /// Names of its places.
@@ -65,11 +66,11 @@ pub struct MapGrid {
     pub limits: Option<(f64, f64)>,
     /// True when each row has colours and a bar of its own.
     pub bar_per_row: bool,
-    /// What the cross means, for the legend; empty for none.
+    /// Meaning of the cross, for the legend; empty for none.
     pub mark: String,
 }
 
-/// Maps as one figure. `title` is what a screen reader says.
+/// Maps as one figure. `title` is the text for screen readers.
 pub fn maps(id: &str, title: &str, grid: &MapGrid) -> String {
     let columns = grid.columns.max(1);
     let n = grid.panels.len();
@@ -151,7 +152,7 @@ impl MapGrid {
         }
     }
 
-    /// The names of the places of an abscissa of this width: as many as stand apart.
+    /// The names of the places of an abscissa of this width: as many as are separate.
     fn x_names(&self, width: f64) -> Vec<String> {
         let names: Vec<String> = self.x_places.iter().map(|p| marked(p)).collect();
         let widest = names.iter().map(|n| draw::text_room(n, TEXT)).fold(0.0, f64::max);
@@ -218,7 +219,7 @@ impl MapGrid {
                     scene.add(text);
                 }
                 if is_marked {
-                    // Beside the number, or in the middle where none stands.
+                    // Next to the number, or in the middle without a hint.
                     let (at, half) = match decimals {
                         Some(_) => ((corner.0 + width - 4.6, corner.1 + 4.6), 2.2),
                         None => ((corner.0 + 0.5 * width, corner.1 + 0.5 * height), 5.0),

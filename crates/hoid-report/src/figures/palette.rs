@@ -22,7 +22,7 @@ pub enum Mark {
     Down,
 }
 
-/// Whose colour a curve or box has.
+/// The item that gives a curve or box its colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shade {
     /// Number of the method, which gives the hue: 0 (ARX) is blue, 1 (BJ) vermillion.
@@ -81,13 +81,13 @@ pub fn shade(method: usize, level: usize, levels: usize) -> String {
     format!("#{r:02X}{g:02X}{b:02X}")
 }
 
-/// True when white stands out better than black on a colour `#rrggbb`: by contrast of luminance,
+/// True when white is prominent better than black on a colour `#rrggbb`: by contrast of luminance,
 /// below `L*` of 50.
 pub fn is_dark(colour: &str) -> bool {
     lightness(channels(colour)) < 50.0
 }
 
-/// The channels of `#rrggbb`; a part that is no number is zero.
+/// The channels of `#rrggbb`; a part that is not a number is zero.
 fn channels(colour: &str) -> [f64; 3] {
     let part = |i: usize| {
         let digits = colour.get(1 + 2 * i..3 + 2 * i).unwrap_or("00");

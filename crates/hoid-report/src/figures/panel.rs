@@ -1,6 +1,6 @@
 //! One quantity over time, and the range of its ordinate.
 //!
-//! An estimate that leaves its usual range for a moment (T_L where K_e nearly vanishes) must not
+//! An estimate that leaves its default range for a moment (T_L where K_e nearly vanishes) must not
 //! flatten all the rest. The ordinate therefore covers the truth, the batch fits and the estimates
 //! between their 10 and 90 % quantiles, and beyond that the quantiles of 1 and 99 % and the middle
 //! of the bands, as far as one and a half such ranges to either side. Where a truth is known and at
@@ -27,7 +27,7 @@ pub enum CurveKind {
     Batch,
     /// A count that stays until the next row, in the colour of its method.
     Steps,
-    /// Bound of what is expected: a thin black line, not in the legend.
+    /// Bound of the expected range: a thin black line, not in the legend.
     Bound,
 }
 
@@ -52,7 +52,7 @@ pub struct TraceCurve {
 /// Range of the ordinate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Ordinate {
-    /// From quantiles, as the module says.
+    /// From quantiles, as the module states.
     Robust,
     /// This one.
     Within(f64, f64),
@@ -142,7 +142,7 @@ impl TracePanel {
         of(CurveKind::Estimate).any(near).then_some((low, high))
     }
 
-    /// The methods with rows beyond the axes of the panel when it stands alone.
+    /// The methods with rows beyond the axes of the panel when it is alone.
     pub fn beyond(&self) -> Vec<Beyond> {
         let (low, high) = self.range();
         let estimates = self.curves.iter().filter(|c| c.kind == CurveKind::Estimate);

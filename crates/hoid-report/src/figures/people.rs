@@ -1,4 +1,4 @@
-//! People by condition: each person a thin line through their estimates with their standard errors, and beside them
+//! People by condition: each person a thin line through their estimates with their standard errors, and next to them
 //! the mean over people with its interval of 95 %.
 
 use kuva::{prelude::Plot, render::render::Scene};
@@ -19,7 +19,7 @@ const HEIGHT: f64 = 150.0;
 /// The names of the places below the axis, and a second row of them.
 const NAMES_BELOW: f64 = 17.0;
 const SECOND: f64 = 12.0;
-/// Parts of a place: people from and to, and the mean.
+/// Horizontal positions within a column: first and last person, and the mean.
 const PEOPLE: (f64, f64) = (0.18, 0.6);
 const MEAN: f64 = 0.78;
 /// More people than this are grey, without a legend.
@@ -50,11 +50,12 @@ pub struct PeopleGrid {
     pub people: Vec<String>,
     /// Names of the places, such as conditions.
     pub places: Vec<String>,
-    /// What the places differ in.
+    /// Differences between the places.
     pub abscissa: String,
 }
 
-/// People by condition as one figure, two panels in a row where there are several. `title` is what a screen reader says.
+/// People by condition as one figure, two panels in a row where there are several. `title` is the text for screen
+/// readers.
 pub fn people_by_condition(id: &str, title: &str, grid: &PeopleGrid) -> String {
     let n = grid.panels.len();
     if n == 0 || grid.places.is_empty() {

@@ -26,7 +26,7 @@ impl Scale {
         y.clamp(self.y.0, self.y.1)
     }
 
-    /// Beyond the axes the path is cut; without bound, numbers of 1e300 would stand in the file.
+    /// Beyond the axes the path is cut; without bound, numbers of 1e300 would be in the file.
     pub fn bounded(&self, y: f64) -> f64 {
         let (low, high) = self.y;
         let span = high - low;

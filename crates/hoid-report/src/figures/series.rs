@@ -76,7 +76,7 @@ pub fn without_level<T: PartialEq>(kept: &[usize], value: impl Fn(usize) -> T) -
     needed.map(|(_, &k)| k).collect()
 }
 
-/// Runs of indices that are all known. Of very many, those closer to each other than a column are
+/// Runs of indices that are all known. For very many, those closer to each other than a column are
 /// one.
 pub fn runs(n: usize, known: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     let mut found: Vec<Range<usize>> = Vec::new();

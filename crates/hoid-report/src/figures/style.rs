@@ -1,4 +1,4 @@
-//! What all figures share: size, colours and fonts.
+//! Common parts of all figures: size, colours and fonts.
 
 use std::sync::Arc;
 
@@ -71,7 +71,7 @@ pub fn line(points: impl IntoIterator<Item = (f64, f64)>, colour: &str, width: f
         .with_stroke_width(width)
 }
 
-/// True for what has a place on an axis: beyond this size the differences of numbers overflow.
+/// True for values with a place on an axis: beyond this size the differences of numbers overflow.
 pub fn is_drawable(value: f64) -> bool {
     value.abs() < 1e100
 }

@@ -11,7 +11,7 @@ use super::{
 };
 
 /// SVG text with a view box (it scales with the page), a title for screen readers, and ids that
-/// begin with that of the figure.
+/// start with that of the figure.
 pub fn finish(id: &str, title: &str, scene: Scene) -> String {
     let scene = anchored(scene);
     let raw = SvgBackend::new().render_scene(&scene);
@@ -59,7 +59,7 @@ fn escaped(text: &str) -> String {
         .replace('"', "&quot;")
 }
 
-/// A scene whose texts with tags begin at their place, wherever they were anchored: readers of SVG
+/// A scene whose texts with tags start at their place, wherever they were anchored: readers of SVG
 /// do not agree on where the tags of a centred text stand.
 fn anchored(mut scene: Scene) -> Scene {
     for element in &mut scene.elements {

@@ -20,7 +20,7 @@ const UPPER: f64 = 150.0;
 const LOWER: f64 = 190.0;
 
 /// Measured (grey), predicted (vermillion) and simulated (blue) output over time: the whole record
-/// above, its middle eighth below, where the prediction can be told from the measurement.
+/// above, its middle eighth below, where the prediction can be distinguished from the measurement.
 ///
 /// The ordinate covers the measured output with half its range to either side; what leaves that (an
 /// unstable model) is cut off. Long records are drawn by the smallest and largest sample of each
@@ -32,7 +32,7 @@ pub fn time_response(id: &str, record: &Record, validation: &Validation) -> Stri
     let models = validation.simulated.iter().chain(&validation.predicted);
     let (wanted_low, wanted_high) = style::padded_range(measured.iter().chain(models).copied());
     let range = (wanted_low.max(low - half), wanted_high.min(high + half));
-    // Beyond the axes the path is clipped; without bound, numbers of 1e300 would stand in the file.
+    // Beyond the axes the path is clipped; without bound, numbers of 1e300 would be in the file.
     let bounded = |v: f64| v.clamp(range.0 - half, range.1 + half);
 
     let panel = |from: usize, to: usize| -> (Vec<Plot>, (f64, f64)) {

@@ -47,14 +47,13 @@ pub struct TraceGrid {
     pub shaded_s: Vec<(f64, f64)>,
     /// Times with a dotted line, s.
     pub marks_s: Vec<f64>,
-    /// Changes that were declared: when, s, and what changed. Each has a dashed line, with its number
-    /// in the first panel.
+    /// Changes that were declared: when, s, and the change. Each has a dashed line, with its number in the first panel.
     pub changes: Vec<(f64, String)>,
     /// True when panels of a row have one ordinate, which is labelled once.
     pub shared_ordinates: bool,
 }
 
-/// The panels of a grid as one figure. `title` is what a screen reader says.
+/// The panels of a grid as one figure. `title` is the text for screen readers.
 pub fn trace_panels(id: &str, title: &str, grid: &TraceGrid) -> String {
     let columns = grid.columns.max(1);
     let n = grid.panels.len();
@@ -173,7 +172,7 @@ impl TracePanel {
     fn plots(&self, (low, high): (f64, f64), levels: usize, parts: usize) -> Vec<Plot> {
         let logarithmic = self.ordinate == Ordinate::Logarithmic;
         let half = 0.5 * (high - low);
-        // Beyond the axes the path is cut; without bound, numbers of 1e300 would stand in the file.
+        // Beyond the axes the path is cut; without bound, numbers of 1e300 would be in the file.
         let bounded = |v: f64| match logarithmic {
             true => v.clamp(low / 10.0, high * 10.0),
             false => v.clamp(low - half, high + half),

@@ -76,7 +76,7 @@ impl GroupReport<'_> {
             .collect()
     }
 
-    /// What could not be estimated, and how often.
+    /// Quantities that could not be estimated, and how often.
     pub(super) fn failures(&self) -> Vec<Value> {
         let table = self.tables.estimates;
         let [subject, condition, estimator, status, reason] =

@@ -23,7 +23,7 @@ const FITS: [(&str, usize); 5] = [
 ];
 
 impl GroupReport<'_> {
-    /// What the describing functions say, with standard errors, a row for each subject and
+    /// Results of the describing functions, with standard errors, a row for each subject and
     /// condition.
     pub(super) fn margins(&self) -> Vec<Value> {
         let Some(table) = self.tables.frequencies.map(|f| f.margins) else {

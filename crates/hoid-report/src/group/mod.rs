@@ -1,6 +1,6 @@
 //! The page about a group of recorded runs.
 //!
-//! | module | what it shows |
+//! | module | contents |
 //! |---|---|
 //! | `report`, `tables` | what a page is made of |
 //! | `people` | the verdict, what was not read, the operator of each person |

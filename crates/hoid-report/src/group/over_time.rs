@@ -14,8 +14,8 @@ use crate::{
 /// Recursions in the order of the colours: as everywhere, RLS blue and RPEM vermillion.
 const METHODS: [(&str, &str); 3] = [("RLS", "ARX (RLS)"), ("RPEM", "BJ (RPEM)"), ("PHYSICAL", "physical")];
 
-/// A figure: panels by name and unit, and the columns of RLS and of the others. The runs of a group do not
-/// say the units of e and u, so that gains have none.
+/// A figure: panels by name and unit, and the columns of RLS and of the others. The runs of a group do not report the
+/// units of e and u, so that gains have none.
 type Row = (&'static str, &'static str, &'static str, &'static str);
 
 const OPERATOR: [Row; 5] = [
@@ -32,7 +32,7 @@ const DISCRETE: [Row; 4] = [
     ("b1", "", "b1", "b1"),
 ];
 
-/// What is drawn over time.
+/// Signals drawn over time.
 #[derive(Clone, Copy, PartialEq)]
 enum Shown {
     /// Median and quartiles over the runs of all recursions.
@@ -103,7 +103,7 @@ impl GroupReport<'_> {
             .collect()
     }
 
-    /// The columns of the averages of traces whose name begins so, without the figure at their end.
+    /// The columns of the averages of traces whose name starts so, without the figure at their end.
     fn columns(&self, prefix: &str) -> Vec<&str> {
         let names = self.tables.traces.columns.iter().map(|column| column.name.as_str());
         names
@@ -187,7 +187,7 @@ impl GroupReport<'_> {
         rows
     }
 
-    /// When the task of a condition changes, s: as the manifest says, or at the seam of joined
+    /// When the task of a condition changes, s: as the manifest states, or at the seam of joined
     /// runs.
     fn change_s(&self, condition: &str) -> Option<f64> {
         let known = self.manifest.conditions.get(condition).and_then(|facts| facts.change_s);
@@ -247,7 +247,7 @@ impl GroupReport<'_> {
         trace_panels(id, &format!("Estimates over time, condition {condition}"), &grid)
     }
 
-    /// One recursion of a subject and condition; none where it has no number.
+    /// One recursion of a subject and condition; none if it has no number.
     fn curve(
         &self,
         (subject, condition, method): (&str, &str, &str),

@@ -1,4 +1,4 @@
-//! The pages of a finished group, made of the tables in its directory and written beside them.
+//! The pages of a finished group, made of the tables in its directory and written next to them.
 
 use std::{
     collections::BTreeSet,
@@ -72,7 +72,7 @@ impl Tables {
 }
 
 /// The describing functions of a finished group with the operators through them, a figure for each
-/// condition: its name and the SVG text. None where no condition has a periodic excitation.
+/// condition: its name and the SVG text. None if no condition has a periodic excitation.
 ///
 /// # Errors
 /// As [`write_group_pages`].
@@ -92,7 +92,7 @@ pub fn group_figures(manifest: &Manifest, out: &Path) -> Result<Vec<(String, Str
 /// is where the manifest was read.
 ///
 /// # Errors
-/// [`ReportError::Io`], [`ReportError::Study`] for tables that are not there and pages that cannot be written;
+/// [`ReportError::Io`], [`ReportError::Study`] for tables that do not exist and pages that cannot be written;
 /// [`ReportError::Template`] for a defect of this crate.
 pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
     let read = Tables::read(out)?;
@@ -144,12 +144,13 @@ pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result
     Ok(pages)
 }
 
-/// Characters of a subject in the name of a page: with a number behind them a name that every file
+/// Characters of a subject in the name of a page: with a number after them a name that every file
 /// system takes.
 const LONGEST_NAME: usize = 80;
 
-/// The name of the page of each subject: letters and digits, a number behind it where another
-/// subject has the name already. File systems that do not tell S1 from s1 are counted as well.
+/// The name of the page of each subject: letters and digits, a number after it where another
+/// subject has the name already. File systems that do not distinguish S1 from s1 are counted as
+/// well.
 fn page_names(subjects: &[&str]) -> Vec<String> {
     let mut taken = BTreeSet::new();
     let name_of = |subject: &&str| {
@@ -167,8 +168,8 @@ fn page_names(subjects: &[&str]) -> Vec<String> {
     subjects.iter().map(name_of).collect()
 }
 
-/// What was done to the runs and what is wrong with their sampling: a row for all files of which the
-/// same is said.
+/// Processing applied to the runs and the problems of their sampling: a row for all files of which
+/// the same is reported.
 fn account(preparation: &OutputTable, trouble: &OutputTable) -> Vec<(String, String)> {
     let mut rows: Vec<(String, String)> = Vec::new();
     for (table, what) in [(preparation, "preparation"), (trouble, "sampling trouble")] {

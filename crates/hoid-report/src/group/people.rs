@@ -2,7 +2,7 @@
 //! its errors.
 //!
 //! A parameter that the data determine is given with its standard error. One that they do not is in
-//! parentheses; where its interval is open above, `> x` says from where on.
+//! parentheses; where its interval is open above, `> x` states from where on.
 
 use hoid_ident::family::Parameter;
 use hoid_model::{VerdictLevel, uncertainty::Estimate};
@@ -12,8 +12,8 @@ use minijinja::{Value, context};
 use super::report::GroupReport;
 use crate::numbers;
 
-/// Names and headings of the parameters, in the order of the table. The runs of a group do not say the
-/// units of e and u, so that what scales with u/e has none.
+/// Names and headings of the parameters, in the order of the table. The runs of a group do not report the units of e
+/// and u, so that what scales with u/e has none.
 const COLUMNS: [(&str, &str); 13] = [
     ("K_over_T_I", "K/T_I"),
     ("K_I", "K_I"),
@@ -37,7 +37,7 @@ pub struct PeopleTable {
     pub headings: Vec<String>,
     /// Cells of its rows.
     pub rows: Vec<Vec<String>>,
-    /// Where the columns of parameters begin; the last column is the verdict.
+    /// Where the columns of parameters start; the last column is the verdict.
     pub parameters: usize,
 }
 

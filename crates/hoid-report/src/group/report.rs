@@ -1,4 +1,4 @@
-//! What a page about a group shows: manifest, tables, and all subjects or one.
+//! Results of a page about a group: manifest, tables, and all subjects or one.
 
 use hoid_study::group::{GroupSummary, Manifest};
 
@@ -7,13 +7,13 @@ use super::tables::GroupTables;
 /// The page.
 #[derive(Debug)]
 pub struct GroupReport<'a> {
-    /// What was analysed.
+    /// The analysed data.
     pub manifest: &'a Manifest,
-    /// What failed, the people, and what all of it is worth.
+    /// Failures, people and the overall verdict.
     pub summary: &'a GroupSummary,
-    /// What came out.
+    /// The results.
     pub tables: GroupTables<'a>,
-    /// What was done and with what, as name and value.
+    /// The processing and its inputs, as name and value.
     pub settings: Vec<(String, String)>,
     /// One subject alone, or all.
     pub subject: Option<&'a str>,

@@ -32,7 +32,7 @@ pub struct FrequencyTables<'a> {
     pub agreement: &'a OutputTable,
 }
 
-/// A column of texts; empty where there is none.
+/// A column of texts; empty if there is none.
 pub(super) fn texts<'a>(table: &'a OutputTable, name: &str) -> &'a [String] {
     match table.column(name) {
         Some(ColumnValues::Text(values)) => values,
@@ -40,7 +40,7 @@ pub(super) fn texts<'a>(table: &'a OutputTable, name: &str) -> &'a [String] {
     }
 }
 
-/// A column of numbers; empty where there is none.
+/// A column of numbers; empty if there is none.
 pub(super) fn reals<'a>(table: &'a OutputTable, name: &str) -> &'a [f64] {
     match table.column(name) {
         Some(ColumnValues::Real(values)) => values,

@@ -8,8 +8,8 @@ use hoid_track::{StartAt, Trace};
 /// A batch fit and its span, s.
 pub type BatchFit = ((f64, f64), Fit);
 
-/// The orders of a trace; where it tracks the delay, with the median of what it says of the delay
-/// in a span, s.
+/// The orders of a trace; where it tracks the delay, with the median of its report on the delay in
+/// a span, s.
 fn orders_within(trace: &Trace, (from, to): (f64, f64)) -> Orders {
     let orders = trace.options().orders;
     if trace.options().method.track_delay_s().is_none() {
@@ -33,10 +33,10 @@ fn orders_within(trace: &Trace, (from, to): (f64, f64)) -> Orders {
 }
 
 /// A fit of a span of a record with the structure and the orders of a trace; where the trace tracks
-/// the delay, with what it says of it there.
+/// the delay, with its report on it there.
 ///
 /// # Errors
-/// Those of the fit.
+/// The errors of the fit.
 pub fn batch_fit(trace: &Trace, record: &Record, (from, to): (f64, f64)) -> Result<BatchFit, IdentError> {
     let options = trace.options();
     let estimator = Estimator {

@@ -1,5 +1,5 @@
-//! Coefficients by name, across structures: the poles of the operator stand in A of an ARX model
-//! and in F of a Box-Jenkins model.
+//! Coefficients by name, across structures: the poles of the operator are in A of an ARX model and
+//! in F of a Box-Jenkins model.
 
 use hoid_ident::Fit;
 use hoid_track::Trace;
@@ -40,7 +40,7 @@ impl Coefficient {
     }
 }
 
-/// Those of a trace, in the order of theta.
+/// The entries of a trace, in the order of theta.
 pub fn of_trace(trace: &Trace) -> Vec<Coefficient> {
     trace
         .parameter_names()
@@ -49,7 +49,7 @@ pub fn of_trace(trace: &Trace) -> Vec<Coefficient> {
         .collect()
 }
 
-/// Those of a fit, in the order of theta; none for a grey box, whose parameters are no
+/// The entries of a fit, in the order of theta; none for a grey box, whose parameters are not
 /// coefficients.
 pub fn of_fit(fit: &Fit) -> Vec<Coefficient> {
     if fit.is_grey_box() {

@@ -1,5 +1,5 @@
 //! One self-contained HTML page about recursive estimates over a record: parameters over time with
-//! 95 % bands, batch fits and, where the record says it, the truth; innovations; standard errors;
+//! 95 % bands, batch fits and, where the record shows it, the truth; innovations; standard errors;
 //! steps that were shortened.
 
 mod batch_fits;

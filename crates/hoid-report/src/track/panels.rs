@@ -74,7 +74,7 @@ fn truth_curve(record: &Record, values: Vec<f64>) -> TraceCurve {
     }
 }
 
-/// The name of what changed with its subscript.
+/// The name of the change with its subscript.
 fn in_legend(name: &str) -> &str {
     match name {
         "K_e_dot" => "K_\u{117}",
@@ -122,8 +122,8 @@ fn grid(traces: &[Evaluated<'_>], record: &Record, panels: Vec<TracePanel>) -> T
     }
 }
 
-/// What people determine: gain and phase at the frequencies of the traces, crossover and phase margin
-/// with the controlled element, and the level of the remnant; `None` where neither was asked for.
+/// Quantities that people determine: gain and phase at the frequencies of the traces, crossover and phase margin with
+/// the controlled element, and the level of the remnant; `None` where neither was requested.
 pub fn response_grid(traces: &[Evaluated<'_>], record: &Record) -> Option<TraceGrid> {
     let mut panels = Vec::new();
     let mut add = |name: String, unit: &str, of: &dyn Fn(&Trace, usize) -> Option<Estimate>| {

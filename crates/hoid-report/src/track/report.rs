@@ -12,27 +12,27 @@ use super::{
     tables,
 };
 use crate::{
-    ReportError, answer, facts,
+    ReportError, facts,
     figures::{self, TraceGrid},
-    page, tables as of_fits,
+    fit_summary, page, tables as of_fits,
 };
 
-/// Most traces of a page: more curves over each other cannot be told apart.
+/// Most traces of a page: more curves over each other cannot be distinguished.
 const MOST_TRACES: usize = 4;
 
-/// What the page is about.
+/// Subject of the page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackReport<'a> {
     /// Heading of the page.
     pub title: String,
-    /// What was done and with what, as name and value: command, versions, record, seed.
+    /// The processing and its inputs, as name and value: command, versions, record, seed.
     pub settings: Vec<(String, String)>,
     /// The record that was tracked. Columns with the names of the operator's parameters (`K_e`,
     /// `T_L`, `K_e_dot`, `omega_nm`, `zeta_nm`, `tau_e`) are the truth, as in every simulation.
     pub record: &'a Record,
     /// One to four estimates of that record, drawn over each other.
     pub traces: Vec<TraceSection<'a>>,
-    /// What the traces are worth, on top of the page.
+    /// Verdict on the traces, on top of the page.
     pub verdict: Option<Verdict>,
     /// Remarks for the reader, such as warnings of the command.
     pub notes: Vec<String>,
@@ -83,7 +83,7 @@ impl TrackReport<'_> {
             |id: &str, title: &str, grid: &TraceGrid| Value::from_safe_string(figures::trace_panels(id, title, grid));
         let values = context! {
             title => self.title.clone(),
-            answer => self.verdict.as_ref().map(|v| context! { verdict => answer::verdict(v) }),
+            answer => self.verdict.as_ref().map(|v| context! { verdict => fit_summary::verdict(v) }),
             settings => page::facts(&self.settings),
             notes => self.notes.clone(),
             names => self.traces.iter().map(|t| t.name.clone()).collect::<Vec<_>>(),
@@ -121,8 +121,8 @@ impl TrackReport<'_> {
         Ok(panels::operator_grid(&traces, self.record))
     }
 
-    /// Gain and phase, crossover and margin over time, as [`TrackReport::operator_grid`]; `None` where
-    /// the traces have none of them.
+    /// Gain and phase, crossover and margin over time, as [`TrackReport::operator_grid`]; `None` if the traces have
+    /// none of them.
     ///
     /// # Errors
     /// As there.
@@ -172,7 +172,7 @@ impl TrackReport<'_> {
             changes => tables::changes(trace),
             begins => Some(trace.section.trace.options())
                 .filter(|options| options.method.starts_itself())
-                .map(hoid_track::TrackOptions::start_in_words),
+                .map(hoid_track::TrackOptions::start_as_text),
             batch => tables::batch(trace, self.record),
         }
     }

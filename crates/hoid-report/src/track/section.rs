@@ -1,4 +1,4 @@
-//! One recursive estimate of a page and the batch fits beside it.
+//! One recursive estimate of a page and the batch fits next to it.
 
 use hoid_ident::Fit;
 use hoid_track::Trace;
@@ -17,7 +17,7 @@ pub struct TraceSection<'a> {
 /// A batch fit of a span, drawn as a dashed line over that span.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BatchLine<'a> {
-    /// Begin of the span, s.
+    /// Start of the span, s.
     pub from_s: f64,
     /// End of the span, s.
     pub to_s: f64,

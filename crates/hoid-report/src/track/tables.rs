@@ -21,7 +21,7 @@ use crate::{
 /// Time from which errors count, s: the start of a recursion from nothing is left out.
 const ERRORS_FROM_S: f64 = 10.0;
 
-/// One row a method: what it is, how it forgets, where it started.
+/// One row per method: description, forgetting, where it started.
 pub fn methods(traces: &[Evaluated<'_>], record: &Record) -> Vec<Value> {
     let row = |t: &Evaluated<'_>| {
         let trace = t.section.trace;
@@ -42,8 +42,8 @@ pub fn methods(traces: &[Evaluated<'_>], record: &Record) -> Vec<Value> {
         };
         context! {
             name => t.section.name.clone(), method => options.method.name(), model, average,
-            forgetting => options.memory_in_words(record.sample_time()),
-            start => options.start_in_words(),
+            forgetting => options.memory_as_text(record.sample_time()),
+            start => options.start_as_text(),
             moves_from => format!("{} s", plain(trace.updated_from_s().max(record.time_s(0)))),
         }
     };
@@ -211,7 +211,7 @@ fn span(trace: &Evaluated<'_>, record: &Record, line: &BatchLine<'_>) -> Value {
     let end = line.to_s - 0.5 * record.sample_time().s();
     let span = format!("[{}, {}] s", plain(line.from_s), plain(line.to_s));
     let Some(row) = times.partition_point(|t| *t < end).checked_sub(1) else {
-        return context! { span, reason => "the trace begins later" };
+        return context! { span, reason => "the trace starts later" };
     };
     let at_s = times[row];
     let (now, fit) = (&trace.operators[row], line.fit.operator());

@@ -1,4 +1,4 @@
-//! What the recursion should have found, where the record says it: the columns of a simulation.
+//! Result of the recursion should have, where the record shows it: the columns of a simulation.
 
 use hoid_model::{OperatorParameters, Record};
 use hoid_track::Trace;

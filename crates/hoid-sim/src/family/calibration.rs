@@ -148,7 +148,7 @@ fn line_power(held: &HeldLoop, scenario: &FamilyScenario) -> Result<MeanSquares,
             let [y, p] = held.responses(omega).ok_or(ModelError::OutOfRange {
                 quantity: "frequency of a sinusoid in rad/s",
                 found: omega,
-                expected: "one that is no pole of operator or controlled element",
+                expected: "one that is not a pole of operator or controlled element",
             })?;
             let closed = 1.0 + y * p;
             let of_e = if is_target { Complex64::from(1.0) } else { -p } / closed;

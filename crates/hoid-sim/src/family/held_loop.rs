@@ -4,7 +4,7 @@
 //!
 //! `u = r(k - l) + n`, `y = C x_p + D (u + d)`, `e = f - y`,
 //!
-//! r the response of the operator behind the part of a sample of their delay `tau = l Ts + delta`,
+//! r the response of the operator after the part of a sample of their delay `tau = l Ts + delta`,
 //! x_p the state of the controlled element. Operator and element are then taken over one sample
 //! exactly, for inputs that are held ([`hoid_model::held_system`]). An operator without
 //! neuromuscular part may pass e on at once: of the held error that would be one sample or the next,
@@ -25,7 +25,7 @@ const SMALLEST: f64 = 1e-9;
 #[derive(Debug, Clone)]
 pub(super) struct HeldLoop {
     operator: HeldSystem,
-    /// What passes of e(k), e(k-1), e(k-2) besides.
+    /// Additional weights of e(k), e(k-1), e(k-2).
     taps: [f64; 3],
     delay: usize,
     element: HeldSystem,
@@ -34,7 +34,7 @@ pub(super) struct HeldLoop {
     sample_time: SampleTime,
 }
 
-/// What enters a sample: target, disturbance, remnant.
+/// Inputs of a sample: target, disturbance, remnant.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Inputs {
     pub target: f64,
@@ -42,7 +42,7 @@ pub(super) struct Inputs {
     pub remnant: f64,
 }
 
-/// What a sample gives: error, control, output of the element.
+/// Result of a sample: error, control, output of the element.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Outputs {
     pub e: f64,
@@ -50,14 +50,14 @@ pub(super) struct Outputs {
     pub y: f64,
 }
 
-/// Where the loop stands between two samples.
+/// Where the loop is between two samples.
 pub(super) struct LoopState {
     operator: OperatorState,
     element: Vec<f64>,
     next: Vec<f64>,
 }
 
-/// Where the operator stands between two samples.
+/// Where the operator is between two samples.
 #[derive(Debug, Clone)]
 pub(super) struct OperatorState {
     state: Vec<f64>,
@@ -69,14 +69,14 @@ pub(super) struct OperatorState {
     k: usize,
 }
 
-/// What the operator says of a sample before its error is known.
+/// Information of the operator about a sample before its error is known.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Answer {
+pub(super) struct OperatorOutput {
     /// The response without the error of the sample, before the delay of whole samples.
     past: f64,
-    /// The same behind the delay: what u has of it.
+    /// The same after the delay: what u has of it.
     pub known: f64,
-    /// What u has of the error of the sample besides.
+    /// Direct response of u to the error of the sample.
     tap: f64,
 }
 
@@ -138,14 +138,14 @@ impl HeldLoop {
         1.0 + self.element_direct() * if self.delay == 0 { self.taps[0] } else { 0.0 }
     }
 
-    /// True where u has something of the error of the same sample.
+    /// True if u has something of the error of the same sample.
     pub fn answers_at_once(&self) -> bool {
         self.delay == 0 && self.taps[0] != 0.0
     }
 
-    /// What the operator says of the sample that is next.
+    /// Information of the operator about the sample that is next.
     #[inline]
-    pub fn answer(&self, state: &OperatorState) -> Answer {
+    pub fn answer(&self, state: &OperatorState) -> OperatorOutput {
         let [e1, e2] = state.errors;
         let past = self.operator.output(&state.state) + self.taps[1] * e1 + self.taps[2] * e2;
         let (known, tap) = if self.delay == 0 {
@@ -154,12 +154,12 @@ impl HeldLoop {
             let mask = state.ring.len() - 1;
             (state.ring[state.k.wrapping_sub(self.delay) & mask], 0.0)
         };
-        Answer { past, known, tap }
+        OperatorOutput { past, known, tap }
     }
 
     /// Takes the error of the sample that was answered: the operator is one sample on.
     #[inline]
-    pub fn respond(&self, state: &mut OperatorState, answer: Answer, e: f64) {
+    pub fn respond(&self, state: &mut OperatorState, answer: OperatorOutput, e: f64) {
         let mask = state.ring.len() - 1;
         state.ring[state.k & mask] = answer.past + self.taps[0] * e;
         state.k += 1;
@@ -173,7 +173,7 @@ impl HeldLoop {
     #[inline]
     pub fn step(&self, state: &mut LoopState, inputs: Inputs) -> Outputs {
         let answer = self.answer(&state.operator);
-        let Answer { known, tap, .. } = answer;
+        let OperatorOutput { known, tap, .. } = answer;
         let direct = self.element_direct();
         let of_state = self.element_output * self.element.output(&state.element);
         let rest = inputs.target - of_state - direct * (known + inputs.remnant + inputs.disturbance);
@@ -226,7 +226,7 @@ impl OperatorState {
         }
     }
 
-    /// What it stands at, as numbers; the ring from the sample that is next.
+    /// What it is at, as numbers; the ring from the sample that is next.
     pub fn numbers(&mut self) -> impl Iterator<Item = &mut f64> {
         let oldest = self.k & (self.ring.len() - 1);
         self.ring.rotate_left(oldest);

@@ -1,9 +1,9 @@
 //! The closed loop of any operator of the family, sample by sample.
 //!
-//! The lean path of the reference text's operator stays [`Simulator`](crate::Simulator); here all
-//! orders are found at run time.
+//! The lean path of the thesis's operator stays [`Simulator`](crate::Simulator); here all orders
+//! are found at run time.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `held_loop` | the loop with its parameters at one instant, and one sample of it |
 //! | `noise` | the parts of the remnant and the walk of the stick |

@@ -38,7 +38,7 @@ impl Shaping {
     }
 }
 
-/// Where a filter stands.
+/// Position of a filter.
 #[derive(Debug, Clone)]
 pub(super) struct Shaped {
     state: Vec<f64>,
@@ -81,7 +81,7 @@ impl Shaped {
         }
     }
 
-    /// What it stands at, as numbers.
+    /// What it is at, as numbers.
     pub fn numbers(&mut self) -> impl Iterator<Item = &mut f64> {
         self.state.iter_mut()
     }

@@ -1,9 +1,9 @@
 //! The operator of a scenario of the family alone, a sample at a time: for a loop that is closed elsewhere.
 //!
-//! What [`FamilySimulator`] does of `u = r(k - l) + n`, with the same random numbers and the strength of remnant that
-//! the loop of the scenario gives: a loop that answers u as its controlled element does gives the same run to the last
-//! bit. What the recorder adds to e and u (`offset_e`, `offset_u`) is not the operator's. The control of a sample must
-//! not hang on the error of the same sample.
+//! Simulates, as [`FamilySimulator`] does in a loop, `u = r(k - l) + n`, with the same random numbers and the strength
+//! of remnant that the loop of the scenario gives: a loop that answers u as its controlled element does gives the same
+//! run to the last bit. Contribution of the recorder to e and u (`offset_e`, `offset_u`) is not the operator's. The
+//! control of a sample must not hang on the error of the same sample.
 
 use super::{
     FamilySimulator,
@@ -80,14 +80,14 @@ impl FamilyOperatorRun {
         self.n = self.remnant.next(scenario, remnants, self.k);
     }
 
-    /// Where it stands, as numbers.
+    /// Its position, as numbers.
     pub fn saved(&mut self) -> Vec<f64> {
         let beside = [self.k as f64, self.n];
         beside.into_iter().chain(self.numbers().map(|number| *number)).collect()
     }
 
-    /// Goes on from where an operator of the same scenario and run stood ([`FamilyOperatorRun::saved`]), with the same
-    /// digits. False where the numbers are of another; then nothing has changed.
+    /// Continues from where an operator of the same scenario and run was ([`FamilyOperatorRun::saved`]), with the same
+    /// digits. False if the numbers are of another; then nothing has changed.
     pub fn restore(&mut self, saved: &[f64]) -> bool {
         let Some((&[k, n], rest)) = saved.split_first_chunk::<2>() else {
             return false;
@@ -223,7 +223,7 @@ mod tests {
         }
     }
 
-    /// An operator goes on in another, behind the end of its scenario too.
+    /// An operator continues in another, after the end of its scenario too.
     #[test]
     fn a_saved_operator_goes_on_with_the_same_digits() {
         let new = || FamilyOperatorRun::new(FamilySimulator::new(&busy()).unwrap(), SEED, 0.0).unwrap();

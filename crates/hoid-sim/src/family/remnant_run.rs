@@ -1,4 +1,4 @@
-//! What u holds beside the response, sample by sample: the parts of the remnant, and the walk of the stick.
+//! Components of u other than the response, sample by sample: the parts of the remnant, and the walk of the stick.
 //!
 //! `n(k) = walk(k) + sum of K_i(k) G_i(q) w_i(k)`, with K_i of [`calibration`](super::calibration) and w_i of
 //! [`noise`](super::noise), scaled by what it follows where it depends on the signal. All of it is known before the
@@ -24,7 +24,7 @@ pub(super) struct Remnants {
 }
 
 impl Remnants {
-    /// A number of the calibration at sample `k`, on its way from the initial to the last one; behind the end of the
+    /// A number of the calibration at sample `k`, on its way from the initial to the last one; after the end of the
     /// scenario it is that of the last sample.
     #[inline]
     fn calibrated(&self, scenario: &ResolvedFamilyScenario, k: usize, of: impl Fn(&Calibration) -> f64) -> f64 {
@@ -41,7 +41,7 @@ fn samples_of(scenario: &ResolvedFamilyScenario) -> usize {
     scenario.run_in_samples() + scenario.measurement_samples()
 }
 
-/// The remnant of a run, and where it stands.
+/// The remnant of a run, and its position.
 #[derive(Debug, Clone)]
 pub(super) struct RemnantRun {
     run: RunSeed,
@@ -80,7 +80,8 @@ impl RemnantRun {
         new
     }
 
-    /// Draws the random numbers of so many samples where there are fewer; the first ones are the same for any number.
+    /// Draws the random numbers of a given number of samples where there are fewer; the first ones are the same for any
+    /// number.
     fn draw(&mut self, scenario: &ResolvedFamilyScenario, samples: usize) {
         if samples <= self.steps.len() {
             return;
@@ -101,7 +102,7 @@ impl RemnantRun {
     /// The remnant of sample `k`, which comes after that of `k - 1`.
     #[inline]
     pub fn next(&mut self, scenario: &ResolvedFamilyScenario, of: &Remnants, k: usize) -> f64 {
-        // Behind the end of the scenario it goes on.
+        // After the end of the scenario it continues.
         if k >= self.steps.len() {
             self.draw(scenario, 2 * k + 1);
         }
@@ -119,7 +120,7 @@ impl RemnantRun {
     /// Takes the control of sample `k`, after its remnant.
     #[inline]
     pub fn follow(&mut self, scenario: &ResolvedFamilyScenario, of: &Remnants, k: usize, u: f64) {
-        // Of a run that was restored here nothing has been drawn yet.
+        // For a run that was restored here nothing has been drawn yet.
         self.draw(scenario, k + 1);
         for (i, part) in scenario.scenario().remnant.iter().enumerate() {
             if let Some(own) = part.signal_dependence {
@@ -138,7 +139,7 @@ impl RemnantRun {
         self.walk += scenario.stick.walk_per_root_s * scenario.sample_time.s().sqrt() * self.steps[k];
     }
 
-    /// What it stands at, as numbers.
+    /// What it is at, as numbers.
     pub fn numbers(&mut self) -> impl Iterator<Item = &mut f64> {
         let shaped = self.shaped.iter_mut().flat_map(Shaped::numbers);
         [&mut self.walk, &mut self.before]

@@ -29,7 +29,7 @@ pub struct FamilySimulator {
     pub(super) scenario: ResolvedFamilyScenario,
     /// Each with the state that it is of.
     loops: Vec<(FamilyState, HeldLoop)>,
-    /// Place in `loops` of each sample; empty where there is one for all.
+    /// Place in `loops` of each sample; empty if there is one for all.
     places: Vec<usize>,
     pub(super) remnants: Remnants,
 }
@@ -126,7 +126,7 @@ impl FamilySimulator {
         self.scenario.run_in_samples() + self.scenario.measurement_samples()
     }
 
-    /// The loop at sample `k`; behind the end of the scenario it is that of the last one.
+    /// The loop at sample `k`; after the end of the scenario it is that of the last one.
     #[inline]
     pub(super) fn held(&self, k: usize) -> &HeldLoop {
         let place = self.places.get(k).or(self.places.last()).copied().unwrap_or(0);
@@ -206,7 +206,7 @@ impl FamilySimulator {
         let (ts, samples) = (scenario.sample_time, self.samples());
         let shown_s = self.scenario.time_s(0) + seen.preview_s;
         let shown = phased(&scenario.target, run, TARGET_PHASES)?.samples(shown_s, ts, samples);
-        let held = seen.operator.hold(ts)?;
+        let held = seen.operator.zoh(ts)?;
         let mut response = vec![0.0; samples];
         fir(&held.b, held.nk, &shown, &mut response);
         divide_in_place(&held.f, &mut response);

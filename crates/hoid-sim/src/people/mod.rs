@@ -17,7 +17,7 @@
 //! # Ok::<(), hoid_sim::SimError>(())
 //! ```
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `population` | [`Population`]: the ranges, with their sources; [`Plant`] |
 //! | `remnants` | [`RemnantKind`]: remnants like people's |

@@ -45,7 +45,7 @@ impl Default for Task {
 /// A person with everything true of them.
 #[derive(Debug, Clone)]
 pub struct Person {
-    /// What they control.
+    /// The controlled element.
     pub plant: Plant,
     /// Their operator, and the controlled element.
     pub state: FamilyState,
@@ -121,7 +121,7 @@ impl Person {
             let Some(taken) = loop_of(population, plant, form, &draw[1..])? else {
                 continue;
             };
-            let Taken {
+            let AcceptedLoop {
                 state,
                 crossover_rad_s,
                 phase_margin_deg,
@@ -135,7 +135,7 @@ impl Person {
             scenario.remnant.clone_from(&remnant);
             scenario.measurement_s = task.measurement_s;
             scenario.run_in_s = task.run_in_s;
-            // What is stable in continuous time need not be so behind the holds.
+            // What is stable in continuous time need not be so after the holds.
             let simulator = match FamilySimulator::new(&scenario) {
                 Err(SimError::Model(ModelError::UnstableLoop { .. })) => continue,
                 other => other?,
@@ -233,14 +233,14 @@ impl Person {
 }
 
 /// A loop that a population takes.
-struct Taken {
+struct AcceptedLoop {
     state: FamilyState,
     crossover_rad_s: f64,
     phase_margin_deg: f64,
 }
 
 /// The loop of one draw with its crossover and margin, where the population takes it.
-fn loop_of(population: &Population, plant: Plant, form: Form, draw: &[f64]) -> Result<Option<Taken>, SimError> {
+fn loop_of(population: &Population, plant: Plant, form: Form, draw: &[f64]) -> Result<Option<AcceptedLoop>, SimError> {
     let kinds = form.coordinates(true);
     let value = |kind: &Coordinate| match kind {
         Coordinate::Gain => 1.0,
@@ -284,7 +284,7 @@ fn loop_of(population: &Population, plant: Plant, form: Form, draw: &[f64]) -> R
         return Ok(None);
     };
     let taken = population.phase_margin_deg.contains(phase_margin_deg);
-    Ok(taken.then_some(Taken {
+    Ok(taken.then_some(AcceptedLoop {
         state,
         crossover_rad_s,
         phase_margin_deg,

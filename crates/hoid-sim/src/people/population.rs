@@ -1,4 +1,4 @@
-//! Who is drawn, and what they control.
+//! The person drawn, and the controlled element.
 //!
 //! Each parameter is drawn uniformly over a range, the time constants and the damping over its
 //! logarithm. The gain follows from a crossover frequency that is drawn likewise. A loop whose phase
@@ -41,7 +41,7 @@ impl Range {
         self.low * (self.high / self.low).powf(part)
     }
 
-    /// True where it holds the value.
+    /// True if it holds the value.
     pub fn contains(&self, value: f64) -> bool {
         (self.low..=self.high).contains(&value)
     }
@@ -145,7 +145,7 @@ impl Population {
     }
 }
 
-/// What a virtual person controls.
+/// The controlled element of a virtual person.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Plant {
     /// `1/s`.

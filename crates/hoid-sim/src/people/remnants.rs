@@ -2,7 +2,7 @@
 //!
 //! All but the first have three parts: a broad band `1/(T_n s + 1)` with T_n = 0.05 to 0.3 s, 70 %
 //! of the remnant; a peak at the person's own omega_nm with a damping of 0.15 to 0.4, 20 %; a drift
-//! `1/(T_n s + 1)` with T_n = 3 to 10 s, 10 %. What makes each kind is told with its source in
+//! `1/(T_n s + 1)` with T_n = 3 to 10 s, 10 %. What makes each kind is reported with its source in
 //! [`hoid_model::family_scenario`].
 
 use hoid_model::family_scenario::{Followed, Intermittence, Pulses, RemnantPart, RemnantShape, SignalDependence};
@@ -12,7 +12,7 @@ use super::population::Range;
 /// A kind of remnant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum RemnantKind {
-    /// `1/(T_n s + 1)` alone, as in the reference text.
+    /// `1/(T_n s + 1)` alone, as in the thesis.
     Lag,
     /// Broad band, peak and drift, Gaussian.
     BroadBand,

@@ -1,16 +1,14 @@
-//! What is done with the runs of a person in a condition, and with one run.
+//! Treatment of the runs of a person in a condition, and with one run.
 //!
-//! All runs of a person in a condition come first. Where nothing changes within them the family of
-//! operators is fitted to all of them at once ([`hoid_ident::family`]): the operator of the person.
-//! nk, and for Box-Jenkins nd and T_n, are one choice for all of them too (`run_orders`). Beside these
-//! stands a Box-Jenkins model of all runs with initial states of each, the delay that fits best, and
-//! the greatest order of the noise model that the manifest allows. In a closed loop a noise model
-//! that is too small biases the operator, and one run is too short for a great one.
+//! All runs of a person in a condition come first. Where nothing changes within them the family of operators is fitted
+//! to all of them at once ([`hoid_ident::family`]): the operator of the person. nk, and for Box-Jenkins nd and T_n, are
+//! one choice for all of them too (`run_orders`). In addition there is a Box-Jenkins model of all runs with initial
+//! states of each, the delay that fits best, and the greatest order of the noise model that the manifest allows. In a
+//! closed loop a noise model that is too small biases the operator, and one run is too short for a great one.
 //!
-//! With the chosen orders, ARX and Box-Jenkins models are fitted to the sub-batches of each run and
-//! to the whole of it, and the recursions start from the fit of the first sub-batch; the family is
-//! fitted to the whole run with the form of the person. A row says what was estimated in which
-//! window; what fails is a row with its reason.
+//! With the chosen orders, ARX and Box-Jenkins models are fitted to the sub-batches of each run and to the whole of it,
+//! and the recursions start from the fit of the first sub-batch; the family is fitted to the whole run with the form of
+//! the person. A row reports what was estimated in which window; what fails is a row with its reason.
 
 use std::path::Path;
 
@@ -37,12 +35,12 @@ use crate::statistics::median;
 
 /// Label of a run that could not be read.
 pub(super) const READ: &str = "read";
-/// Label of what is of the recording itself.
+/// Label for the recording itself.
 pub(super) const RECORD: &str = "record";
 /// Name of the table of people.
 pub(super) const PEOPLE: &str = "people";
 
-/// What all runs of a person in a condition say of each.
+/// Statement of all runs of a person in a condition about each.
 pub(super) struct FromCell {
     arx: Result<Orders, String>,
     box_jenkins: Result<Orders, String>,
@@ -110,7 +108,7 @@ pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>
     let late_samples = analysis.rows.condition.offset_samples;
     let people = match (&cell.changes, runs.is_empty()) {
         (Some(reason), _) => vec![Person::without(cell.key(), PersonStatus::Changes, reason)],
-        // The run of a file that cannot be read says so.
+        // The run of a file that cannot be read reports it.
         (None, true) => vec![Person::without(
             cell.key(),
             PersonStatus::Failed,
@@ -200,18 +198,18 @@ impl<'a> RunAnalysis<'a> {
         }
     }
 
-    /// A recursion over the run: one that starts itself is told nothing, another has the orders of the cell and
+    /// A recursion over the run: one that starts itself gets no information, another has the orders of the cell and
     /// starts from a fit of the first window.
     fn track(&mut self, run: &Run, windows: &[Window; 3], method: &Method, from_cell: &FromCell) {
         let label = traces::label_of(method);
         let mut tracking = Tracking {
-            // The run is mended and at its rate.
+            // The run is repaired and at its rate.
             rate: Decimation::Off,
             every: run.samples(self.settings.trace_every as f64).round().max(1.0) as usize,
             ..Tracking::of(TrackRequest::of(method.clone()))
         };
         if !method.starts_itself() {
-            let structure = method.usual_structure();
+            let structure = method.default_structure();
             match from_cell.orders(structure) {
                 Ok(orders) => {
                     let has = |name: &str| name == "nk" || structure.polynomials().contains(&name[1..]);

@@ -1,4 +1,4 @@
-//! What is done with each run: the keys of `[analysis]`.
+//! Treatment of each run: the keys of `[analysis]`.
 
 use hoid_ident::family::FamilyEstimator;
 use hoid_model::{Form, Structure, operator_family::Coordinate};
@@ -6,7 +6,7 @@ use hoid_track::Method;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What is done with each run.
+/// Treatment of each run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AnalysisSettings {
@@ -22,8 +22,7 @@ pub struct AnalysisSettings {
     /// Recursions by name, as in `hoid track`. Default: adaptive, rls, rpem.
     #[schemars(extend("items" = serde_json::json!({ "enum": method_names() })))]
     pub methods: Vec<String>,
-    /// Polynomial models that are fitted beside the operator, in tables and figures: arx, bj, both or
-    /// none.
+    /// Polynomial models that are fitted next to the operator, in tables and figures: arx, bj, both or none.
     #[schemars(extend("items" = serde_json::json!({ "enum": POLYNOMIALS.map(Structure::name) })))]
     pub polynomials: Vec<String>,
     /// Samples from one kept point of a trace to the next.
@@ -33,8 +32,8 @@ pub struct AnalysisSettings {
     /// Form of the operator of the family: auto, or the name of one.
     #[schemars(extend("enum" = serde_json::json!(form_names())))]
     pub form: String,
-    /// What is known of the operator before the data: population, none, or
-    /// NAME=CENTRE:SPREAD separated by commas.
+    /// Prior knowledge of the operator before the data: population, none, or NAME=CENTRE:SPREAD
+    /// separated by commas.
     pub prior: String,
     /// Parameters of the operator that each run has for itself, such as K; all others are common to
     /// the runs of a person in a condition.
@@ -95,7 +94,7 @@ impl AnalysisSettings {
         self.methods.iter().map(of).collect()
     }
 
-    /// The polynomial models that are fitted, in their usual order.
+    /// The polynomial models that are fitted, in their default order.
     ///
     /// # Errors
     /// A name of another structure, or of none.
@@ -119,7 +118,7 @@ impl AnalysisSettings {
         let (fitted, recursions) = (self.polynomials()?, self.recursions()?);
         let started = |structure: Structure| {
             let mut from_fits = recursions.iter().filter(|method| !method.starts_itself());
-            from_fits.any(|method| method.usual_structure() == structure)
+            from_fits.any(|method| method.default_structure() == structure)
         };
         let needed = |structure: &Structure| fitted.contains(structure) || started(*structure);
         Ok(POLYNOMIALS.into_iter().filter(needed).collect())
@@ -177,7 +176,7 @@ impl AnalysisSettings {
         for (from, to) in self.windows_s.iter().flatten() {
             if !(from < to && from.is_finite() && to.is_finite()) {
                 return Err(format!(
-                    "analysis.windows_s has [{from}, {to}], expected a beginning before its end"
+                    "analysis.windows_s has [{from}, {to}], expected a start before its end"
                 ));
             }
         }

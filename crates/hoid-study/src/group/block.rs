@@ -1,11 +1,11 @@
-//! What is analysed at once and is a part on disk: a run, or all runs of a person in a condition.
+//! Unit of analysis, which is one part on disk: a run, or all runs of a person in a condition.
 
 use super::manifest::{Manifest, RunEntry};
 
 /// All runs of a person in a condition.
 pub(super) struct Cell<'a> {
     pub runs: Vec<&'a RunEntry>,
-    /// Why it has no operator of its own: what the person does changes within the runs.
+    /// Why it has no operator of its own: the behaviour of the person changes within the runs.
     pub changes: Option<String>,
 }
 
@@ -16,7 +16,7 @@ impl Cell<'_> {
     }
 }
 
-/// What is analysed at once and is a part on disk.
+/// Unit of analysis, which is one part on disk.
 pub(super) enum Block<'a> {
     Run(&'a RunEntry),
     Cell(Cell<'a>),

@@ -1,11 +1,11 @@
-//! What is known of a condition: the keys of `[conditions.NAME]`.
+//! Known properties of a condition: the keys of `[conditions.NAME]`.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::preparation_settings::PreparationSettings;
 
-/// What is known of a condition.
+/// Known properties of a condition.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ConditionSettings {
@@ -25,8 +25,7 @@ pub struct ConditionSettings {
     /// Time at which the task changes, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub change_s: Option<f64>,
-    /// What is done to its runs before they are analysed; what it names wins over that of the
-    /// group.
+    /// Treatment of its runs before they are analysed; what it names wins over that of the group.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prepare: Option<PreparationSettings>,
 }

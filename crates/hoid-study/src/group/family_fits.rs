@@ -86,7 +86,7 @@ fn run_of(runs: &[&RunEntry], recording: &str) -> String {
     runs.iter().find_map(of).unwrap_or_else(|| recording.to_owned())
 }
 
-/// Parameters, loop and response of a fit of records that were put beside each other.
+/// Parameters, loop and response of a fit of records that were put next to each other.
 pub(super) fn rows_of_fit(rows: &mut RunRows<'_>, window: Window, label: &str, fit: &FamilyFit, record: &Record) {
     let of = fit.operator(0);
     for parameter in of.parameters.iter().filter(|p| p.value.is_finite()) {

@@ -3,7 +3,7 @@
 //!
 //! For each subject and each condition whose excitation the manifest names: the describing function
 //! over the runs that can be read, its verdict, and crossover and margins with the controlled
-//! element, all as `hoid describe` has them ([`describe_runs`]). They stand beside the parametric
+//! element, all as `hoid describe` has them ([`describe_runs`]). They are next to the parametric
 //! fits and assume nothing of their structure.
 //!
 //! How far a fit is from it: with `H_j` the describing function at line j, `s_j` its standard error
@@ -17,7 +17,7 @@
 //! known, a fit agrees when its crossover is within 10 % and its phase margin within 5 deg of those
 //! of the describing function: about what two experiments with the same person differ by; else when
 //! its distance is below 10 %. Where the task changes within the run, both are averages over what
-//! changes, in different ways, and nothing is said.
+//! changes, in different ways, and nothing is reported.
 
 use std::path::Path;
 
@@ -35,7 +35,7 @@ use super::{
 };
 use crate::{columns::Rows, statistics::median};
 
-/// What the describing functions say: a row a line, and a row a subject and condition.
+/// Results of the describing functions: a row a line, and a row a subject and condition.
 pub(super) struct Frequencies {
     pub lines: OutputTable,
     pub margins: OutputTable,
@@ -84,7 +84,7 @@ struct Tables {
 }
 
 /// Describing functions of all subjects and conditions with an excitation, and how far the fits are
-/// from them; none where the manifest names none.
+/// from them; none if the manifest names none.
 pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAverages) -> Option<Frequencies> {
     manifest.conditions.values().find(|facts| facts.excitation.is_some())?;
     let with_errors: Vec<String> = MARGINS

@@ -46,7 +46,7 @@ struct RunOfCell {
     change_s: Option<f64>,
 }
 
-/// Makes the tables from the parts: Parquet, and CSV beside it where `csv` is set.
+/// Makes the tables from the parts: Parquet, and CSV next to it where `csv` is set.
 pub(super) fn join(
     manifest: &Manifest,
     base: &Path,

@@ -49,7 +49,7 @@ use super::{
     preparation_settings::PreparationSettings, read_settings::ReadSettings,
 };
 
-/// Name of the copy of the manifest beside the results.
+/// Name of the copy of the manifest next to the results.
 pub const MANIFEST: &str = "group.toml";
 
 /// A group of recorded runs.
@@ -61,13 +61,13 @@ pub struct Manifest {
     /// How the files are read.
     #[serde(default)]
     pub read: ReadSettings,
-    /// What is done to the runs before they are analysed.
+    /// Treatment of the runs before they are analysed.
     #[serde(default, skip_serializing_if = "PreparationSettings::is_empty")]
     pub prepare: PreparationSettings,
-    /// What is done with each run.
+    /// Treatment of each run.
     #[serde(default)]
     pub analysis: AnalysisSettings,
-    /// What is known of the conditions, by name.
+    /// Known properties of the conditions, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub conditions: BTreeMap<String, ConditionSettings>,
     /// The runs.
@@ -80,13 +80,13 @@ pub struct Manifest {
 pub struct RunEntry {
     /// Its file, from the directory of the manifest.
     pub file: PathBuf,
-    /// A second file that is joined behind the first, from the next sample on: what the person
-    /// controls changes at the seam.
+    /// A second file that is joined after the first, from the next sample on: the controlled
+    /// element changes at the seam.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub then: Option<PathBuf>,
-    /// Who it is.
+    /// Identity.
     pub subject: String,
-    /// What was controlled.
+    /// The controlled element.
     #[serde(default)]
     pub condition: String,
     /// Which run.
@@ -144,7 +144,7 @@ impl Manifest {
             }
             if !known.insert((&run.subject, &run.condition, &run.run)) {
                 return Err(format!(
-                    "run {} of {} in {:?} is there twice, the second time as {}: give each its own run",
+                    "run {} of {} in {:?} is duplicated, the second time as {}: give each its own run",
                     run.run,
                     run.subject,
                     run.condition,
@@ -238,7 +238,7 @@ impl Manifest {
         Ok((manifest, others))
     }
 
-    /// What is done to the runs of a condition.
+    /// Treatment of the runs of a condition.
     ///
     /// # Errors
     /// The key that has no meaning, and why.
@@ -247,7 +247,7 @@ impl Manifest {
         self.prepare.preparation(of_condition)
     }
 
-    /// What a high rate by itself makes of the runs of a condition.
+    /// Decimation of the runs of a condition because of a high rate.
     ///
     /// # Errors
     /// As [`Manifest::preparation`].

@@ -1,13 +1,13 @@
 //! Recorded runs of several subjects: from a folder of files to a group result.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`Manifest`] | which file is which run of which subject, and what is done with it |
-//! | [`ReadSettings`], [`PreparationSettings`], [`AnalysisSettings`], [`ConditionSettings`] | its tables: how runs are read, prepared and analysed, and what is known of a condition |
-//! | [`inspect`], [`commented`] | a manifest completed by what the files say, with the evidence |
+//! | [`ReadSettings`], [`PreparationSettings`], [`AnalysisSettings`], [`ConditionSettings`] | its tables: how runs are read, prepared and analysed, and the prior knowledge of a condition |
+//! | [`inspect`], [`commented`] | a manifest completed by what the files state, with the evidence |
 //! | [`Pattern`] | subject, condition and run from names of files |
 //! | [`run_group`] | the analysis in a directory, part by part |
-//! | `reading` | runs from files, and what was done to them |
+//! | `reading` | runs from files, and the processing of them |
 //! | `analysis` | what is done with the runs of a person in a condition (`block`) and with one run, in which `windows`, with which orders (`run_orders`), and the rows of it (`run_rows`) |
 //! | `family_fits`, [`Person`] | the operator of a person in a condition, and its row in the table of people |
 //! | [`RunEstimates`] | what was found in each run, read back from the tables |
@@ -22,8 +22,8 @@
 //! | `averages` | means over the runs, chosen delays, averages of traces |
 //! | `join` | the tables of the group from those of its runs |
 //!
-//! Each run is a part on disk, as a block of a study is, and so is what is found in all runs of a
-//! person in a condition, which comes first: a group that was stopped goes on, and of a run nothing stays in memory but its
+//! Each run is a part on disk, as a block of a study is, and so are the findings in all runs of a person in a
+//! condition, which comes first: a group that was stopped continues, and of a run nothing stays in memory but its
 //! estimates and responses; traces are averaged for one person in one condition after the other.
 
 mod analysis;

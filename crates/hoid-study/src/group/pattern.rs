@@ -1,7 +1,7 @@
 //! Names of files as patterns: `{subject}_{condition}_{run}*.csv`.
 //!
-//! A name in braces stands for one or more characters, as few as possible, `*` for any number of
-//! them; everything else stands for itself.
+//! A name in braces represents one or more characters, as few as possible, `*` for any number of
+//! them; everything else represents itself.
 
 use std::fmt;
 
@@ -19,12 +19,12 @@ enum Part {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pattern(Vec<Part>);
 
-/// What the names in braces stand for in one file name.
+/// Values of the names in braces in one file name.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FileNameParts {
     /// `{subject}`.
     pub subject: String,
-    /// `{condition}`; empty where the pattern has none.
+    /// `{condition}`; empty if the pattern has none.
     pub condition: String,
     /// `{run}`.
     pub run: String,
@@ -46,8 +46,8 @@ impl Pattern {
     /// Reads a pattern.
     ///
     /// # Errors
-    /// [`StudyError::Pattern`] for braces that are not closed, other names, one that is there
-    /// twice, two names without a text between them, or a pattern without `{run}`.
+    /// [`StudyError::Pattern`] for braces that are not closed, other names, one that is duplicated,
+    /// two names without a text between them, or a pattern without `{run}`.
     pub fn new(text: &str) -> Result<Self, StudyError> {
         let bad = |reason: String| StudyError::Pattern {
             pattern: text.to_owned(),
@@ -65,11 +65,11 @@ impl Pattern {
                     .ok_or_else(|| bad("a brace is not closed".to_owned()))?;
                 if !NAMES.contains(&name) {
                     return Err(bad(format!(
-                        "{{{name}}} is no name, expected {{subject}}, {{condition}} or {{run}}"
+                        "{{{name}}} is not a name, expected {{subject}}, {{condition}} or {{run}}"
                     )));
                 }
                 if parts.contains(&Part::Name(name.to_owned())) {
-                    return Err(bad(format!("{{{name}}} is there twice")));
+                    return Err(bad(format!("{{{name}}} is duplicated")));
                 }
                 if matches!(parts.last(), Some(Part::Name(_))) {
                     return Err(bad(format!("nothing separates {{{name}}} from the name before it")));
@@ -88,7 +88,7 @@ impl Pattern {
         Ok(Self(parts))
     }
 
-    /// What the names stand for in a file name; none where it does not match.
+    /// Values of the placeholders in a file name; none if it does not match.
     pub fn matches(&self, name: &str) -> Option<FileNameParts> {
         let mut found = FileNameParts::default();
         found_in(&self.0, name, &mut found).then_some(found)

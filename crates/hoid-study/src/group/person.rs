@@ -18,14 +18,14 @@ use crate::columns::Rows;
 /// Name of the run that is all of them.
 pub(super) const ALL: &str = "all";
 
-/// What became of a fit.
+/// Outcome of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PersonStatus {
     /// It has a result.
     Fitted,
     /// It failed.
     Failed,
-    /// There is none, since what the person does changes within the runs.
+    /// There is none, since the behaviour of the person changes within the runs.
     Changes,
 }
 
@@ -46,9 +46,9 @@ pub struct Person {
     pub run: String,
     /// How many runs were fitted together.
     pub runs: usize,
-    /// What became of it.
+    /// Outcome of it.
     pub status: PersonStatus,
-    /// Why there is no result; empty where there is one.
+    /// Why there is no result; empty if there is one.
     pub reason: String,
     /// The form of the operator.
     pub form: String,
@@ -68,11 +68,11 @@ pub struct Person {
     pub kappa: Option<f64>,
     /// Order nd of the noise model.
     pub noise_order: Option<usize>,
-    /// What the result is worth.
+    /// Verdict on the result.
     pub verdict: Option<VerdictLevel>,
-    /// What speaks against it.
+    /// Findings against it.
     pub reasons: Vec<String>,
-    /// What is worth knowing besides.
+    /// Additional notes.
     pub notes: Vec<String>,
 }
 
@@ -142,7 +142,7 @@ impl Person {
         self.parameters.iter().find(|p| p.name == name)
     }
 
-    /// Who and where: `P03 in fo`.
+    /// Person and place: `P03 in fo`.
     pub fn name(&self) -> String {
         let of_run = if self.is_of_all_runs() {
             String::new()
@@ -248,7 +248,7 @@ impl Person {
     }
 }
 
-/// Who and where, in words.
+/// Person and place, as text.
 pub(super) fn cell_name(subject: &str, condition: &str) -> String {
     if condition.is_empty() {
         subject.to_owned()
@@ -340,7 +340,7 @@ mod tests {
         let table = people_table(&[person.clone(), failed.clone()]);
         assert_eq!(people_of(&table), [person.clone(), failed.clone()]);
         assert_eq!((person.name().as_str(), failed.name().as_str()), ("P in c, run 3", "Q"));
-        // Nobody has a lead: no columns of it.
+        // No one has a lead: no columns of it.
         assert!(table.column("T_L").is_none() && table.column("T_I_low").is_some());
         person.parameters.clear();
         assert!(people_table(&[person]).column("tau_e").is_none());

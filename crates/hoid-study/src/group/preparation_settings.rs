@@ -13,9 +13,9 @@
 //! offset = { stick = 0 }
 //! ```
 //!
-//! Where nothing is said of the rate, what is recorded at more than 200 Hz is decimated to about 100
-//! Hz ([`hoid_model::resampling`]); `offset_samples` of a condition counts samples as they were recorded,
-//! behind a factor or a frequency of one's own those of the new rate.
+//! If the rate is not specified, what is recorded at more than 200 Hz is decimated to about 100 Hz
+//! ([`hoid_model::resampling`]); `offset_samples` of a condition counts samples as they were recorded, after a factor
+//! or a frequency of one's own those of the new rate.
 
 use std::collections::BTreeMap;
 
@@ -24,19 +24,20 @@ use hoid_model::Decimation;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What is done to the runs before they are analysed. What is left out is not done, or as the group
-/// says.
+/// Treatment of the runs before they are analysed. What is left out is not done, or as the group
+/// reports.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PreparationSettings {
     /// Factor, factor and unit, or two units by channel.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub scale: BTreeMap<String, NumberOrText>,
-    /// By how much a channel was recorded late, in samples, or in s as a text such as "0.0167s".
+    /// Amount by which a channel was recorded late, in samples, or in s as a text such as
+    /// "0.0167s".
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub offset: BTreeMap<String, NumberOrText>,
-    /// Every M-th sample behind a low-pass filter; "off" or 1 keeps the rate. Default: "auto", above 200
-    /// Hz by the M that comes nearest to 100 Hz.
+    /// Every M-th sample after a low-pass filter; "off" or 1 keeps the rate. Default: "auto", above 200 Hz by the M
+    /// that comes nearest to 100 Hz.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub decimate: Option<NumberOrText>,
     /// New sampling frequency, Hz.
@@ -45,7 +46,7 @@ pub struct PreparationSettings {
     /// Time from the first sample that is dropped, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub run_in_s: Option<f64>,
-    /// Whether rows that are there twice are dropped.
+    /// Whether rows that are duplicated are dropped.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drop_repeated: Option<bool>,
 }
@@ -70,13 +71,12 @@ impl NumberOrText {
 }
 
 impl PreparationSettings {
-    /// Whether it says nothing.
+    /// Whether it carries no information.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
 
-    /// What is said of the rate: it is one thing with two keys, and a condition that names one of them
-    /// names the rate.
+    /// Report about the rate: it is one thing with two keys, and a condition that names one of them names the rate.
     fn rate<'a>(&'a self, condition: Option<&'a Self>) -> (Option<&'a NumberOrText>, Option<f64>) {
         let of = condition.unwrap_or(self);
         let named = of.decimate.is_some() || of.rate_hz.is_some();
@@ -84,7 +84,7 @@ impl PreparationSettings {
         (of.decimate.as_ref(), of.rate_hz)
     }
 
-    /// What a high rate by itself makes of the runs of a condition: nothing where the rate is named.
+    /// Decimation of the runs of a condition because of a high rate: nothing if the rate is named.
     ///
     /// # Errors
     /// The key that has no meaning, and why.
@@ -96,8 +96,8 @@ impl PreparationSettings {
         })
     }
 
-    /// What is done to the runs of a condition: what the condition says, and what the group says of
-    /// the rest.
+    /// Treatment of the runs of a condition: what the condition states, and what the group reports
+    /// about the rest.
     ///
     /// # Errors
     /// The key that has no meaning, and why.
@@ -128,7 +128,7 @@ impl PreparationSettings {
     }
 }
 
-/// A factor, or the words for it; auto where nothing is said.
+/// A factor, or the words for it; auto where nothing is specified.
 fn decimation(typed: Option<&NumberOrText>) -> Result<Decimation, String> {
     let Some(typed) = typed else {
         return Ok(Decimation::Auto);
@@ -138,7 +138,7 @@ fn decimation(typed: Option<&NumberOrText>) -> Result<Decimation, String> {
         .map_err(|_| format!("decimate is {text}, expected \"auto\", \"off\", or by how many samples, 1 or more"))
 }
 
-/// What is said of each channel; the second list wins.
+/// Report about each channel; the second list wins.
 fn parsed<T>(
     group: &BTreeMap<String, NumberOrText>,
     condition: &BTreeMap<String, NumberOrText>,

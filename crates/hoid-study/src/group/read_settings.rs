@@ -12,7 +12,7 @@ pub struct ReadSettings {
     pub input: String,
     /// Column of the output.
     pub output: String,
-    /// Column of the time and its unit, as `clock:ms`; t, or a usual name of a time, where it is left out.
+    /// Column of the time and its unit, as `clock:ms`; t, or a common name of a time, where it is left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<String>,
     /// The trial of each file that is read, as `trial=3`.
@@ -21,7 +21,7 @@ pub struct ReadSettings {
     /// Sampling frequency, Hz; that of the column t where it is left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sampling_hz: Option<f64>,
-    /// Begin of the span that counts, s.
+    /// Start of the span that counts, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub from_s: Option<f64>,
     /// End of the span that counts, s.
@@ -31,7 +31,7 @@ pub struct ReadSettings {
     pub resample: bool,
     /// Bridge missing values.
     pub fill: bool,
-    /// What is taken out of e and u: none, mean or linear.
+    /// Trend removed from e and u: none, mean or linear.
     pub detrend: Detrending,
     /// Faults of the recordings: bridge, report or keep. Where a fault is too long to be bridged the operator
     /// of a person is that of all parts without it, and of what is done with single runs the longest part
@@ -39,21 +39,21 @@ pub struct ReadSettings {
     pub faults: FaultTreatment,
 }
 
-/// What is done about faults of a recording.
+/// Treatment of faults of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum FaultTreatment {
     /// Short ones are bridged; of a run with long ones the longest part without them counts.
     #[default]
     Bridge,
-    /// They are told.
+    /// They are reported.
     Report,
-    /// They are not looked for.
+    /// They are not searched for.
     Keep,
 }
 
 impl FaultTreatment {
-    /// The same for who repairs.
+    /// The same for callers that repairs.
     pub(super) fn handling(self) -> FaultHandling {
         match self {
             Self::Bridge => FaultHandling::Bridge,
@@ -63,7 +63,7 @@ impl FaultTreatment {
     }
 }
 
-/// What is taken out of e and u.
+/// Trend removed from e and u.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Detrending {

@@ -1,4 +1,4 @@
-//! Reading the runs of a group as the manifest says, and what was done to them.
+//! Reading the runs of a group as the manifest states, and the processing of them.
 
 use std::path::Path;
 
@@ -15,17 +15,17 @@ use super::{
 };
 use crate::columns::Rows;
 
-/// How the output is put beside the input.
+/// How the output is put next to the input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Pairing {
     /// As recorded, and as `[prepare]` moves channels.
     Recorded,
-    /// With `offset_samples` of the condition taken back too: u beside the e that it answers.
+    /// With `offset_samples` of the condition taken back too: u next to the e that it answers.
     InTheLoop,
 }
 
-/// The record in a file, and what was done to it; the condition may have a preparation of its own.
-fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing) -> Result<Looked, String> {
+/// The record in a file, and the processing of it; the condition may have a preparation of its own.
+fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing) -> Result<CheckedRecord, String> {
     let reading = &manifest.read;
     let text = |error: hoid_io::IoError| error.to_string();
     let options = ReadOptions {
@@ -71,11 +71,15 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
         recorded.record.clone(),
         recorded.account.clone(),
     );
-    let mended = as_recorded
+    let repaired = as_recorded
         .repaired(reading.faults.handling(), Of::Person)
         .map_err(|error| error.to_string())?;
-    let faults = mended.accounts.into_iter().flat_map(|account| account.faults).collect();
-    let longest = mended.records.into_iter().max_by_key(Record::len);
+    let faults = repaired
+        .accounts
+        .into_iter()
+        .flat_map(|account| account.faults)
+        .collect();
+    let longest = repaired.records.into_iter().max_by_key(Record::len);
     let mut read = ReadRecord {
         record: longest.unwrap_or_else(|| read.record.clone()),
         ..read
@@ -87,7 +91,7 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
         .map_err(|error| error.to_string())?;
     read.record = record;
     read.steps.extend(done.map(Step::from));
-    Ok(Looked {
+    Ok(CheckedRecord {
         factor: done.map_or(1, |done| done.factor),
         read,
         faults,
@@ -95,17 +99,17 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
     })
 }
 
-/// What was read, without its faults, and which there were.
-pub(super) struct Looked {
+/// A record that was read and repaired, with the faults found.
+pub(super) struct CheckedRecord {
     read: ReadRecord,
     faults: Vec<Fault>,
-    /// By how much its rate was lowered behind what counts samples as they were recorded.
+    /// Amount by which its rate was lowered after what counts samples as they were recorded.
     factor: usize,
     recorded: Recorded,
 }
 
-/// The tables of the account: what was done to the runs, one step a row, and what is wrong with
-/// their sampling, one finding a row.
+/// The tables of the account: the processing of the runs, one step a row, and the problems of their
+/// sampling, one finding a row.
 pub(super) fn schemas() -> [(&'static str, TableSchema); 2] {
     let schema = |names: &[&str]| {
         let column = |name: &&str| ColumnSchema {
@@ -145,9 +149,9 @@ pub(super) fn schemas() -> [(&'static str, TableSchema); 2] {
 }
 
 /// A file by its name in the manifest, and what was read of it.
-pub(super) type ReadFile<'a> = (&'a Path, Result<Looked, String>);
+pub(super) type ReadFile<'a> = (&'a Path, Result<CheckedRecord, String>);
 
-/// The file of a run, and the one that is joined behind it.
+/// The file of a run, and the one that is joined after it.
 pub(super) fn read_files<'a>(
     manifest: &Manifest,
     base: &Path,
@@ -163,16 +167,16 @@ pub(super) fn read_files<'a>(
         .collect()
 }
 
-/// A run, read and prepared as the manifest says.
+/// A run, read and prepared as the manifest states.
 pub(super) struct Run {
     pub record: Record,
-    /// Where the second file begins, s, for a run that is joined of two.
+    /// Where the second file starts, s, for a run that is joined of two.
     pub seam_s: Option<f64>,
-    /// By how much its rate was lowered: so many samples of the recording are one.
+    /// Amount by which its rate was lowered: so many samples of the recording are one.
     pub factor: usize,
-    /// By how much a sample of the input is taken later than that of the output beside it, s.
+    /// Amount by which a sample of the input is taken later than that of the output next to it, s.
     pub input_lead_s: f64,
-    /// What an identification takes; nothing of a run that is joined of two, whose task changes at the seam.
+    /// Recorded run for an identification; none for a run that is joined of two, whose task changes at the seam.
     pub recorded: Option<Recorded>,
 }
 
@@ -180,7 +184,7 @@ pub(super) struct Run {
 #[derive(Clone)]
 pub(super) struct Recorded {
     pub record: Record,
-    /// What was done to it.
+    /// Processing applied to it.
     pub account: Account,
 }
 
@@ -200,7 +204,7 @@ pub(super) fn read_run(manifest: &Manifest, base: &Path, entry: &RunEntry, pairi
 pub(super) fn run_of(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
     let mut run: Option<Run> = None;
     for (_, read) in files {
-        let Looked {
+        let CheckedRecord {
             read, factor, recorded, ..
         } = read?;
         let record = read.record;
@@ -228,13 +232,13 @@ pub(super) fn run_of(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
     run.ok_or_else(|| "no file is named".to_owned())
 }
 
-/// What was done to the files of a run and what is wrong with them; nothing for one that cannot be
-/// read, which its estimates say.
+/// Processing applied to the files of a run and the problems of them; nothing for one that cannot
+/// be read, which its estimates show.
 pub(super) fn account(entry: &RunEntry, files: &[ReadFile<'_>]) -> [(&'static str, OutputTable); 2] {
     let [(steps_name, steps), (trouble_name, trouble)] = schemas();
     let (mut steps, mut trouble) = (Rows::new(&steps), Rows::new(&trouble));
     for (file, read) in files {
-        let Ok(Looked { read, faults, .. }) = read else {
+        let Ok(CheckedRecord { read, faults, .. }) = read else {
             continue;
         };
         for fault in faults {

@@ -4,7 +4,7 @@
 //! The grid is `omega = 10^(k/32)` rad/s from 0.1 to 40, as far as the sampling goes: 32 points a
 //! decade, so that a straight line between two of them is within 0.01 rad of the phase of a delay
 //! of half a second at 10 rad/s. A response is that from e to u in the pairing of the manifest,
-//! `H e^{j omega Ts offset}`, as the describing function beside it. Phases are followed from the
+//! `H e^{j omega Ts offset}`, as the describing function next to it. Phases are followed from the
 //! lowest frequency on.
 
 use std::collections::BTreeMap;

@@ -141,7 +141,8 @@ fn check_directory(manifest: &Manifest, base: &Path, directory: &Path) -> Result
     Ok(())
 }
 
-/// SHA-256 of the manifest and of the files that count; the run of one that cannot be read says so.
+/// SHA-256 of the manifest and of the files that count; the run of one that cannot be read reports
+/// it.
 fn hash(manifest: &Manifest, base: &Path) -> String {
     let mut hasher = Sha256::new();
     hasher.update(manifest.text().as_bytes());

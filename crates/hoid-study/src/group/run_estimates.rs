@@ -1,5 +1,5 @@
-//! What a finished group found in each of its runs, read back from its tables: the operator in the form of the
-//! person, root mean squares, and responses.
+//! Results of a finished group for each of its runs, read back from its tables: the operator in the form of the person,
+//! root mean squares, and responses.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -31,7 +31,7 @@ impl RunEstimates {
     /// From the tables in the directory of a finished group.
     ///
     /// # Errors
-    /// [`StudyError::Io`] for tables that are not there.
+    /// [`StudyError::Io`] for tables that do not exist.
     pub fn read(directory: &Path) -> Result<Self, StudyError> {
         let table = |name: &str| read_table(&table_path(directory, name, false));
         Ok(Self::of(&table("estimates")?, &table("responses")?))

@@ -1,12 +1,12 @@
 //! The orders and the delay of the ARX and Box-Jenkins models, chosen beforehand.
 //!
-//! A single run tells the delay of a person badly: the loss of a model of second order is flat over
-//! nk, has several minima, of which a sample more or less takes another, and often falls towards the
-//! end of the range. The delay is therefore one for all runs of a person in a condition, that of
-//! their operator in the family: `nk = round(tau_e/Ts) + 1`, with the samples by which u is recorded
-//! late. Where there is no such operator, every nk in the range is fitted to all runs at once on
-//! each of two sub-batches, and nk is the average of the two best, rounded. nd is the greater of the
-//! orders that BIC prefers on the sub-batches of all runs.
+//! A single run determines the delay of a person badly: the loss of a model of second order is flat
+//! over nk, has several minima, of which a sample more or less takes another, and often falls
+//! towards the end of the range. The delay is therefore one for all runs of a person in a condition,
+//! that of their operator in the family: `nk = round(tau_e/Ts) + 1`, with the samples by which u is
+//! recorded late. Where there is no such operator, every nk in the range is fitted to all runs at
+//! once on each of two sub-batches, and nk is the average of the two best, rounded. nd is the
+//! greater of the orders that BIC prefers on the sub-batches of all runs.
 
 use hoid_ident::{Estimator, OrderRanges, choose_orders, order_selection::Criterion};
 use hoid_io::OutputTable;
@@ -107,10 +107,10 @@ pub(super) fn chosen(estimates: &OutputTable, structure: Structure) -> Result<Or
         let row = (0..values.len()).filter(own).find(|i| !reason[*i].is_empty());
         return Err(row.map_or_else(|| "no delay was chosen".to_owned(), |i| reason[i].clone()));
     };
-    let usual = structure.operator_orders(nk);
+    let default = structure.operator_orders(nk);
     Ok(Orders {
-        nd: value("nd").unwrap_or(usual.nd),
-        ..usual
+        nd: value("nd").unwrap_or(default.nd),
+        ..default
     })
 }
 

@@ -25,8 +25,8 @@ pub(super) struct RunTables {
     pub estimates: OutputTable,
     pub responses: OutputTable,
     pub traces: OutputTable,
-    /// By the name of the table: of a run what was done to its files and what is wrong with their
-    /// sampling; of all runs at once the person.
+    /// By the name of the table: of a run the processing applied to its files and the problems of
+    /// their sampling; of all runs at once the person.
     pub account: Vec<(&'static str, OutputTable)>,
 }
 
@@ -44,10 +44,10 @@ pub(super) fn estimates_schema() -> TableSchema {
 /// The tables of a run while they are filled.
 pub(super) struct RunRows<'a> {
     entry: &'a RunEntry,
-    /// What is known of its condition.
+    /// Known properties of its condition.
     pub condition: ConditionSettings,
-    /// By how much a sample of the input is taken later than that of the output beside it, s: a ratio of
-    /// samples has it as a phase, which is taken back.
+    /// Amount by which a sample of the input is taken later than that of the output next to it, s: a ratio of samples
+    /// has it as a phase, which is taken back.
     pub input_lead_s: f64,
     element: Option<ContinuousTransferFunction>,
     columns: TraceColumns,
@@ -72,7 +72,7 @@ impl<'a> RunRows<'a> {
         }
     }
 
-    /// What counts samples of the recording, in those of a run.
+    /// Converts options that count samples of the recording to samples of a run.
     pub fn at_the_rate_of(&mut self, run: &Run) {
         self.condition.offset_samples = run.samples(self.condition.offset_samples);
         self.input_lead_s = run.input_lead_s;
@@ -218,7 +218,7 @@ impl<'a> RunRows<'a> {
         self.estimates.text("reason", reason);
     }
 
-    /// What speaks against a recursion over the whole run; of one that is trustworthy nothing.
+    /// Findings against a recursion over the whole run; of one that is trustworthy nothing.
     pub fn judged(&mut self, estimator: &str, verdict: &Verdict) {
         if verdict.level == VerdictLevel::Trustworthy {
             return;
@@ -229,7 +229,7 @@ impl<'a> RunRows<'a> {
         self.estimates.text("reason", &reasons.join("; "));
     }
 
-    /// What could not be estimated, and why.
+    /// Quantities that could not be estimated, and why.
     pub fn failed(&mut self, window: Option<Window>, estimator: &str, reason: &str) {
         self.begin(window, estimator);
         self.estimates.text("status", "failed");

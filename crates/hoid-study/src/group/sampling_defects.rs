@@ -11,7 +11,7 @@ pub enum SamplingDefect {
     Jitter,
     /// One row of two hundred is missing.
     Missing,
-    /// One row of two hundred is there twice.
+    /// One row of two hundred is duplicated.
     Repeated,
     /// A clock that runs slow by 0.2 %.
     SlowClock,
@@ -35,7 +35,7 @@ impl SamplingDefect {
         Self::Stalled,
     ];
 
-    /// True where the times of the rows are no longer even.
+    /// True if the times of the rows are no longer even.
     pub(super) fn is_uneven(self) -> bool {
         matches!(self, Self::Jitter | Self::Missing | Self::Repeated)
     }
@@ -79,7 +79,7 @@ pub(super) fn recorded(record: &Record, names: &[&str], defects: &[SamplingDefec
         let step = 8.0 * sd / 256.0;
         u.iter_mut().for_each(|u| *u = (*u / step).round() * step);
     }
-    // Where the values of each row come from; the times go on.
+    // Where the values of each row come from; the times continue.
     let held = |k: usize| {
         let stall = n / 3..n / 3 + (0.5 / ts) as usize;
         if has(SamplingDefect::Stalled) && stall.contains(&k) {

@@ -1,13 +1,13 @@
 //! How fast the recursions follow a change at a known instant, and how noisy they are, by subject,
 //! condition and parameter.
 //!
-//! Of a recorded person the truth is not known: the levels before and after the change are those of
-//! the recursion itself, the medians over the second half of its rows before, and of those after
+//! For a recorded person the truth is not known: the levels before and after the change are those
+//! of the recursion itself, the medians over the second half of its rows before, and of those after
 //! the change, of the median over the runs. The settling times are those when the median has first
 //! covered 50 and 90 % of the step, as in the studies; the noise is the deviation of one run around
 //! its own level after the change, `1.4826` times the median absolute deviation, and its median
 //! over the runs. There is no time where the step is smaller than the noise, so that there is
-//! nothing to settle to, and none where the share was covered when the change came: then it was not
+//! nothing to settle to, and none if the share was covered when the change came: then it was not
 //! the change that moved the estimate.
 
 use std::collections::BTreeMap;
@@ -34,7 +34,7 @@ const FIGURES: [&str; 7] = [
     "noise",
 ];
 
-/// What single runs say: instants of the change, and the noise of each parameter.
+/// Results of single runs: instants of the change, and the noise of each parameter.
 #[derive(Debug, Clone, Default)]
 struct OfRuns {
     change_s: Vec<f64>,
@@ -140,7 +140,7 @@ impl Step {
         }
     }
 
-    /// Time from the change until a share of the step is covered; none where it was before.
+    /// Time from the change until a share of the step is covered; none if it was before.
     fn settled_s(&self, times: &[f64], values: &[f64], change_s: f64, share: f64) -> Option<f64> {
         let covered = |v: f64| (v - self.before) / (self.after - self.before) >= share;
         let (before, after): (Vec<_>, Vec<_>) = times.iter().zip(values).partition(|(t, _)| **t <= change_s);

@@ -1,17 +1,16 @@
-//! What a finished group says: what failed, the people, and one verdict on all of it.
+//! Report of a finished group: what failed, the people, and one verdict on all of it.
 //!
 //! | finding | weight | when |
 //! |---|---|---|
 //! | `nothing-read` | undetermined | no run could be read |
-//! | `nothing-determined` | undetermined | operators were asked for, and of no person there is one that the data determine |
+//! | `nothing-determined` | undetermined | operators were requested, and of no person there is one that the data determine |
 //! | `run-failed` | doubt | a run could not be read |
 //! | `condition-failed` | doubt | no operator could be fitted to a person in a condition |
 //! | `person-not-determined`, `person-doubtful` | doubt | the verdict on a person |
 //! | `fits-failed` | note | other fits, which are rows with their reasons |
 //! | `condition-changes` | note | a condition that changes within its runs has no operator |
 //!
-//! One person whose data say nothing makes the group doubtful and not undetermined: the others
-//! stand.
+//! One person whose data carry no information makes the group doubtful and not undetermined: the others remain valid.
 
 use std::path::Path;
 
@@ -39,16 +38,16 @@ pub struct RunFailure {
     pub reason: String,
 }
 
-/// What a finished group says.
+/// Report of a finished group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroupSummary {
     /// Runs that count.
     pub runs: usize,
-    /// Those of them that could not be read.
+    /// The entries of them that could not be read.
     pub failures: Vec<RunFailure>,
     /// The people, by their first runs in the manifest.
     pub people: Vec<Person>,
-    /// What all of it is worth.
+    /// Reliability of all of it.
     pub verdict: Verdict,
 }
 
@@ -56,7 +55,7 @@ impl GroupSummary {
     /// From the tables in the directory of a finished group.
     ///
     /// # Errors
-    /// [`StudyError::Io`] for tables that are not there.
+    /// [`StudyError::Io`] for tables that do not exist.
     pub fn read(manifest: &Manifest, directory: &Path) -> Result<Self, StudyError> {
         let table = |name: &str| read_table(&table_path(directory, name, false));
         let (people, estimates) = (people_of(&table(PEOPLE)?), table("estimates")?);
@@ -169,7 +168,7 @@ mod tests {
         assert_eq!(judged(2, 0, &[person(Trustworthy)]).level, Trustworthy);
         assert_eq!(judged(2, 1, &[person(Trustworthy)]).level, Doubtful);
         assert_eq!(judged(2, 2, &[]).level, NotDetermined);
-        // One of two people stands.
+        // One of two people does not move.
         let both = [person(Trustworthy), person(NotDetermined)];
         let verdict = judged(2, 0, &both);
         assert_eq!(verdict.level, Doubtful);

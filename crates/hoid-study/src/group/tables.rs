@@ -25,7 +25,7 @@ pub(super) fn schema<'a>(columns: impl Iterator<Item = (&'a str, ColumnKind)>) -
     }
 }
 
-/// Reads a column of texts; empty where there is none.
+/// Reads a column of texts; empty if there is none.
 pub(super) fn texts<'a>(table: &'a OutputTable, name: &str) -> &'a [String] {
     match table.column(name) {
         Some(ColumnValues::Text(values)) => values,
@@ -33,7 +33,7 @@ pub(super) fn texts<'a>(table: &'a OutputTable, name: &str) -> &'a [String] {
     }
 }
 
-/// Reads a column of numbers; empty where there is none.
+/// Reads a column of numbers; empty if there is none.
 pub(super) fn numbers<'a>(table: &'a OutputTable, name: &str) -> &'a [f64] {
     match table.column(name) {
         Some(ColumnValues::Real(values)) => values,
@@ -41,7 +41,7 @@ pub(super) fn numbers<'a>(table: &'a OutputTable, name: &str) -> &'a [f64] {
     }
 }
 
-/// Stands between sentences in one cell.
+/// A separator between sentences in one cell.
 const BETWEEN: &str = " | ";
 
 /// Sentences in one cell.

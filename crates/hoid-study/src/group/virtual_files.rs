@@ -18,7 +18,7 @@ use crate::{StudyError, columns::Rows};
 /// An experiment that is being written.
 pub(super) struct VirtualFiles<'a> {
     directory: &'a Path,
-    /// Columns of a run besides t.
+    /// Columns of a run other than t.
     columns: &'a [&'a str],
     defects: &'a [SamplingDefect],
     runs: Vec<RunEntry>,

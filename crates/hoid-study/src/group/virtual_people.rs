@@ -21,12 +21,12 @@ use super::{
 };
 use crate::{StudyError, columns::Rows};
 
-/// What is to be simulated.
+/// Scenario to be simulated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PeopleExperiment {
     /// Number of subjects.
     pub subjects: u64,
-    /// What they control: a condition each.
+    /// The controlled element: a condition each.
     pub plants: Vec<Plant>,
     /// Form of their operators; `None` for those that people have on each element.
     pub form: Option<Form>,
@@ -36,7 +36,7 @@ pub struct PeopleExperiment {
     pub runs: u64,
     /// Spread of the parameters between the runs of a subject.
     pub between_runs: f64,
-    /// Who they are.
+    /// Identity.
     pub population: Population,
     /// Time between two samples.
     pub sample_time: SampleTime,
@@ -64,9 +64,9 @@ impl Default for PeopleExperiment {
     }
 }
 
-/// Columns of a file besides t.
+/// Columns of a file other than t.
 const COLUMNS: [&str; 4] = ["e", "u", "d", "y"];
-/// What else is true.
+/// Other true statements.
 const OTHERS: [&str; 7] = [
     "crossover_rad_s",
     "phase_margin_deg",
@@ -91,7 +91,7 @@ pub fn simulate_people(
 ) -> Result<Manifest, StudyError> {
     experiment.check()?;
     VirtualFiles::refuse_another(directory)?;
-    // Nobody is written before everybody is found.
+    // No one is written before everybody is found.
     let mut people = Vec::new();
     for subject in 1..=experiment.subjects {
         for (place, plant) in (0..).zip(&experiment.plants) {
@@ -123,7 +123,7 @@ pub fn simulate_people(
         (plant.to_string(), facts)
     };
     let analysis = AnalysisSettings {
-        // Remnants like people's are no lag of first order.
+        // Remnants like people's are not a lag of first order.
         nd: (1, 6),
         ..AnalysisSettings::default()
     };

@@ -1,5 +1,5 @@
-//! A virtual experiment: subjects, conditions and runs of simulated subjects, with the truth beside
-//! the files.
+//! A virtual experiment: subjects, conditions and runs of simulated subjects, with the truth next
+//! to the files.
 //!
 //! The gain K_e, the lead T_L, omega_nm, zeta_nm and the noise level of subject s are those of the
 //! condition times `exp(a z)`, z a normal deviate of the subject, a the spread between subjects
@@ -28,7 +28,7 @@ use crate::{
     columns::{OPERATOR, Rows},
 };
 
-/// What is to be simulated.
+/// Scenario to be simulated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VirtualExperiment {
     /// Number of subjects.
@@ -86,7 +86,7 @@ pub fn simulate_group(
         let change_s = scenario.schedule.change_s();
         let element = scenario.initial.controlled_element;
         let facts = ConditionSettings {
-            // What is controlled in the whole run.
+            // The controlled element in the whole run.
             controlled_element: change_s
                 .is_none()
                 .then(|| format!("{}/1,{},0", element.k_c, element.omega_b_rad_s)),
@@ -108,7 +108,7 @@ pub fn simulate_group(
     )
 }
 
-/// Most runs of a virtual experiment: a file each.
+/// Largest number of runs of a virtual experiment: a file each.
 const MOST_RUNS: u64 = 100_000;
 
 /// Checks the number of files that an experiment would write.

@@ -4,7 +4,7 @@
 //! Their options are those of the registry of estimators.
 
 use hoid_analysis::{
-    Asked, Identification,
+    Identification, ResolvedRequest,
     registry::{self, CHANGE, estimators},
 };
 use hoid_ident::{IdentError, NamedOrders, family::OperatorPrior, settings::MethodSpec};
@@ -17,8 +17,8 @@ pub(super) const TIME_VARYING: &str = "time-varying";
 /// Another word for `operator`.
 const FAMILY: &str = "family";
 
-/// Options of the registry that are no keys of a plan's own table: they have types there, or no meaning for
-/// single runs.
+/// Options of the registry that are not keys of a plan's own table: they have types there, or no meaning for single
+/// runs.
 const ELSEWHERE: [&str; 10] = [
     "noise",
     "change",
@@ -47,8 +47,8 @@ pub(super) fn methods() -> Vec<MethodSpec> {
     estimators().into_iter().filter_map(in_plan).collect()
 }
 
-/// What is run as `hoid identify` runs it, with its defaults and without a prior; `None` for another method.
-pub(super) fn of_method(method: &str, changes: bool) -> Option<Asked> {
+/// Estimator that runs as `hoid identify` runs it, with its defaults and without a prior; `None` for another method.
+pub(super) fn of_method(method: &str, changes: bool) -> Option<ResolvedRequest> {
     let estimator = match method {
         TIME_VARYING => CHANGE,
         OPERATOR | FAMILY if changes => CHANGE,
@@ -57,15 +57,15 @@ pub(super) fn of_method(method: &str, changes: bool) -> Option<Asked> {
         registry::PEM | registry::REMNANT | CHANGE => return None,
         name => name,
     };
-    let mut asked = Asked::of_estimator(estimator, Structure::BoxJenkins)?;
-    if let Asked::Operator(how) = &mut asked {
+    let mut asked = ResolvedRequest::of_estimator(estimator, Structure::BoxJenkins)?;
+    if let ResolvedRequest::Operator(how) = &mut asked {
         how.estimator.prior = OperatorPrior::none();
     }
     Some(asked)
 }
 
 /// Its name as a method of plans.
-pub(crate) fn name(asked: &Asked) -> &'static str {
+pub(crate) fn name(asked: &ResolvedRequest) -> &'static str {
     match asked.estimator() {
         CHANGE => TIME_VARYING,
         name => name,
@@ -73,28 +73,34 @@ pub(crate) fn name(asked: &Asked) -> &'static str {
 }
 
 /// With the orders of its noise, or of its polynomials.
-pub(super) fn with_orders(asked: Asked, noise: &NamedOrders, polynomials: &Orders) -> Result<Asked, IdentError> {
+pub(super) fn with_orders(
+    asked: ResolvedRequest,
+    noise: &NamedOrders,
+    polynomials: &Orders,
+) -> Result<ResolvedRequest, IdentError> {
     Ok(match asked {
-        Asked::Operator(how) => Asked::Operator(Identification {
+        ResolvedRequest::Operator(how) => ResolvedRequest::Operator(Identification {
             estimator: how.estimator.with_noise_orders(noise)?,
             ..how
         }),
-        Asked::Change(how) => Asked::Change(Identification {
+        ResolvedRequest::Change(how) => ResolvedRequest::Change(Identification {
             estimator: how.estimator.with_noise_orders(noise)?,
             ..how
         }),
-        Asked::Polynomials(mut how) => {
+        ResolvedRequest::Polynomials(mut how) => {
             let all = polynomials.named().map(|(name, n)| (name.to_owned(), n..=n));
             how.estimator.orders = all.into_iter().collect();
-            Asked::Polynomials(how)
+            ResolvedRequest::Polynomials(how)
         }
-        Asked::Remnant(how) => Asked::Remnant(how),
+        ResolvedRequest::Remnant(how) => ResolvedRequest::Remnant(how),
     })
 }
 
 /// A parameter that is held or bounded and that the model does not have, with those that it has.
-pub(super) fn unknown_parameter(asked: &Asked) -> Option<(&str, Vec<String>)> {
-    let Asked::Change(how) = asked else { return None };
+pub(super) fn unknown_parameter(asked: &ResolvedRequest) -> Option<(&str, Vec<String>)> {
+    let ResolvedRequest::Change(how) = asked else {
+        return None;
+    };
     let names = how.estimator.names();
     let held = how.estimator.constraints.keys();
     let unknown = held
@@ -104,20 +110,20 @@ pub(super) fn unknown_parameter(asked: &Asked) -> Option<(&str, Vec<String>)> {
 }
 
 /// Columns of its own parameters; those of polynomials are known by their orders.
-pub(crate) fn parameters(asked: &Asked) -> Vec<String> {
+pub(crate) fn parameters(asked: &ResolvedRequest) -> Vec<String> {
     match asked {
-        Asked::Operator(how) => {
+        ResolvedRequest::Operator(how) => {
             let of = |form: &Form| form.parameters(how.estimator.neuromuscular);
             how.estimator.forms.iter().flat_map(of).map(str::to_owned).collect()
         }
-        Asked::Change(how) => {
+        ResolvedRequest::Change(how) => {
             let mut names = how.estimator.names();
-            // What is no parameter of the fit, but a product of some that change.
+            // What is not a parameter of the fit, but a product of some that change.
             let all = how.estimator.form.parameters(how.estimator.neuromuscular).into_iter();
             let products = all.filter(|name| matches!(*name, "K" | "K_e_dot"));
             names.extend(products.flat_map(|name| [1, 2].map(|end| format!("{name}{end}"))));
             names
         }
-        Asked::Remnant(_) | Asked::Polynomials(_) => Vec::new(),
+        ResolvedRequest::Remnant(_) | ResolvedRequest::Polynomials(_) => Vec::new(),
     }
 }

@@ -28,9 +28,9 @@ use crate::StudyError;
 pub struct Plan {
     /// Name of the study.
     pub name: String,
-    /// One line on what it is.
+    /// Description in one line.
     pub title: String,
-    /// What it shows, or what to know of it.
+    /// Its content or notes on it.
     pub description: String,
     /// Seed of its random streams.
     pub seed: u64,
@@ -62,7 +62,7 @@ pub struct Cell {
     pub scenario: String,
     /// The condition from which it started, empty for none.
     pub condition: String,
-    /// What stands for the lists of its table.
+    /// Axes that replace the lists of its table.
     pub axes: Vec<Axis>,
     /// The scenario, ready to be simulated.
     pub resolved: ResolvedScenario,
@@ -70,7 +70,7 @@ pub struct Cell {
     pub replications: u64,
 }
 
-/// What a scenario of a plan has beside the keys of a scenario file.
+/// Additional keys of a scenario in a plan.
 #[derive(Debug, Deserialize)]
 struct OwnKeys {
     name: Option<String>,
@@ -80,10 +80,10 @@ struct OwnKeys {
 /// Most replications of a cell.
 const MOST_REPLICATIONS: u64 = 100_000_000;
 
-/// Most estimates of a study.
+/// Largest number of estimates of a study.
 const MOST_ESTIMATES: u128 = 10_000_000_000;
 
-/// Most blocks of a study: a few files each.
+/// Largest number of blocks of a study: a few files each.
 const MOST_BLOCKS: u128 = 1_000_000;
 
 impl Plan {
@@ -265,7 +265,8 @@ impl Plan {
         &self.text
     }
 
-    /// SHA-256 of what decides the results: the text of the plan and the replications.
+    /// SHA-256 of everything that determines the results: the text of the plan and the
+    /// replications.
     pub fn hash(&self) -> String {
         let mut hasher = Sha256::new();
         hasher.update(self.text.as_bytes());
@@ -344,7 +345,7 @@ fn tables_of<'a>(
         .collect()
 }
 
-/// A table without axes as it stands.
+/// A table without axes unchanged.
 fn single(table: &Spanned<DeTable<'_>>, text: &str, whole: &[&str]) -> Result<Variant, PlanProblem> {
     let mut all = variants(table, text, whole)?;
     match (all.pop(), all.is_empty()) {
@@ -358,8 +359,8 @@ fn single(table: &Spanned<DeTable<'_>>, text: &str, whole: &[&str]) -> Result<Va
 
 fn cell(variant: &Variant, index: u64, replications: u64) -> Result<Cell, PlanProblem> {
     let own: OwnKeys = variant.read()?;
-    let usual = own.condition.clone().unwrap_or_else(|| "scenario".to_owned());
-    let name = own.name.unwrap_or_else(|| usual.clone());
+    let default = own.condition.clone().unwrap_or_else(|| "scenario".to_owned());
+    let name = own.name.unwrap_or_else(|| default.clone());
     let scenario: Scenario =
         hoid_io::parse_scenario(&variant.text, "", &name).map_err(|error| of_scenario(error, variant))?;
     let resolved = scenario.resolve().map_err(|error| of_model(&error, variant))?;

@@ -14,7 +14,7 @@
 
 use std::collections::BTreeMap;
 
-use hoid_analysis::Asked;
+use hoid_analysis::ResolvedRequest;
 use hoid_ident::{Estimator, GreyBox, IdentError};
 use hoid_model::{Detrend, Orders, SampleTime, Structure, scenario::ResolvedScenario};
 use hoid_track::{Method, StartAt, TrackOptions};
@@ -33,9 +33,9 @@ use super::{
 pub struct EstimatorCell {
     /// Its name in the plan.
     pub name: String,
-    /// The name, and what stands for the lists of its table.
+    /// The name, and the axes that replace the lists of its table.
     pub label: String,
-    /// What stands for the lists.
+    /// Axes that replace the lists.
     pub axes: Vec<Axis>,
     /// The estimator from whose VAF that of this one is counted.
     pub versus: Option<String>,
@@ -45,9 +45,9 @@ pub struct EstimatorCell {
     pub span_s: Option<(f64, f64)>,
     /// Every n-th sample is taken.
     pub decimate: usize,
-    /// What is taken out of e and u before.
+    /// Trend removed from e and u before.
     pub detrend: Detrend,
-    /// What it does.
+    /// Its behaviour.
     pub task: Task,
     /// Label of its start, empty for its own.
     pub start: String,
@@ -55,7 +55,7 @@ pub struct EstimatorCell {
     pub(crate) start_values: BTreeMap<String, f64>,
 }
 
-/// What is done with a record.
+/// Treatment of a record.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Task {
     /// The record itself is described: levels and noise level.
@@ -64,15 +64,15 @@ pub enum Task {
     Fit(Box<Estimator>),
     /// The operator's parameters are fitted.
     GreyBox(Box<GreyBox>),
-    /// What is done as `hoid identify` does it, verdict included.
-    Analysis(Box<Asked>),
+    /// Analysis as by `hoid identify`, verdict included.
+    Analysis(Box<ResolvedRequest>),
     /// The operator is tracked.
     Track(Box<TrackOptions>),
 }
 
 impl Task {
-    /// What is done as `hoid identify` does it; none of the others.
-    pub(crate) fn analysis(&self) -> Option<&Asked> {
+    /// Analysis as by `hoid identify`; none for the other estimators.
+    pub(crate) fn analysis(&self) -> Option<&ResolvedRequest> {
         match self {
             Self::Analysis(asked) => Some(asked),
             _ => None,
@@ -94,7 +94,7 @@ impl EstimatorCell {
             name => Some(hoid_survey::method(name).map_err(|_| at("method", unknown_method(name)))?),
         };
         let structure = match &table.structure {
-            None => method.as_ref().map_or(Structure::BoxJenkins, Method::usual_structure),
+            None => method.as_ref().map_or(Structure::BoxJenkins, Method::default_structure),
             Some(name) => name
                 .parse::<Structure>()
                 .map_err(|error| at("structure", format!("is wrong: {error}")))?,
@@ -116,10 +116,7 @@ impl EstimatorCell {
             if let Some((from, to)) = span
                 && !(from < to && from.is_finite() && to.is_finite())
             {
-                return Err(at(
-                    key,
-                    format!("is [{from}, {to}], expected a beginning before its end"),
-                ));
+                return Err(at(key, format!("is [{from}, {to}], expected a start before its end")));
             }
         }
         let (mut start, mut start_values) = (String::new(), BTreeMap::new());
@@ -198,27 +195,27 @@ impl EstimatorCell {
             return Orders::default();
         };
         let (ts, table) = (scenario.scenario().sample_time.s() * self.decimate as f64, &self.orders);
-        // The delay in whole samples, but for the rounding of the quotient: what is left over is
+        // The delay in whole samples, except for the rounding of the quotient: what is left over is
         // for b0 and those after it.
         let delay = (scenario.scenario().initial.operator.tau_e_s / ts + 1e-9).floor() as usize;
-        let of = |order: Option<Order>, usual: usize, simulated: usize| match order {
-            None | Some(Order::Range(_)) => usual,
+        let of = |order: Option<Order>, default: usize, simulated: usize| match order {
+            None | Some(Order::Range(_)) => default,
             Some(Order::Number(n)) => n,
             Some(Order::Scenario(OfScenario::True)) => simulated,
             Some(Order::Scenario(OfScenario::Ramp)) => simulated.saturating_sub(1),
         };
-        let usual = structure.operator_orders(if structure.has_input() { delay + 1 } else { 0 });
+        let default = structure.operator_orders(if structure.has_input() { delay + 1 } else { 0 });
         let nd = match &self.task {
             Task::GreyBox(_) => scenario.scenario().remnant.order,
-            _ => usual.nd,
+            _ => default.nd,
         };
         Orders {
-            na: table.na.unwrap_or(usual.na),
-            nb: table.nb.unwrap_or(usual.nb),
-            nc: of(table.nc, usual.nc, 0),
+            na: table.na.unwrap_or(default.na),
+            nb: table.nb.unwrap_or(default.nb),
+            nc: of(table.nc, default.nc, 0),
             nd: of(table.nd, nd, scenario.scenario().remnant.order),
-            nf: table.nf.unwrap_or(usual.nf),
-            nk: of(table.nk, usual.nk, delay + 1),
+            nf: table.nf.unwrap_or(default.nf),
+            nk: of(table.nk, default.nk, delay + 1),
         }
     }
 
@@ -264,12 +261,12 @@ impl EstimatorCell {
         task
     }
 
-    fn with_orders(&self, asked: &Asked, scenario: &ResolvedScenario) -> Result<Asked, IdentError> {
+    fn with_orders(&self, asked: &ResolvedRequest, scenario: &ResolvedScenario) -> Result<ResolvedRequest, IdentError> {
         let noise = self.orders.of_noise(scenario.scenario().remnant.order);
         analysis::with_orders(asked.clone(), &noise, &self.orders(scenario))
     }
 
-    /// Checks orders, start and options against a scenario: the key and what is wrong with it.
+    /// Checks orders, start and options against a scenario: the key and the problems of it.
     pub(crate) fn check(&self, scenario: &ResolvedScenario) -> Result<(), (&'static str, String)> {
         let orders = self.orders(scenario);
         if let Some(structure) = self.structure() {

@@ -1,8 +1,8 @@
-//! The table `[[estimators]]` as it stands in a plan: keys, defaults, what belongs to which method.
+//! The table `[[estimators]]` as it is in a plan: keys, defaults, what belongs to which method.
 
 use std::collections::BTreeMap;
 
-use hoid_analysis::{AnalysisError, Asked, registry::estimator_setting};
+use hoid_analysis::{AnalysisError, ResolvedRequest, registry::estimator_setting};
 use hoid_ident::{
     Estimator, GreyBox, IdentError, InitialState, NamedOrders, SearchOptions,
     settings::{Kind, MethodSpec, Setting},
@@ -14,7 +14,7 @@ use serde::{Deserialize, Deserializer, de::Error as _};
 
 use super::{analysis, problem::PlanProblem};
 
-/// Keys that want a list or a table as it stands.
+/// Keys that want a list or a table unchanged.
 pub fn whole_keys() -> Vec<String> {
     let fixed = ["scenarios", "span_s", "start_span_s", "delay_s", "delay_range_s"].map(str::to_owned);
     let settings = methods().into_iter().flat_map(|spec| spec.settings);
@@ -38,7 +38,7 @@ pub(super) fn methods() -> Vec<MethodSpec> {
 pub(crate) enum Order {
     /// This one.
     Number(usize),
-    /// That of the scenario.
+    /// The value for the scenario.
     Scenario(OfScenario),
     /// One of a range, LO..HI.
     Range(#[schemars(with = "String")] OrderRange),
@@ -89,7 +89,7 @@ pub(crate) struct OrdersTable {
 }
 
 impl OrdersTable {
-    /// True where an order is a range.
+    /// True if an order is a range.
     fn has_range(&self) -> bool {
         [self.nc, self.nd, self.nk]
             .into_iter()
@@ -123,15 +123,14 @@ pub(super) enum Change {
     Sigmoid,
 }
 
-/// What is estimated from each record, and how. Each value may be a list, which makes it an axis of
-/// the grid.
+/// Estimator of each record. Each value may be a list, which makes it an axis of the grid.
 #[derive(Debug, Deserialize, JsonSchema)]
 pub(crate) struct EstimatorTable {
     /// Name in the results.
     pub(super) name: String,
     /// Names of the scenarios that it takes. Default: all.
     pub(super) scenarios: Option<Vec<String>>,
-    /// What is done.
+    /// The action taken.
     #[schemars(extend("enum" = what_is_done()))]
     pub(super) method: String,
     /// Name of an estimator above, from whose VAF with the same nk on the same run that of this one
@@ -147,7 +146,7 @@ pub(crate) struct EstimatorTable {
     pub(super) span_s: Option<(f64, f64)>,
     /// Takes every so manieth sample of e and u, without a filter. Default 1.
     pub(super) decimate: Option<usize>,
-    /// What is taken out of e and u before. Default: none.
+    /// Trend removed from e and u before. Default: none.
     #[serde(default, deserialize_with = "choice")]
     #[schemars(with = "Option<String>", extend("enum" = names::<Detrend>(&[])))]
     pub(super) detrend: Option<Detrend>,
@@ -160,7 +159,7 @@ pub(crate) struct EstimatorTable {
     pub(super) start: Option<BTreeMap<String, StartValue>>,
     /// Own starts from which a search runs to its end. Default 2.
     pub(super) starts: Option<usize>,
-    /// Most iterations of a search. Default 100.
+    /// Largest number of iterations of a search. Default 100.
     pub(super) max_iterations: Option<usize>,
     /// Shortest and longest delay tau_e of an operator, s. Default 0.05 to 0.6, of operator 0.02 to 0.8.
     #[serde(alias = "delay_range_s")]
@@ -188,17 +187,17 @@ pub(super) enum StartValue {
 }
 
 impl EstimatorTable {
-    /// Refuses keys that the method does not look at: a setting without effect would be believed.
+    /// Refuses keys that the method does not look at: a setting without effect would be trusted.
     pub(super) fn check_placement(
         &self,
         method: Option<&Method>,
-        asked: Option<&Asked>,
+        asked: Option<&ResolvedRequest>,
         at: &impl Fn(&str, String) -> PlanProblem,
     ) -> Result<(), PlanProblem> {
         let (fits, grey_box) = (self.method == FIT, self.method == GREY_BOX);
         let operator = asked.is_some_and(|asked| asked.structure().is_none());
         let tracks = method.is_some();
-        // A window is no recursion that starts from coefficients or waits.
+        // A window is not a recursion that starts from coefficients or waits.
         let moves = method.is_some_and(|method| !method.fits_anew());
         let both = "fit and grey-box";
         let recursive = "the recursive methods";
@@ -271,26 +270,26 @@ impl EstimatorTable {
     }
 
     fn search(&self) -> SearchOptions {
-        let usual = SearchOptions::default();
+        let default = SearchOptions::default();
         SearchOptions {
-            max_iterations: self.max_iterations.unwrap_or(usual.max_iterations),
-            ..usual
+            max_iterations: self.max_iterations.unwrap_or(default.max_iterations),
+            ..default
         }
     }
 
     pub(super) fn fit(&self, structure: Structure) -> Estimator {
-        let usual = Estimator::new(structure, Orders::default());
+        let default = Estimator::new(structure, Orders::default());
         Estimator {
             initial_state: self.initial_state,
             search: self.search(),
-            starts: self.starts.unwrap_or(usual.starts),
-            ..usual
+            starts: self.starts.unwrap_or(default.starts),
+            ..default
         }
     }
 
     pub(super) fn grey_box(&self, at: &impl Fn(&str, String) -> PlanProblem) -> Result<GreyBox, PlanProblem> {
-        let usual = GreyBox::new(1..=1);
-        let range = self.delay_s.unwrap_or(usual.delay_range_s);
+        let default = GreyBox::new(1..=1);
+        let range = self.delay_s.unwrap_or(default.delay_range_s);
         if !(range.0 > 0.0 && range.0 < range.1 && range.1.is_finite()) {
             return Err(at(
                 "delay_s",
@@ -299,16 +298,19 @@ impl EstimatorTable {
         }
         Ok(GreyBox {
             delay_range_s: range,
-            initial_state: self.initial_state.unwrap_or(usual.initial_state),
+            initial_state: self.initial_state.unwrap_or(default.initial_state),
             search: self.search(),
-            starts: self.starts.unwrap_or(usual.starts),
-            ..usual
+            starts: self.starts.unwrap_or(default.starts),
+            ..default
         })
     }
 
-    /// What is run as `hoid identify` runs it, with the options of the table but its orders; `None` for another
+    /// Estimator that runs as `hoid identify` runs it, with the options of the table but its orders; `None` for another
     /// method.
-    pub(super) fn asked(&self, at: &impl Fn(&str, String) -> PlanProblem) -> Result<Option<Asked>, PlanProblem> {
+    pub(super) fn asked(
+        &self,
+        at: &impl Fn(&str, String) -> PlanProblem,
+    ) -> Result<Option<ResolvedRequest>, PlanProblem> {
         let changes = self.change == Some(Change::Sigmoid);
         let Some(mut asked) = analysis::of_method(&self.method, changes) else {
             return Ok(None);
@@ -399,7 +401,7 @@ impl EstimatorTable {
     }
 }
 
-/// Words for `method` beside those of the recursive methods.
+/// Words for `method` next to those of the recursive methods.
 pub(super) const FIT: &str = "fit";
 pub(super) const GREY_BOX: &str = "grey-box";
 pub(super) const RECORD: &str = "record";
@@ -427,7 +429,7 @@ pub(super) fn plan_key(setting: &Setting) -> String {
 
 /// A value of a plan in the form of the command line.
 fn text_of(value: &toml::Value, kind: Kind) -> Result<String, String> {
-    let wrong = || format!("is {value}, expected {}", in_words(kind));
+    let wrong = || format!("is {value}, expected {}", as_text(kind));
     Ok(match (value, kind) {
         (toml::Value::String(text), Kind::Prior) if hoid_io::is_fit_file(text) => {
             let reason = "is a file, and a plan holds all that it needs; name the parameters, as \"omega_nm=9:0.2\"";
@@ -455,12 +457,12 @@ fn text_of(value: &toml::Value, kind: Kind) -> Result<String, String> {
     })
 }
 
-fn in_words(kind: Kind) -> &'static str {
+fn as_text(kind: Kind) -> &'static str {
     match kind {
         Kind::Flag => "true or false",
         Kind::Count => "a whole number",
         Kind::Number => "a number",
-        Kind::NumberOrUsual(_) => "a number, or true",
+        Kind::NumberOrDefault(_) => "a number, or true",
         Kind::Counts => "a whole number, or two",
         Kind::NumberOrSpan => "a number, or two",
         Kind::Delay => "a whole number of samples, or a text such as \"0.28s\"",
@@ -472,7 +474,7 @@ fn in_words(kind: Kind) -> &'static str {
     }
 }
 
-/// What is wrong with a value, behind its key.
+/// Problems with a value, after its key.
 fn in_plan(error: &IdentError) -> String {
     match error {
         IdentError::BadOption { found, expected, .. } => format!("is {found}, expected {expected}"),
@@ -487,7 +489,7 @@ fn methods_with(key: &str) -> Vec<&'static str> {
     with.map(|spec| spec.name).collect()
 }
 
-/// What is wrong with a key that the method does not have.
+/// Problems with a key that the method does not have.
 fn misplaced(key: &str) -> String {
     match methods_with(key).as_slice() {
         [] => "is unknown; the book has the keys of an estimator on its page Monte Carlo studies".to_owned(),

@@ -1,4 +1,4 @@
-//! Grids in TOML: where a list stands for a value, each of its entries is taken.
+//! Grids in TOML: where a list represents a value, each of its entries is taken.
 //!
 //! A table of a plan is taken apart into its leaves, `remnant.order = [1, 2]` and so on. A leaf
 //! with a list is an axis, unless a list is what the key wants. All combinations are formed, the
@@ -23,7 +23,7 @@ pub struct Variant {
     pub text: String,
     /// Line of the plan, from 1, of each line of `text`.
     pub lines: Vec<usize>,
-    /// What stands for the lists, in the order of the file.
+    /// Axes that replace the lists, in the order of the file.
     pub axes: Vec<Axis>,
 }
 
@@ -41,7 +41,7 @@ struct Leaf {
     /// Each entry as it was written, and as it is shown.
     entries: Vec<(String, String)>,
     is_axis: bool,
-    /// Where it stands in the plan.
+    /// Where it is in the plan.
     start: usize,
 }
 
@@ -61,7 +61,7 @@ impl Variant {
         self.lines.get(at).copied()
     }
 
-    /// Reads the text; a problem is told with the line of the plan.
+    /// Reads the text; a problem is reported with the line of the plan.
     pub fn read<T: serde::de::DeserializeOwned>(&self) -> Result<T, PlanProblem> {
         toml::from_str(&self.text).map_err(|error| {
             let line = error.span().map_or(1, |span| line_at(&self.text, span.start));
@@ -82,7 +82,7 @@ pub fn line_at(text: &str, byte: usize) -> usize {
 }
 
 /// All combinations of the lists of a table. Keys in `whole`, joined by dots, want a list or a
-/// table as it stands.
+/// table unchanged.
 pub fn variants(table: &Spanned<DeTable<'_>>, source: &str, whole: &[&str]) -> Result<Vec<Variant>, PlanProblem> {
     let mut leaves = Vec::new();
     collect(table.get_ref(), source, whole, &mut Vec::new(), &mut leaves)?;
@@ -125,7 +125,7 @@ fn combination(index: usize, count: usize, leaves: &[Leaf], source: &str, first_
         let key: Vec<String> = leaf.path.iter().map(|part| quoted(part)).collect();
         let line = format!("{} = {written}\n", key.join("."));
         let at = line_at(source, leaf.start);
-        // An entry over several lines is short of some where the list began later; the first line
+        // An entry over several lines is short of some where the list started later; the first line
         // is what a reader looks for.
         variant.lines.extend(line.lines().map(|_| at));
         variant.text.push_str(&line);

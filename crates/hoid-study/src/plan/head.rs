@@ -9,10 +9,10 @@ use serde::Deserialize;
 pub(crate) struct Head {
     /// Name of the study: letters, digits, - and _.
     pub name: String,
-    /// One line on what it is.
+    /// Description in one line.
     #[serde(default)]
     pub title: String,
-    /// What it shows, or what to know of it.
+    /// Its content or notes on it.
     #[serde(default)]
     pub description: String,
     /// Seed of the random streams. Default 1.
@@ -22,9 +22,9 @@ pub(crate) struct Head {
     pub replications: u64,
     /// Replications that are run and stored together, which a stopped study loses at most. Default
     /// 50.
-    #[serde(default = "usual_block")]
+    #[serde(default = "default_block")]
     pub block: u64,
-    /// What is kept.
+    /// The stored data.
     #[serde(default)]
     pub keep: Keep,
 }
@@ -59,6 +59,6 @@ fn one() -> u64 {
     1
 }
 
-fn usual_block() -> u64 {
+fn default_block() -> u64 {
     50
 }

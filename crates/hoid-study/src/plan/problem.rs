@@ -1,6 +1,6 @@
-//! What is wrong in a plan, and where.
+//! Problems in a plan, and where.
 
-/// What is wrong in a plan, and where.
+/// Problems in a plan, and where.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct PlanProblem {
     pub line: Option<usize>,

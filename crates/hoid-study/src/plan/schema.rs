@@ -80,7 +80,7 @@ fn of_kind(kind: Kind) -> Value {
         Kind::Flag => json!({ "type": "boolean" }),
         Kind::Count => json!({ "type": "integer", "minimum": 0 }),
         Kind::Number => json!({ "type": "number" }),
-        Kind::NumberOrUsual(_) => json!({ "type": ["number", "boolean"] }),
+        Kind::NumberOrDefault(_) => json!({ "type": ["number", "boolean"] }),
         Kind::Counts | Kind::Delay => json!({ "type": ["integer", "string"] }),
         Kind::NumberOrSpan => json!({ "type": ["number", "array"], "items": { "type": "number" } }),
         Kind::Memory => json!({ "type": ["number", "string"] }),
@@ -105,7 +105,7 @@ fn strip(schema: &mut Value) {
     }
 }
 
-/// Lets each value that is no table be a list of such values too.
+/// Lets each value that is not a table be a list of such values too.
 fn with_lists(table: &mut Value, whole: &[&str]) {
     let Some(properties) = table.get_mut("properties").and_then(Value::as_object_mut) else {
         return;

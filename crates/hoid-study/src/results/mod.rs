@@ -1,7 +1,7 @@
 //! Reading a finished study back: rows of its summary, values of its replications, traces.
 //!
-//! What describes a cell and an estimator comes from the plan that stands beside the tables,
-//! numbers come from the tables. Rows are found by what describes them:
+//! The description of a cell and an estimator comes from the plan that is next to the tables, numbers come from the
+//! tables. Rows are found by their description:
 //!
 //! ```no_run
 //! use hoid_study::{Query, Results};

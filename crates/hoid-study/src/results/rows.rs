@@ -19,7 +19,7 @@ pub struct SummaryRow {
     pub noise_level: f64,
     /// Time constant T_n of the simulated remnant, s.
     pub t_n_s: f64,
-    /// What stands for the lists of scenario and estimator, by their keys joined by `_`.
+    /// Axes that replace the lists of scenario and estimator, by their keys joined by `_`.
     pub axes: BTreeMap<String, String>,
     /// Label of the estimator: its name and its axes.
     pub estimator: String,

@@ -84,7 +84,7 @@ impl Results {
     }
 
     /// The values of a quantity replication by replication, cells and estimators in the order of
-    /// the table; what does not exist is no number. `bias_<column>` is computed from the column and
+    /// the table; missing items is not a number. `bias_<column>` is computed from the column and
     /// its true value; `failed`, `not_convertible`, `converged` and `diverged` are 0 or 1. Empty
     /// when the query names no quantity, or one that the table of fits does not have.
     pub fn values(&self, query: &Query) -> Vec<f64> {

@@ -98,7 +98,7 @@ fn values_say_what_the_summary_says() {
         let statistics = Statistics::of(&values);
         let row = results.one(&query).unwrap();
         assert_eq!(values.len(), 6);
-        // The same numbers, but for the order of additions.
+        // The same numbers, except for the order of additions.
         assert!(
             (statistics.median - row.statistics.median).abs() <= 1e-12 * row.statistics.median.abs(),
             "{quantity}"

@@ -186,7 +186,7 @@ struct Collected<'a> {
 #[derive(Clone, Default)]
 struct OfEstimator {
     values: Vec<Vec<f64>>,
-    /// Whether each has the form of what was simulated, a gain with a lead, or none to choose.
+    /// Whether each has the form of the simulated scenario, a gain with a lead, or none to choose.
     leads: Vec<bool>,
     count: usize,
     failed: usize,

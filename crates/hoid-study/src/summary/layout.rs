@@ -1,4 +1,5 @@
-//! What both summaries share: the columns of the settings, and how much is in memory at a time.
+//! Common parts of both summaries: the columns of the settings, and how much is in memory at a
+//! time.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -13,10 +14,10 @@ use crate::{
 /// Numbers in memory at a time: 256 MB.
 pub(super) const BUDGET: usize = 1 << 25;
 
-/// Parts of each cell: where they stand and their numbers.
+/// Parts of each cell: its position and their numbers.
 pub(crate) type PartsOfCell<'a> = BTreeMap<usize, Vec<(&'a Path, u64)>>;
 
-/// Columns that say which cell and which estimator a row is about.
+/// Columns that report which cell and which estimator a row is about.
 pub(super) fn setting_columns(plan: &Plan) -> Vec<(String, ColumnKind)> {
     use ColumnKind::{Real, Text, Whole};
     let mut columns: Vec<(String, ColumnKind)> = Vec::new();
@@ -45,7 +46,7 @@ pub(super) fn schema(plan: &Plan, columns: Vec<(String, ColumnKind)>) -> TableSc
     }
 }
 
-/// Begins a row with the settings of cell and estimator.
+/// Starts a row with the settings of cell and estimator.
 pub(super) fn begin_row(rows: &mut Rows, extra: &[String], cell: &Cell, estimator: &EstimatorCell) {
     let scenario = cell.resolved.scenario();
     rows.begin();

@@ -1,6 +1,6 @@
 //! Summaries of a study: a row for each cell, estimator and quantity.
 //!
-//! Quantities are all real columns of the table of fits that are no settings; `bias_<p>`, the
+//! Quantities are all real columns of the table of fits that are not settings; `bias_<p>`, the
 //! relative bias `100 (x - x0) / x0` in %, of theta, operator and remnant where the truth is known
 //! and constant; and the rates `failed`, `not_convertible`, `converged` and `diverged` (mean and
 //! its Monte Carlo error). Of traces each kept time has mean, standard deviation, quartiles and

@@ -24,7 +24,7 @@ pub(super) struct Filters {
     pub d1: f64,
     /// Order of the Padé approximation, 0 for none.
     pub pade: usize,
-    /// Variances of the innovation of the remnant, and of what enters beside e.
+    /// Variances of the innovation of the remnant, and of what enters next to e.
     pub innovation_variance: f64,
     pub beside_e: f64,
     pub x: DVector<f64>,
@@ -76,7 +76,7 @@ impl Filters {
     pub fn predict(&mut self, e: f64) {
         let (a, b) = self.held(&self.w);
         let mut slope = &a * &self.slope;
-        // K_e and K_e_dot stand in C alone.
+        // K_e and K_e_dot are in C alone.
         for i in 2..self.w.len() {
             let by = STEP * self.w[i];
             let moved = |by: f64| {
@@ -150,7 +150,7 @@ impl Filters {
         all.all(|x| x.is_finite())
     }
 
-    /// Keeps the parameters within their bounds; true where that changed one.
+    /// Keeps the parameters within their bounds; true if that changed one.
     pub fn bound(&mut self, bounds: &[[f64; 2]; LARGEST]) -> bool {
         let before = self.w.clone();
         for (w, bounds) in self.w.iter_mut().zip(bounds) {
@@ -184,7 +184,7 @@ mod tests {
         }
     }
 
-    /// h is the derivative of the prediction while the parameters stand still, with and without
+    /// h is the derivative of the prediction while the parameters stay constant, with and without
     /// Padé's delay.
     #[test]
     fn the_whole_derivative_is_that_of_finite_differences() {

@@ -18,9 +18,9 @@
 //!
 //! A joint filter ([`crate::joint_filter`]) keeps the covariance between state and parameters, which
 //! two filters that take turns do not have. By default the delay is whole samples, as all other
-//! methods have it. With `pade` of 1 to 3 it is a parameter too, behind the approximation of that
-//! order, as the source and the discussion of the reference text have it for a delay that is no
-//! multiple of the sample time or changes ([`super::pade`]); its states stand between y_1 and n.
+//! methods have it. With `pade` of 1 to 3 it is a parameter too, after the approximation of that
+//! order, as the source and the discussion of the thesis have it for a delay that is not a multiple
+//! of the sample time or changes ([`super::pade`]); its states are between y_1 and n.
 
 mod filters;
 mod pade;
@@ -66,11 +66,11 @@ settings! {
         /// Drift of tau_e in a root second, share of its start, behind a Padé approximation
         #[setting(bounds(Bounds::NonNegative))]
         pub delay_drift: f64 = 0.02,
-        /// Error that enters the neuromuscular part beside e, share of the size of e
+        /// Error that enters the neuromuscular part next to e, share of the size of e
         #[setting(bounds(Bounds::NonNegative))]
         pub state_noise: f64 = 0.1,
         /// Root mean square of e
-        #[setting(bounds(Bounds::NonNegative), default("that of the record; in a stream of what has come so far"))]
+        #[setting(bounds(Bounds::NonNegative), default("that of the record; in a stream of the data so far"))]
         pub error_size: Option<f64> = None,
         /// Order of the Padé approximation of the delay, 1 to 3; 0 for whole samples
         pub pade: usize = 0,
@@ -93,11 +93,11 @@ impl RecursiveMethod for DualEkfOptions {
     }
 
     /// It follows from a random walk of the parameters.
-    fn usual_memory(&self, _parameter: &str) -> Memory {
+    fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Infinite
     }
 
-    fn usual_nd(&self) -> Option<usize> {
+    fn default_nd(&self) -> Option<usize> {
         Some(1)
     }
 
@@ -130,7 +130,7 @@ impl RecursiveMethod for DualEkfOptions {
         true
     }
 
-    fn memory_in_words(&self) -> Option<String> {
+    fn memory_as_text(&self) -> Option<String> {
         Some("by a random walk of the parameters".to_owned())
     }
 
@@ -161,7 +161,7 @@ struct DualEkf {
     bounds: [[f64; 2]; LARGEST],
     delay: DelayLine<Vec<f64>>,
     reported: Reported,
-    /// What enters beside e, a share of its size; the mean square of e so far, where it is not given.
+    /// Additional noise of e, as a share of its size; the mean square of e so far, where it is not given.
     state_noise: f64,
     size_is_given: bool,
     power: f64,
@@ -217,7 +217,7 @@ impl DualEkf {
             slope: DMatrix::zeros(n, p),
         };
         let [k_e, k_e_dot, omega, zeta] = physical_bounds::<OPERATOR>(setup, sample_time)?;
-        // Behind a Padé approximation the delay is the filters' own, but for the hold.
+        // After a Padé approximation the delay is the filters' own, except for the hold.
         let late = if own.pade == 0 { setup.orders.nk } else { 1 };
         Ok(Self {
             first: filters.clone(),
@@ -288,7 +288,7 @@ impl State for DualEkf {
             &mut self.restarts,
         ];
         visit_all(parts, each);
-        // Of numbers that were changed none may leave its bounds.
+        // For numbers that were changed none may leave its bounds.
         self.filters.bound(&self.bounds);
     }
 }
@@ -363,7 +363,7 @@ mod tests {
     fn options(own: DualEkfOptions, span_s: (f64, f64), nk: usize) -> TrackOptions {
         TrackOptions {
             start: StartAt::Span(Some(span_s)),
-            ..TrackOptions::usual(Method::from(own), nk)
+            ..TrackOptions::default_for(Method::from(own), nk)
         }
     }
 

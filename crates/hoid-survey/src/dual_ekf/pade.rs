@@ -22,7 +22,7 @@ fn coefficients(order: usize) -> Vec<f64> {
     c
 }
 
-/// The neuromuscular part behind a delay, over one sample of held input: states y_0, y_1 and those
+/// The neuromuscular part after a delay, over one sample of held input: states y_0, y_1 and those
 /// of the delay.
 ///
 /// The delay is in controllable canonical form, `p^(n) + sum a_k p^(k) = e`, its output

@@ -22,7 +22,7 @@ hoid_core::state!([] Belief { x, p });
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Model {
     pub ts: f64,
-    /// Variance of what is added to each element of X in a sample, and of n.
+    /// Variance of the noise added to each element of X in a sample, and of n.
     pub drift: [f64; N],
     pub noise: f64,
 }

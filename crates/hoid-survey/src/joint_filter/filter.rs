@@ -17,14 +17,14 @@ use crate::known_noise::lead_of;
 
 use super::belief::{Belief, ETA, Model, N};
 
-/// Takes a sample into what is believed; the innovation and its variance as expected.
+/// Adds a sample to the trusted data; the innovation and its variance as expected.
 pub(super) type Update = fn(&Model, &mut Belief, f64, f64) -> [f64; 2];
 
-/// Variance of n over that of the remnant: a coloured remnant tells less than a white one of the
-/// same variance.
+/// Variance of n over that of the remnant: a coloured remnant is less informative than a white one
+/// of the same variance.
 const OUTPUT_NOISE: f64 = 10.0;
-/// Variance of what drives v beside the error within one second, over that of the remnant seen
-/// through K_e_dot.
+/// Variance of the noise that drives v in addition to the error within one second, over that of the
+/// remnant seen through K_e_dot.
 const STATE_NOISE: f64 = 10.0;
 /// Drift of K_e and K_e_dot in one second, in units of `g = sqrt(K_e^2 + omega^2 K_e_dot^2)` and
 /// `g/omega` at the crossover omega.
@@ -93,8 +93,8 @@ impl JointFilter {
         })
     }
 
-    /// Keeps the parameters within their bounds and what is known of them within reason; true where
-    /// that changed something.
+    /// Keeps the parameters within their bounds and the prior knowledge of them within reason; true
+    /// if that changed something.
     fn hold(&mut self) -> bool {
         let mut cut = false;
         let sound =

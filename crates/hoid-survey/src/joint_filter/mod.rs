@@ -58,7 +58,7 @@ macro_rules! joint_filter {
             }
 
             /// It follows from a random walk of the parameters.
-            fn usual_memory(&self, _parameter: &str) -> Memory {
+            fn default_memory(&self, _parameter: &str) -> Memory {
                 Memory::Infinite
             }
 
@@ -83,7 +83,7 @@ macro_rules! joint_filter {
                 true
             }
 
-            fn memory_in_words(&self) -> Option<String> {
+            fn memory_as_text(&self) -> Option<String> {
                 Some("by a random walk of the parameters".to_owned())
             }
 

@@ -1,8 +1,8 @@
 //! The unscented Kalman filter: 2 N points `X ± sqrt(N) L_i`, with `L L' = P`, of equal weight are
 //! sent through transition and output, and give their means and covariances (S. J. Julier and J. K.
-//! Uhlmann, *Proceedings of the IEEE* 92 (2004) 401-422, with kappa = 0). The points are drawn anew
-//! after the noise of the transition has been added. `X <- X + c/s eps`, `P <- P - c c'/s`, with c
-//! the covariance of X with the output and s the variance of the output.
+//! Uhlmann, *Proceedings of the IEEE* 92 (2004) 401-422, with kappa = 0). The points are drawn
+//! again after the noise of the transition has been added. `X <- X + c/s eps`, `P <- P - c c'/s`,
+//! with c the covariance of X with the output and s the variance of the output.
 
 use super::belief::{Belief, Matrix, Model, N};
 
@@ -66,7 +66,7 @@ fn root(p: &Matrix) -> Matrix {
     let mut l = [[0.0; N]; N];
     for j in 0..N {
         let rest = p[j][j] - (0..j).map(|k| l[j][k] * l[j][k]).sum::<f64>();
-        // A share of rounding of what is left of a variance.
+        // A share of rounding of the remainder of a variance.
         if rest > 1e-14 * p[j][j] {
             l[j][j] = rest.sqrt();
             for i in j + 1..N {

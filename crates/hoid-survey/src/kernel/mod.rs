@@ -1,7 +1,7 @@
 //! The arithmetic of a sample, in fixed room: what serves these methods alone, in the form of
 //! [`hoid_core`].
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`physical`] | the prediction-error method in physical parameters |
 //! | [`multiple_model`] | a bank of hypotheses about when the operator changed |

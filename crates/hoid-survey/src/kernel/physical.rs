@@ -33,7 +33,7 @@ const ZETA: usize = 3;
 /// Place of tau_e in eta, where it is a parameter.
 const TAU: usize = 4;
 
-/// What the recursion estimates, and within which bounds.
+/// Parameters of the recursion and their bounds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhysicalModel<S, const N: usize> {
     /// Orders: nc and nd are free, na = 0, nf = 2 and nb = 2, or 3 when tau_e is a parameter.
@@ -50,7 +50,7 @@ pub struct PhysicalModel<S, const N: usize> {
 }
 
 /// The recursion. N is the capacity for parameters, K that for the errors of its filters
-/// ([`ErrorLayout::filter_errors`]; 0 for the usual error bars), L the number of past inputs that
+/// ([`ErrorLayout::filter_errors`]; 0 for the default error bars), L the number of past inputs that
 /// are kept: 2 without tau_e, 3 and the range of the delay with it; at least nc.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhysicalRpem<S, const N: usize, const K: usize, const L: usize, A> {
@@ -160,7 +160,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         Some(recursion)
     }
 
-    /// Lets B begin at the delay of the estimate.
+    /// Lets B start at the delay of the estimate.
     fn apply_delay(&mut self) {
         if let Some(first) = self.model.smallest_nk {
             let nk = self.polynomials.whole_samples + 1;
@@ -276,7 +276,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         self.correct();
     }
 
-    /// Sensitivities with respect to eta, whose noise parameters stand behind the operator's.
+    /// Sensitivities with respect to eta, whose noise parameters are after the operator's.
     #[inline(always)]
     fn sensitivities(&self) -> (ErrorLayout, Sensitivities<N, K>) {
         if K == 0 {

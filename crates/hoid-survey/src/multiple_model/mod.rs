@@ -1,5 +1,5 @@
-//! The bank of hypotheses of the real-time kernel ([`crate::kernel::multiple_model`]) behind the face of a
-//! recursion: what it supposes of a person, in seconds.
+//! The bank of hypotheses of the real-time kernel ([`crate::kernel::multiple_model`]) after the face of a recursion:
+//! what it supposes of a person, in seconds.
 //!
 //! Where the delay is tracked, other delays are proposed every 1.28 s.
 //!
@@ -44,7 +44,7 @@ const WITH_DELAYS: usize = 48;
 /// Standard deviations beyond which an innovation moves the estimate no further.
 const LIMIT: f64 = 3.5;
 /// Order of the noise model when none is named: the odds need innovations that are white.
-const USUAL_ND: usize = 6;
+const DEFAULT_ND: usize = 6;
 
 settings! {
     /// Options of the bank of hypotheses.
@@ -54,14 +54,14 @@ settings! {
         /// Standard deviations beyond which an innovation moves the estimate no further
         #[setting(bounds(Bounds::Positive), default("3.5"))]
         pub limit: Option<f64> = None,
-        /// At each sample what all of a recorded run says of it, by hypotheses run from both ends,
-        /// in place of what the past alone says
+        /// At each sample what all of a recorded run shows about it, by hypotheses run from both
+        /// ends, in place of the prediction from the past alone
         pub smooth: bool = false,
     }
     groups {
         /// Bounds.
         pub bounds: BoundOptions,
-        /// A delay that is followed.
+        /// A tracked delay.
         pub delay: DelayOptions,
         /// The guard.
         pub guard: GuardOptions,
@@ -72,19 +72,19 @@ impl RecursiveMethod for MultipleModelOptions {
     fn about(&self) -> About {
         About {
             name: "multiple-model",
-            help: "a bank of hypotheses of when the person changed, which sets its memory itself and tells of changes",
+            help: "a bank of hypotheses of when the person changed, which sets its memory itself and reports changes",
             source: "Andersson 1985; Willsky and Jones 1976; Adams and MacKay 2007; the book, page A person who changes",
             structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
             defaults: &[],
         }
     }
 
-    fn usual_nd(&self) -> Option<usize> {
-        Some(USUAL_ND)
+    fn default_nd(&self) -> Option<usize> {
+        Some(DEFAULT_ND)
     }
 
     /// It follows from a model of the change.
-    fn usual_memory(&self, _parameter: &str) -> Memory {
+    fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Infinite
     }
 
@@ -130,7 +130,7 @@ impl RecursiveMethod for MultipleModelOptions {
         true
     }
 
-    fn memory_in_words(&self) -> Option<String> {
+    fn memory_as_text(&self) -> Option<String> {
         Some(format!(
             "since the last change, by a bank of hypotheses; a change is declared at log odds of {}",
             self.alarm

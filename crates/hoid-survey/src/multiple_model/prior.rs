@@ -1,4 +1,4 @@
-//! What is supposed of a person and of their changes, in seconds, and the first hypothesis.
+//! Prior assumptions about a person and of their changes, in seconds, and the first hypothesis.
 
 use std::ops::RangeInclusive;
 
@@ -34,11 +34,11 @@ const CROSSOVER_RAD_S: f64 = 2.0;
 /// Memory of the innovation variance, and what of it is left after a change, s.
 const LEVEL_MEMORY_S: f64 = 20.0;
 const DOUBT_S: f64 = 1.0;
-/// Births for which a hypothesis is kept whatever it foretells.
+/// Births for which a hypothesis is kept whatever it predicts.
 const PROTECTED_BIRTHS: f64 = 4.0;
-/// Age from which a hypothesis can say what changed, s.
+/// Age from which a hypothesis can report what changed, s.
 const SETTLED_S: f64 = 0.5;
-/// A hypothesis of up to this age stands for a change, s.
+/// A hypothesis of up to this age represents a change, s.
 const RECENT_S: f64 = 4.0;
 
 /// Births for one time at which other delays are proposed, how many of them, the odds of a change
@@ -49,7 +49,7 @@ const DELAYS_PROPOSED: usize = 8;
 const DELAY_ODDS: f64 = 1.0;
 const DELAY_JUMP_S: f64 = 0.05;
 const NEIGHBOUR: f64 = 0.15;
-/// What 0.01 s of delay is worth in K_e, K_e_dot, omega_nm and zeta_nm, in the units of
+/// Effect of 0.01 s of delay on K_e, K_e_dot, omega_nm and zeta_nm, in the units of
 /// [`DelayPrior::error_per_sample`].
 const WORTH: [f64; OPERATOR] = [0.01, 0.03, 0.04, 0.08];
 
@@ -61,7 +61,7 @@ pub(super) fn delays(setup: &Setup, sample_time: SampleTime) -> RangeInclusive<u
     }
 }
 
-/// What is supposed of changes, in samples.
+/// Prior assumptions about changes, in samples.
 ///
 /// # Errors
 /// As [`physical_bounds`].
@@ -103,7 +103,7 @@ pub(super) fn change_prior(alarm: f64, setup: &Setup, sample_time: SampleTime) -
     })
 }
 
-/// The first hypothesis, from the batch fit of the start span, its covariance so many times larger.
+/// The first hypothesis, from the batch fit of the start span, its covariance scaled by a factor.
 ///
 /// # Errors
 /// [`IdentError::BadStart`] without a fit, or where it lies outside the bounds.

@@ -1,15 +1,15 @@
-//! The two-sided estimate of a recorded run: what all of its samples say of the operator at each of
-//! them.
+//! The two-sided estimate of a recorded run: what all of its samples show about the operator at
+//! each of them.
 //!
-//! Behind the whitening filter the model of [`crate::kernel::multiple_model`] has no dynamics:
+//! After the whitening filter the model of [`crate::kernel::multiple_model`] has no dynamics:
 //! `y(t) = K_e psi_1 + K_e_dot psi_2 + eps`, with signals that the record gives once for all. The
 //! bank of hypotheses may therefore be run over it from either end. At t the run from the front
-//! says `p(eta_t | y_1..y_t) = sum_f P(f) N(m_f, P_f)`, where f says when the person changed last,
-//! and the run from the back `p(y_{t+1}..y_N | eta_t)`, in proportion to `sum_b P(b) N(m_b, P_b)`,
-//! where b says when the person will change next. The product is the two-filter smoother (D. C.
-//! Fraser and J. E. Potter, *IEEE Transactions on Automatic Control* 14 (1969) 387-390), here of
-//! two mixtures (G. Kitagawa, *Annals of the Institute of Statistical Mathematics* 46 (1994)
-//! 605-623): with `S = P_f + P_b`,
+//! reports `p(eta_t | y_1..y_t) = sum_f P(f) N(m_f, P_f)`, where f reports when the person changed
+//! last, and the run from the back `p(y_{t+1}..y_N | eta_t)`, in proportion to
+//! `sum_b P(b) N(m_b, P_b)`, where b reports when the person will change next. The product is the
+//! two-filter smoother (D. C. Fraser and J. E. Potter, *IEEE Transactions on Automatic Control* 14
+//! (1969) 387-390), here of two mixtures (G. Kitagawa, *Annals of the Institute of Statistical
+//! Mathematics* 46 (1994) 605-623): with `S = P_f + P_b`,
 //!
 //! - `m = m_f + P_f S^-1 (m_b - m_f)`, `P = P_f - P_f S^-1 P_f`;
 //! - `P(f, b) ~ P(f) P(b) N(m_b - m_f; 0, S)`: a past and a future that contradict each other are
@@ -43,10 +43,10 @@ use super::prior::{change_prior, first_hypothesis, outside};
 /// Room for hypotheses, and time between two births, s.
 const HYPOTHESES: usize = 64;
 const SPACING_S: f64 = 0.08;
-/// Multiple of the covariance of the start fit from which both runs begin.
+/// Multiple of the covariance of the start fit from which both runs start.
 const KNOWN_LITTLE: f64 = 100.0;
 /// Time constants of the neuromuscular system after which the filters have forgotten that they
-/// began at rest.
+/// started at rest.
 const SETTLED: f64 = 6.0;
 /// Least probability of a hypothesis that is joined, and least share of a pair in the largest.
 const LEAST: f64 = 1e-3;
@@ -89,8 +89,8 @@ pub(crate) struct Joined {
     pub variance: f64,
 }
 
-/// Output and signals behind the whitening filter; `None` where they are not known.
-type Seen = Option<(f64, Signals)>;
+/// Output and signals after the whitening filter; `None` if they are not known.
+type WhitenedSample = Option<(f64, Signals)>;
 
 /// The two-sided estimates of the rows of a causal run.
 ///
@@ -122,7 +122,7 @@ pub(super) fn smooth(
     Ok(joined.iter().map(&mut row).collect())
 }
 
-/// The mixtures of pairs at the samples asked for, ascending.
+/// The mixtures of pairs at the requested samples, ascending.
 fn two_sided(
     record: &Record,
     alarm: f64,
@@ -134,12 +134,12 @@ fn two_sided(
 ) -> Result<Vec<Joined>, IdentError> {
     let sample_time = record.sample_time();
     let spacing = (SPACING_S / sample_time.s()).round().max(1.0);
-    let usual = change_prior(alarm, setup, sample_time)?;
+    let default = change_prior(alarm, setup, sample_time)?;
     let supposed = ChangePrior {
         birth_interval: spacing as u32,
-        hazard: usual.hazard.min(0.5 / spacing),
+        hazard: default.hazard.min(0.5 / spacing),
         neuromuscular_every: 0,
-        ..usual
+        ..default
     };
     let first = first_hypothesis(from, KNOWN_LITTLE, sample_time)?;
     let bank = |first: Hypothesis| -> Result<Box<Bank<HYPOTHESES>>, IdentError> {
@@ -171,8 +171,8 @@ fn two_sided(
     Ok(joined)
 }
 
-/// Output and signals of every sample behind D, for filters about a point that began at rest.
-fn whitened(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]) -> Vec<Seen> {
+/// Output and signals of every sample behind D, for filters about a point that started at rest.
+fn whitened(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]) -> Vec<WhitenedSample> {
     let (e, u) = (record.input(), record.output());
     let sound = |v: f64| v.abs() <= largest;
     let mut response = Response::new(about, record.sample_time().s());
@@ -217,16 +217,16 @@ fn sides(bank: &Bank<HYPOTHESES>) -> Vec<Side> {
 
 /// The product of two mixtures.
 fn join(before: &[Side], after: &[Side]) -> Joined {
-    let mut pairs: Vec<(f64, Pair)> = Vec::with_capacity(before.len() + after.len());
+    let mut pairs: Vec<(f64, ForwardBackward)> = Vec::with_capacity(before.len() + after.len());
     let (mut most, least) = (f64::NEG_INFINITY, LEAST.ln());
     for f in before {
         for b in after {
             // Not a number where nothing is bounded: such a pair is tried.
             let highest = f.log_weight + b.log_weight - f.size.max(b.size);
-            if highest < most + least || highest - Pair::half_square(f, b) < most + least {
+            if highest < most + least || highest - ForwardBackward::half_square(f, b) < most + least {
                 continue;
             }
-            if let Some((log, pair)) = Pair::of(f, b) {
+            if let Some((log, pair)) = ForwardBackward::of(f, b) {
                 most = most.max(log);
                 pairs.push((log, pair));
             }
@@ -234,7 +234,7 @@ fn join(before: &[Side], after: &[Side]) -> Joined {
     }
     pairs.retain(|(log, _)| *log >= most + least);
     let each: Vec<(f64, Joined)> = if pairs.is_empty() {
-        // Nothing could be joined: what the past says alone.
+        // Nothing could be joined: the prediction from the past alone.
         let shares = before.iter().map(|f| (f.log_weight.exp(), alone(f)));
         shares.collect()
     } else {
@@ -278,17 +278,17 @@ fn alone(f: &Side) -> Joined {
 }
 
 /// A past and a future, with `L L' = S` and `z = L^-1 (m_b - m_f)`.
-struct Pair<'a> {
+struct ForwardBackward<'a> {
     f: &'a Side,
     b: &'a Side,
     root: [[f64; OPERATOR]; OPERATOR],
     z: [f64; OPERATOR],
 }
 
-impl<'a> Pair<'a> {
-    /// What the difference takes from the logarithm of the weight, at least: `z'z` is no less than
-    /// the square of one difference over its variance. As S is larger than either covariance,
-    /// neither of these bounds is crossed but for rounding.
+impl<'a> ForwardBackward<'a> {
+    /// Lower bound of the decrease of the log weight by the difference: `z'z` is no less than the
+    /// square of one difference over its variance. As S is larger than either covariance, neither
+    /// of these bounds is crossed except for rounding.
     fn half_square(f: &Side, b: &Side) -> f64 {
         let apart = b.level[0] - f.level[0];
         let mut square = 0.0_f64;
@@ -331,7 +331,7 @@ impl<'a> Pair<'a> {
 }
 
 /// L with `L L' = s`. Known products are added up before they are taken away, as [`cholesky::forward`] does;
-/// [`cholesky::factor`] is the same but for rounding.
+/// [`cholesky::factor`] is the same except for rounding.
 fn factor(s: &[[f64; OPERATOR]; OPERATOR]) -> Option<[[f64; OPERATOR]; OPERATOR]> {
     let mut l = [[0.0; OPERATOR]; OPERATOR];
     for i in 0..OPERATOR {

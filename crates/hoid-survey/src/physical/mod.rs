@@ -12,7 +12,7 @@ use hoid_model::{SampleTime, Structure};
 use hoid_track::{
     BoundOptions, DelayOptions, GainOptions, GuardChoice, GuardOptions, Memory, StabilityOptions,
     building::{
-        About, Plan, Recursion, RecursiveMethod, Setup, StartState, USUAL_LIMIT, check_delay, check_operator_orders,
+        About, DEFAULT_LIMIT, Plan, Recursion, RecursiveMethod, Setup, StartState, check_delay, check_operator_orders,
     },
 };
 
@@ -26,7 +26,7 @@ settings! {
         pub stability: StabilityOptions,
         /// Bounds.
         pub bounds: BoundOptions,
-        /// A delay that is followed.
+        /// A tracked delay.
         pub delay: DelayOptions,
         /// The guard.
         pub guard: GuardOptions,
@@ -48,7 +48,7 @@ impl RecursiveMethod for PhysicalOptions {
     }
 
     /// A person hardly changes the others within a run.
-    fn usual_memory(&self, parameter: &str) -> Memory {
+    fn default_memory(&self, parameter: &str) -> Memory {
         match parameter {
             "K_e" => Memory::Seconds(5.0),
             "K_e_dot" => Memory::Seconds(1.5),
@@ -83,7 +83,7 @@ impl RecursiveMethod for PhysicalOptions {
     }
 
     fn limit(&self) -> f64 {
-        self.gain.limit_or(USUAL_LIMIT)
+        self.gain.limit_or(DEFAULT_LIMIT)
     }
 
     fn stable(&self) -> Stable {

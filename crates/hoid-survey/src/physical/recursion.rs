@@ -1,5 +1,5 @@
-//! The recursion in physical parameters behind the face of all: room for the parameters, the delay line,
-//! the covariance in units of the coefficients.
+//! The recursion in physical parameters after the face of all: room for the parameters, the delay line, the covariance
+//! in units of the coefficients.
 
 use hoid_core::{
     adaptation::Adaptation,

@@ -3,13 +3,13 @@
 
 use hoid_model::Orders;
 
-use hoid_track::building::{Past, bounded, weighted};
+use hoid_track::building::{History, bounded, weighted};
 
 /// A signal and what D/F makes of it.
 #[derive(Debug, Clone)]
 pub(crate) struct Filtered {
-    pub raw: Past,
-    pub out: Past,
+    pub raw: History,
+    pub out: History,
 }
 
 hoid_core::state!([] Filtered { raw, out });
@@ -17,8 +17,8 @@ hoid_core::state!([] Filtered { raw, out });
 impl Filtered {
     pub fn new(orders: &Orders) -> Self {
         Self {
-            raw: Past::new(orders.nd),
-            out: Past::new(orders.nf.max(orders.nb)),
+            raw: History::new(orders.nd),
+            out: History::new(orders.nf.max(orders.nb)),
         }
     }
 
@@ -36,8 +36,8 @@ impl Filtered {
 /// An input, its response and both filtered.
 #[derive(Debug, Clone)]
 pub(crate) struct Simulated {
-    pub input: Past,
-    pub response: Past,
+    pub input: History,
+    pub response: History,
     pub input_filtered: Filtered,
     pub response_filtered: Filtered,
 }
@@ -47,8 +47,8 @@ hoid_core::state!([] Simulated { input, response, input_filtered, response_filte
 impl Simulated {
     pub fn new(orders: &Orders) -> Self {
         Self {
-            input: Past::new(orders.nk + orders.nb),
-            response: Past::new(orders.nf),
+            input: History::new(orders.nk + orders.nb),
+            response: History::new(orders.nf),
             input_filtered: Filtered::new(orders),
             response_filtered: Filtered::new(orders),
         }

@@ -21,11 +21,11 @@
 //! ([`super::laguerre`]). With e the method needs the right noise model in a closed loop: z then
 //! holds past noise, which is independent of a white eps only.
 //!
-//! **Covariance.** To first order the errors go on as `t <- (I - A) t - g eps` with rows `g_i phi'`
-//! for B and F and `g_i psi'` for D (psi the gradient for all parameters: D inherits what B and F
-//! are wrong by), so that `sigma^2 C` with `C <- (I - A) C (I - A)' + g g'` is the covariance of
-//! theta, whatever gain was used: for lambda = 1 that of the batch method, with forgetting about
-//! `P/(1 + lambda)`.
+//! **Covariance.** To first order the errors continue as `t <- (I - A) t - g eps` with rows
+//! `g_i phi'` for B and F and `g_i psi'` for D (psi the gradient for all parameters: D inherits
+//! what B and F are wrong by), so that `sigma^2 C` with `C <- (I - A) C (I - A)' + g g'` is the
+//! covariance of theta, whatever gain was used: for lambda = 1 that of the batch method, with
+//! forgetting about `P/(1 + lambda)`.
 //!
 //! **Stability.** A step of B and F is halved until the roots of F lie within [`RADIUS`].
 
@@ -44,7 +44,7 @@ use hoid_model::Orders;
 
 use hoid_track::{
     Sample,
-    building::{Past, Recursion, StepOutcome, bounded, weighted},
+    building::{History, Recursion, StepOutcome, bounded, weighted},
 };
 
 use filters::{Filtered, Parts, Simulated, fill_f};
@@ -62,7 +62,7 @@ const LEAST_SHARE: f64 = 1.0 / 1024.0;
 /// Smallest innovation variance as a share of the one at the start.
 const LEAST: f64 = 1e-16;
 
-/// What the recursion goes on from: a batch fit, or a guess.
+/// Start of the recursion: a batch fit, or a guess.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RefinedStart<'a> {
     /// In the order of [`Orders::parameter_names`].
@@ -99,7 +99,7 @@ pub(crate) struct RefinedRecursion {
     instrument: Option<(Following, Simulated, f64)>,
     output: Filtered,
     /// xi.
-    rest: Past,
+    rest: History,
     shortened: usize,
     work: Work,
 }
@@ -182,7 +182,7 @@ impl RefinedRecursion {
             measured: Simulated::new(&orders),
             instrument: external.then(|| (Following::new(), Simulated::new(&orders), 0.0)),
             output: Filtered::new(&orders),
-            rest: Past::new(orders.nd),
+            rest: History::new(orders.nd),
             shortened: 0,
             work: Work {
                 phi: zeros.clone(),

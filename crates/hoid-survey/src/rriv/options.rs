@@ -1,4 +1,4 @@
-//! What the method may be told, and how it is built.
+//! Report of the method may be, and how it is built.
 
 use hoid_ident::{IdentError, iv::FORCING_CHANNEL, settings};
 use hoid_model::{Record, SampleTime, Structure};
@@ -33,7 +33,7 @@ impl RecursiveMethod for RrivOptions {
         }
     }
 
-    fn usual_memory(&self, parameter: &str) -> Memory {
+    fn default_memory(&self, parameter: &str) -> Memory {
         short_for_b(parameter)
     }
 

@@ -23,7 +23,7 @@ fn textbook() -> Orders {
 }
 
 /// `u = (B/F) q^-2 e + (1/D) eps` with white e and eps of unit variance; B is `gain` times the
-/// usual one from the middle on.
+/// default one from the middle on.
 fn open_loop(n: usize, replication: u64, d: &[f64], gain: f64) -> (Vec<f64>, Vec<f64>) {
     let white = |cell| {
         RunSeed {
@@ -238,18 +238,18 @@ fn silence_is_forgotten_quickly() {
         samples(&record(&e[2000..], &u[2000..])).for_each(|s| {
             recursion.step(s);
         });
-        let mut usual = from_fit(&riv(&warm, textbook()), &warm, &lambda, false);
+        let mut default = from_fit(&riv(&warm, textbook()), &warm, &lambda, false);
         samples(&record(&e[2000..], &u[2000..])).for_each(|s| {
-            usual.step(s);
+            default.step(s);
         });
-        for (i, (a, b)) in errors(&recursion).into_iter().zip(errors(&usual)).enumerate() {
+        for (i, (a, b)) in errors(&recursion).into_iter().zip(errors(&default)).enumerate() {
             println!(
                 "{still:?} {i}: {:.4} {:.4}, errors {a:.4} {b:.4}",
                 recursion.theta()[i],
-                usual.theta()[i]
+                default.theta()[i]
             );
             // 4000 samples, 16 memories.
-            assert!((recursion.theta()[i] - usual.theta()[i]).abs() < b, "{still:?} {i}");
+            assert!((recursion.theta()[i] - default.theta()[i]).abs() < b, "{still:?} {i}");
             assert!((a / b - 1.0).abs() < 0.3, "{still:?} {i}: {a} {b}");
         }
     }

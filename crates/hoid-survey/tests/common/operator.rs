@@ -1,4 +1,4 @@
-//! An operator in state s1 of the reference text, and a prior of their changes.
+//! An operator in state s1 of the thesis, and a prior of their changes.
 
 use hoid_survey::kernel::multiple_model::prior::{ChangePrior, DelayPrior};
 

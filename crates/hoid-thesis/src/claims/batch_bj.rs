@@ -82,7 +82,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "Remnant time constant T_n at orders above 1: \"relative biases around 100 % are obtained\".",
         place: "6.1.2, Fig. C.5",
-        measure: "Magnitude of the median bias of T_n (backward Euler, as in B.2), BJ(m* = m0), m0 = 2 to 4, C1, n_k* = 29; of the exact retrieval beside it.",
+        measure: "Magnitude of the median bias of T_n (backward Euler, as in B.2), BJ(m* = m0), m0 = 2 to 4, C1, n_k* = 29; of the exact retrieval next to it.",
         plans: PLANS,
         source: Source::Data(remnant_time_constant),
     },
@@ -91,7 +91,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "\"The estimation of the remnant gain also presents important errors for m-th orders greater than 1.\"",
         place: "6.1.2, Fig. C.5",
-        measure: "Magnitude of the median bias of K_n (backward Euler, as in B.2), BJ(m* = m0), m0 = 2 to 4, C1, n_k* = 29; of the exact retrieval beside it.",
+        measure: "Magnitude of the median bias of K_n (backward Euler, as in B.2), BJ(m* = m0), m0 = 2 to 4, C1, n_k* = 29; of the exact retrieval next to it.",
         plans: PLANS,
         source: Source::Data(remnant_gain),
     },
@@ -216,7 +216,7 @@ fn second_order_worst(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(vec![part])
 }
 
-/// Biases of a remnant parameter as the text retrieves it, with the exact retrieval shown beside
+/// Biases of a remnant parameter as the text retrieves it, with the exact retrieval shown next to
 /// it.
 fn remnant(
     evidence: &Evidence<'_>,

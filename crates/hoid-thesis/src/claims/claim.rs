@@ -1,4 +1,4 @@
-//! A statement of the text and what it needs to be tested.
+//! A statement of the text and its requirements to be tested.
 
 use super::{evidence::Evidence, rules::Part};
 
@@ -7,7 +7,7 @@ use super::{evidence::Evidence, rules::Part};
 pub struct Claim {
     /// Its name, of which there is one.
     pub id: &'static str,
-    /// What it is about.
+    /// Subject of it.
     pub theme: Theme,
     /// The statement, quoted or put shortly.
     pub statement: &'static str,
@@ -20,7 +20,7 @@ pub struct Claim {
     pub(super) source: Source,
 }
 
-/// What a claim is about.
+/// Subject of a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Theme {
     /// Batch fits of ARX models.

@@ -9,7 +9,7 @@
 //!   cases, all of it in the last.
 //! - *Settling of a median trace*: time after t_M at which it has covered 90 % of its own step,
 //!   from its mean over the 10.24 s before t_M to its mean over the last 15.36 s: an estimate with
-//!   a bias settles at its own value. Its error is half of what lies between the settling of the
+//!   a bias settles at its own value. Its error is half of anything between the settling of the
 //!   median plus and minus its own error, and at least half the step of the kept times.
 
 use std::collections::BTreeMap;
@@ -135,7 +135,7 @@ impl<'a> Study<'a> {
         let Some(bands) = traces.parameters.get(parameter) else {
             return Ok(NOTHING);
         };
-        // The median of the few runs that convert says nothing of the others.
+        // The median of the few runs that convert carries no information about the others.
         if OPERATOR.contains(&parameter)
             && self.mean(&query.clone().quantity_of("share_not_convertible"))?.value > ENOUGH
         {

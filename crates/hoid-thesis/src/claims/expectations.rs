@@ -13,9 +13,9 @@ use hoid_study::{OPERATOR, Query};
 const PLANS: &[&str] = &["recursive"];
 const PLACE: &str = "6.2.2";
 const GAINS: [&str; 3] = ["K_e", "T_L", "K_e_dot"];
-/// What follows the change at 40.96 s, s.
+/// Span after the change at 40.96 s, s.
 const TRANSITION_S: (f64, f64) = (40.96, 51.2);
-/// Starts of the plan, with poles, gains or both beside the true values (Table 6.1).
+/// Starts of the plan, with poles, gains or both next to the true values (Table 6.1).
 const STARTS: [&str; 9] = ["base", "IC1", "IC2", "IC3", "IC4", "IC5", "IC6", "IC7", "IC8"];
 
 pub(super) const CLAIMS: &[Claim] = &[

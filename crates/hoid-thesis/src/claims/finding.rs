@@ -1,4 +1,4 @@
-//! What the data say of a claim.
+//! Content of the data for a claim.
 
 use hoid_study::Statistics;
 
@@ -8,7 +8,7 @@ use super::{
     rules::{self, CellOutcome, CellTest, Part, Verdict},
 };
 
-/// What the data say of a claim.
+/// Content of the data for a claim.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
     /// Whether it holds.
@@ -25,14 +25,14 @@ pub struct Finding {
     pub failed: usize,
     /// Cells in all; the others are undecided.
     pub of: usize,
-    /// What was found, in words.
+    /// The findings, as text.
     pub text: String,
 }
 
 /// A number that was measured, over the cells of a part.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
-    /// What it is.
+    /// Its definition.
     pub label: String,
     /// Median over the cells that have a value.
     pub value: f64,
@@ -47,7 +47,7 @@ pub struct Measured {
 }
 
 impl Claim {
-    /// What the data say of it.
+    /// Content of the data for it.
     pub fn evaluate(&self, evidence: &Evidence<'_>) -> Finding {
         let found = match self.source {
             Source::Data(measure) => measure(evidence),
@@ -64,7 +64,7 @@ impl Claim {
             failed: count(CellOutcome::Fails),
             of: parts.iter().map(|part| part.tests.len()).sum(),
             measured: parts.iter().flat_map(measured).collect(),
-            text: in_words(&verdict, &parts),
+            text: as_text(&verdict, &parts),
             verdict,
             parts,
         }
@@ -93,7 +93,7 @@ fn measured(part: &Part) -> Vec<Measured> {
     std::iter::once(over_cells).chain(shown).collect()
 }
 
-fn in_words(verdict: &Verdict, parts: &[Part]) -> String {
+fn as_text(verdict: &Verdict, parts: &[Part]) -> String {
     let of_part = |part: &Part| {
         let (above, below) = part.beyond();
         let open = part.count(CellOutcome::Undecided);

@@ -180,7 +180,7 @@ fn failures(study: Study<'_>, name: &str, start: &str) -> Result<Value, String> 
             from("BJ", "base", "loss")?,
         );
         for ((converged, loss), base) in converged.iter().zip(&loss).zip(&base) {
-            // A loss that is no number belongs to a search that failed.
+            // A loss that is not a number belongs to a search that failed.
             let reached = *converged == 1.0 && *loss <= 1.01 * base;
             failed.push(f64::from(u8::from(!reached)));
         }

@@ -1,9 +1,9 @@
-//! Statements of the reference text, tested by the data of studies.
+//! Statements of the thesis, tested by the data of studies.
 //!
-//! A claim names what the text says and where, which plans measure it and how. Its verdict comes
+//! A claim names what the text states and where, which plans measure it and how. Its verdict comes
 //! from the data by the rules of the module [`rules`], the same for all claims. A claim whose plan
-//! was not run, or which needs something that the results do not have, cannot be tested and says
-//! why; so does one on experiments with people, for which there are no data here.
+//! was not run, or which needs something that the results do not have, cannot be tested and gives
+//! the reason; so does one on experiments with people, for which there are no data here.
 //!
 //! | module | theme |
 //! |---|---|
@@ -75,7 +75,7 @@ pub fn claims() -> Vec<Claim> {
     .concat()
 }
 
-/// All claims with what the data say of them.
+/// All claims with the evidence of the data on them.
 pub fn findings(evidence: &Evidence<'_>) -> Vec<(Claim, Finding)> {
     let with_finding = |claim: Claim| {
         let finding = claim.evaluate(evidence);

@@ -208,7 +208,8 @@ fn rms(study: Study<'_>, at: Setting, name: &str) -> Result<Value, String> {
     study.difference(&at.rpem(&quantity), &at.rls(&quantity))
 }
 
-/// By how many % the median RMS error of one trace is less than that of another, of the same runs.
+/// Percentage by which the median RMS error of one trace is less than that of another, of the same
+/// runs.
 fn less_rms(study: Study<'_>, one: Query, other: Query) -> Result<Value, String> {
     study.of(&[one, other], &|s| 100.0 * (1.0 - med(&s[0]) / med(&s[1])))
 }

@@ -5,12 +5,11 @@
 //!    - *Comparison* (larger, smaller, no larger than): the cell passes when x is beyond the limit
 //!      by more than the margin, fails when it is on the other side by more, and is undecided
 //!      within the margin.
-//!    - *Number* (around 50 %, 10 times): the cell passes when x lies within the range of the
-//!      wording, widened by the margin, and fails otherwise. It is undecided where it would pass
-//!      with a margin of more than half the range: such an x says nothing of the number. Where the
-//!      number is the size of an effect (so many times slower, so much less error), an x beyond the
-//!      range on the side of the larger effect *exceeds* the claim: what was said is true, and more
-//!      so.
+//!    - *Number* (around 50 %, 10 times): the cell passes when x lies within the range of the wording, widened by the
+//!      margin, and fails otherwise. It is undecided where it would pass with a margin of more than half the range:
+//!      such an x carries no information about the number. Where the number is the size of an effect (so many times
+//!      slower, so much less error), an x beyond the range on the side of the larger effect *exceeds* the claim: what
+//!      was reported is true, and more so.
 //!    - Where less than half of the replications give a value (models that do not convert) the cell
 //!      is undecided.
 //! 2. **A part** of a claim (same figure of merit, same test) holds when 90 % of its decided cells
@@ -21,7 +20,7 @@
 //!    when none of its parts holds even in part, and holds in part otherwise. When no part is
 //!    decided, it cannot be tested.
 //!
-//! What words mean, the same for all claims:
+//! Meaning of words, the same for all claims:
 //!
 //! | wording | test |
 //! |---|---|
@@ -47,7 +46,7 @@ pub(super) const ACCEPTABLE: f64 = 10.0;
 pub(super) const CLOSE: f64 = 5.0;
 /// The least difference that matters, points of % of the true value.
 pub(super) const MATTERS: f64 = 0.1;
-/// What remains of something that is heavily reduced.
+/// Remainder of something that is heavily reduced.
 pub(super) const QUARTER: f64 = 0.25;
 /// The least ratio of something that is much higher.
 pub(super) const MUCH: f64 = 1.5;
@@ -58,12 +57,12 @@ const MARGIN: f64 = 2.0;
 const HOLDS_FROM: f64 = 0.9;
 const IN_PART_FROM: f64 = 0.5;
 
-/// What the data say of a claim.
+/// Content of the data for a claim.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Verdict {
     /// It holds.
     Holds,
-    /// What it says is true, and the effect is larger than the number that it gives.
+    /// What it reports is true, and the effect is larger than the number that it gives.
     HoldsAndMoreSo,
     /// It holds in part.
     HoldsInPart,
@@ -126,9 +125,9 @@ pub enum Bound {
 pub struct CellTest {
     /// Which cell.
     pub label: String,
-    /// What was measured.
+    /// The measurements.
     pub measured: Value,
-    /// What is claimed.
+    /// The claim.
     pub bound: Bound,
 }
 
@@ -173,7 +172,7 @@ pub struct Part {
     pub label: String,
     /// Its cells.
     pub tests: Vec<CellTest>,
-    /// Numbers beside those that are tested.
+    /// Numbers next to those that are tested.
     pub shown: Vec<(String, Value)>,
 }
 

@@ -41,7 +41,7 @@ fn value_of(values: &[f64], figure: fn(&Statistics) -> (f64, f64)) -> Value {
     let (value, error) = figure(&Statistics::of(values));
     Value {
         value,
-        // A scenario without remnant has one replication, which says all.
+        // A scenario without remnant has one replication, which reports all.
         error: if values.len() == 1 { 0.0 } else { error },
     }
 }

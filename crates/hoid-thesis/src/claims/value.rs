@@ -48,7 +48,7 @@ impl Value {
         }
     }
 
-    /// By how many % it is less than a number from other replications.
+    /// Percentage by which it is less than a number from other replications.
     #[must_use]
     pub fn less_than(self, other: Self) -> Self {
         let ratio = self.over(other);

@@ -5,7 +5,7 @@
 //! Its reference value is that of the backward Euler form (eq. B.12),
 //! `sigma'^2 = (K_n (Ts/(Tn + Ts))^m)^2`. The remnant is held exactly over a sample, in the
 //! simulations of the text as here, so that the innovations of an exact model have another
-//! variance: it is shown beside.
+//! variance: it is shown alongside.
 
 use super::{
     claim::{Claim, Source, Theme},
@@ -70,7 +70,7 @@ pub(super) const CLAIMS: &[Claim] = &[
 
 /// The reference value of the innovation variance (eq. B.12).
 fn backward_euler_variance(study: Study<'_>, at: Setting) -> Result<f64, String> {
-    // Of all scenarios of the plan.
+    // For all scenarios of the plan.
     const TS_S: f64 = 0.01;
     const T_N_S: f64 = 0.06;
     let k_n = study.truth(&at.bj("loss", at.m0, TRUE_DELAY))?.k_n;

@@ -1,4 +1,4 @@
-//! What a comparator is: it follows a record, and says what the operator is at some times.
+//! Definition of a comparator: it follows a record, and reports what the operator is at some times.
 
 use hoid_ident::settings::Settings;
 use hoid_model::{OperatorParameters, Record, SampleTime, delayed_operator};
@@ -6,29 +6,29 @@ use num_complex::Complex64;
 
 use crate::ThesisError;
 
-/// What a comparator says of itself.
+/// Self-description of a comparator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct About {
     /// Its name in a plan.
     pub name: &'static str,
-    /// What it does.
+    /// Its behaviour.
     pub help: &'static str,
     /// Author, year, place.
     pub source: &'static str,
-    /// What it is told that a recursion is not, in words; empty for nothing.
+    /// What it is reported that a recursion is not, as text; empty for nothing.
     pub told: &'static str,
 }
 
-/// A record and what is asked of it.
+/// A record and its task.
 #[derive(Debug, Clone, Copy)]
 pub struct Task<'a> {
     /// The record.
     pub record: &'a Record,
-    /// Samples after which an estimate is asked for, in their order.
+    /// Samples after which an estimate is requested, in their order.
     pub at: &'a [usize],
     /// Frequencies of the lines of the forcing function, rad/s.
     pub lines_rad_s: &'a [f64],
-    /// Frequencies at which the response is asked for, rad/s; some of the lines.
+    /// Frequencies at which the response is requested, rad/s; some of the lines.
     pub omega_rad_s: &'a [f64],
     /// Span from which a start is fitted, s.
     pub start_s: (f64, f64),
@@ -36,11 +36,11 @@ pub struct Task<'a> {
     pub nk: usize,
     /// A second run of the same person in the same task, where there is one.
     pub validation: Option<&'a Record>,
-    /// When the controlled element changes, s, and how fast, 1/s; none where it does not.
+    /// When the controlled element changes, s, and how fast, 1/s; none if it does not.
     pub change: Option<(f64, f64)>,
 }
 
-/// What a comparator found, one entry for each sample that was asked for.
+/// Result of a comparator, one entry for each sample that was requested.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Followed {
     /// The response at each frequency.
@@ -50,7 +50,7 @@ pub struct Followed {
 }
 
 impl Followed {
-    /// Of a method that gives a response alone.
+    /// For a method that gives a response alone.
     pub fn without_operator(response: Vec<Vec<Complex64>>) -> Self {
         Self {
             operator: vec![None; response.len()],
@@ -58,8 +58,8 @@ impl Followed {
         }
     }
 
-    /// What a method with an operator found at the next sample that was asked for; its response is that
-    /// of the operator, NaN where there is none.
+    /// Result of a method with an operator at the next requested sample; its response is that of the operator, NaN if
+    /// there is none.
     pub(super) fn push(&mut self, task: &Task<'_>, operator: Option<OperatorParameters>) -> Result<(), ThesisError> {
         self.response.push(match &operator {
             Some(operator) => response_of(operator, task.record.sample_time(), task.omega_rad_s)?,
@@ -72,7 +72,7 @@ impl Followed {
 
 /// A method that is compared with others.
 pub trait Comparator: Settings + Send + Sync {
-    /// What it says of itself.
+    /// Its self-description.
     fn about(&self) -> About;
 
     /// Follows a record.
@@ -108,7 +108,7 @@ impl Task<'_> {
         }
         if let Some(k) = self.at.iter().find(|k| **k >= e.len()) {
             return Err(unsuited(
-                "a sample that is asked for",
+                "a sample that is requested",
                 k.to_string(),
                 "one of the record",
             ));
@@ -117,7 +117,7 @@ impl Task<'_> {
     }
 }
 
-/// The response of an operator with any delay, behind a zero-order hold, at some frequencies.
+/// The response of an operator with any delay, after a zero-order hold, at some frequencies.
 pub(crate) fn response_of(
     operator: &OperatorParameters,
     sample_time: SampleTime,

@@ -8,15 +8,15 @@
 //! population of parameter vectors drawn from wide ranges, of which each generation keeps the best,
 //! and makes the others from two parents each, the better of three drawn ones (a *tournament*),
 //! every gene from a range that reaches half of the parents' distance beyond both (*blend
-//! crossover*, L. J. Eshelman and J. D. Schaffer 1993), now and then moved by a normal deviate. What
+//! crossover*, L. J. Eshelman and J. D. Schaffer 1993), at intervals moved by a normal deviate. What
 //! it minimises is the one-step prediction error,
 //!
 //! `eps(k) = v(k) + d1 v(k-1)`, `v = u - K_e(t) y_0 - K_e_dot(t) y_1`, `K_e_dot = K_e T_L`,
 //!
 //! with the unit responses y_0, y_1 of [`super::unit_responses`] and K_e, T_L along the sigmoid
 //! `1/(1 + e^(-G (t - t_M)))`; d1 is the least-squares value for each v. The best of the last
-//! generation is the start of [`SigmoidChange`], which goes on by Gauss-Newton steps to the maximum
-//! of the likelihood, as the source does.
+//! generation is the start of [`SigmoidChange`], which continues by Gauss-Newton steps to the
+//! maximum of the likelihood, as the source does.
 
 use std::f64::consts::TAU;
 
@@ -48,7 +48,7 @@ const RANGES: [(f64, f64); 9] = [
 const N: usize = RANGES.len();
 /// Place of t_M.
 const MIDPOINT: usize = 4;
-/// Members that go on as they are.
+/// Members that continue as they are.
 const ELITE: usize = 2;
 /// Members that are drawn for each parent.
 const DRAWN: usize = 3;
@@ -72,7 +72,7 @@ settings! {
     }
 }
 
-/// A member: its genes within 0 and 1, and what it costs.
+/// A member: its genes within 0 and 1, and its cost.
 #[derive(Debug, Clone, Copy)]
 struct Member {
     genes: [f64; N],
@@ -251,7 +251,7 @@ mod tests {
             let off = [0.3, 0.5, 0.7].iter().zip(best.genes).map(|(x, y)| (x - y).abs());
             assert!(off.fold(0.0, f64::max) < 0.05, "{seed}: {best:?}");
         }
-        // A cost that is no number is never the best.
+        // A cost that is not a number is never the best.
         let best = GeneticSigmoid::default().search(&|genes| if genes[0] < 0.9 { f64::NAN } else { 1.0 });
         assert!(best.genes[0] >= 0.9);
     }
@@ -264,7 +264,7 @@ mod tests {
         let truth = [0.09, 0.07, 0.4, 1.2, 40.96, 100.0, 11.25, 0.35, 0.28];
         let (loss, d1) = GeneticSigmoid::criterion(&task, run.record.input(), run.record.output(), &truth);
         // Standard error of d1 0.006; of a mean of squares 1.6 %, around the 1.37e-4 and 4.6e-4 of
-        // the two states; the transient at the beginning is the run's own.
+        // the two states; the transient at the start is the run's own.
         assert!((d1 + 0.8465).abs() < 0.03, "{d1}");
         assert!((1.3e-4..4.6e-4).contains(&loss), "{loss}");
         let mut other = truth;

@@ -1,9 +1,9 @@
 //! Least squares by normal equations, for regressions of some hundred coefficients over thousands
 //! of samples.
 //!
-//! `theta = (Phi' Phi + D)^-1 Phi' y`, by Cholesky's factor of the sum; D holds what is known of
-//! theta before the data (A. N. Tikhonov 1963; A. E. Hoerl and R. W. Kennard, *Technometrics* 12
-//! (1970) 55-67). Squaring the condition of Phi is no loss where D bounds it.
+//! `theta = (Phi' Phi + D)^-1 Phi' y`, by Cholesky's factor of the sum; D holds the prior knowledge
+//! of theta before the data (A. N. Tikhonov 1963; A. E. Hoerl and R. W. Kennard, *Technometrics* 12
+//! (1970) 55-67). Squaring the condition of Phi is not a loss where D bounds it.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -43,7 +43,7 @@ impl NormalEquations {
         }
     }
 
-    /// The coefficients, with D beside the data (its lower triangle counts).
+    /// The coefficients, with D next to the data (its lower triangle counts).
     pub fn solve(&self, method: &'static str, prior: &DMatrix<f64>) -> Result<DMatrix<f64>, ThesisError> {
         // Cholesky's factor reads the lower triangle alone.
         let factor: Option<Cholesky<f64, Dyn>> = (&self.gram + prior).cholesky();

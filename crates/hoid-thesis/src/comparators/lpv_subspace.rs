@@ -6,16 +6,16 @@
 //!
 //! `x(k+1) = A x(k) + (B_0 + mu(k) B_1) v(k) + K eps(k)`, `u(k) = C x(k) + eps(k)`.
 //!
-//! At 100 Hz a state says the next one but for hundredths, and B is lost in them; so every d-th
-//! sample of u is taken, and v(k) is the mean of the d values of e, nk - 1 samples before, that act
-//! until the next. The scheduling mu is the sigmoid of the controlled element, which the
-//! experimenter knows (the analytical scheduling of the source). Only the gains of an
-//! operator change, so that A, C and K do not depend on mu and the number of coefficients grows with
-//! the window p and not with 2^p. Steps:
+//! At 100 Hz a state reports the next one except for hundredths, and B is lost in them; so every
+//! d-th sample of u is taken, and v(k) is the mean of the d values of e, nk - 1 samples before, that
+//! act until the next. The scheduling mu is the sigmoid of the controlled element, which the
+//! experimenter knows (the analytical scheduling of the source). Only the gains of an operator
+//! change, so that A, C and K do not depend on mu and the number of coefficients grows with the
+//! window p and not with 2^p. Steps:
 //!
 //! 1. The predictor `u(k) = sum_{i=1..p} C Ã^(i-1) [B_0, B_1, K] z(k-i) + eps`, with
 //!    `z = [v, mu v, u]` and `Ã = A - K C`, by least squares; p so long that Ã^p is nothing.
-//! 2. The same coefficients, shifted, times z are `Gamma x(k)`, what the past says of the next f
+//! 2. The same coefficients, shifted, times z are `Gamma x(k)`, what the past shows about the next f
 //!    outputs; its n main directions over the record are a state.
 //! 3. With that state, C by least squares, its residuals are eps, and A, B_0, B_1, K again by least
 //!    squares.
@@ -114,7 +114,7 @@ impl LpvSubspace {
         self.of_states(z, &states)
     }
 
-    /// The main directions of what the past says of the future, of unit power.
+    /// The main directions of the prediction of the future from the past, of unit power.
     fn states(&self, ahead: &DMatrix<f64>) -> Result<DMatrix<f64>, ThesisError> {
         let gram = (ahead * ahead.transpose()) / ahead.ncols() as f64;
         let eigen = gram.symmetric_eigen();
@@ -123,7 +123,7 @@ impl LpvSubspace {
         let n = self.order;
         let unsuited = |found: String| ThesisError::Unsuited {
             method: NAME,
-            quantity: "the rank of what the past says of the future".to_owned(),
+            quantity: "the rank of the prediction of the future from the past".to_owned(),
             found,
             expected: format!("the order {n} at least: lower it, or lengthen future"),
         };

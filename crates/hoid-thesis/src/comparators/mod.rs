@@ -1,6 +1,5 @@
-//! The survey's other methods as comparators: those that Part II of the reference text describes
-//! (section 2.4) and that need more than the samples so far: the lines, what comes after, a second run. The
-//! recursive ones are in `hoid_survey`.
+//! The survey's other methods as comparators: those that Part II of the thesis describes (section 2.4) and that need
+//! more than the samples so far: the lines, what comes after, a second run. The recursive ones are in `hoid_survey`.
 //!
 //! A comparator follows a record and says, at times that are asked for, what the operator's
 //! response is at some frequencies, and its parameters where it has them. Each is small, after the

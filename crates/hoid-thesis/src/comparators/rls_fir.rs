@@ -7,19 +7,17 @@
 //!
 //! `sum_k lambda^(t-k) (u(k) - g' phi(k))^2 + p var(u) g' K^-1 g`.
 //!
-//! The forcing function has ten lines, which excite twenty directions of nb: without the second term
-//! the others are whatever noise and rounding make of them, and the covariance of the usual form of
-//! the recursion grows as lambda^-t along them until it is no covariance. K is the *tuned-correlated*
-//! kernel `K_ij = decay^max(i, j)` (T. Chen, H. Ohlsson and L. Ljung, *Automatica* 48 (2012)
-//! 1525-1535), the covariance of a response that decays and is smooth; its inverse is that of
-//! independent increments,
+//! The forcing function has ten lines, which excite twenty directions of nb: without the second term the others are
+//! whatever noise and rounding make of them, and the covariance of the common form of the recursion grows as lambda^-t
+//! along them until it is not a covariance. K is the *tuned-correlated* kernel `K_ij = decay^max(i, j)` (T. Chen, H.
+//! Ohlsson and L. Ljung, *Automatica* 48 (2012) 1525-1535), the covariance of a response that decays and is smooth; its
+//! inverse is that of independent increments,
 //!
 //! `g' K^-1 g = sum_i (g_i - g_{i+1})^2/(decay^i - decay^(i+1)) + g_{nb-1}^2/decay^(nb-1)`.
 //!
-//! The recursion is in the information form, `R(t) = lambda R(t-1) + phi phi'` and the same of
-//! `phi u`: sums of squares that stay positive whatever the excitation. They are solved where an
-//! estimate is asked for. The Fourier transform of g is the response, `H = sum g_i e^(-j omega i Ts)`.
-//! It has no poles, and so no operator parameters.
+//! The recursion is in the information form, `R(t) = lambda R(t-1) + phi phi'` and the same of `phi u`: sums of squares
+//! that stay positive whatever the excitation. They are solved where an estimate is requested. The Fourier transform of
+//! g is the response, `H = sum g_i e^(-j omega i Ts)`. It has no poles, and so no operator parameters.
 
 use hoid_ident::{settings, settings::Bounds};
 use nalgebra::DMatrix;
@@ -42,7 +40,7 @@ settings! {
         /// Memory 1/(1 - lambda)
         #[setting(unit("samples"), bounds(Bounds::AtLeast(2.0)))]
         pub memory: f64 = 1024.0,
-        /// Weight p of what is known before the data
+        /// Weight p of the prior
         #[setting(bounds(Bounds::PositiveFinite))]
         pub penalty: f64 = 0.3,
         /// Decay of the kernel from one sample to the next
@@ -71,7 +69,7 @@ impl RlsFir {
         inverse
     }
 
-    /// The impulse responses after the samples that are asked for.
+    /// The impulse responses after the samples that are requested.
     fn impulse_responses(&self, task: &Task<'_>) -> Result<Vec<Vec<f64>>, ThesisError> {
         let (e, u) = task.signals(NAME, self.nb)?;
         let lambda = 1.0 - 1.0 / self.memory;
@@ -130,7 +128,7 @@ mod tests {
     use super::{super::tests::*, *};
 
     /// Another way to the same minimum: the regularised sum of squares as a tall least-squares
-    /// problem, rows of the prior beside those of the data, by Householder reflections.
+    /// problem, rows of the prior next to those of the data, by Householder reflections.
     #[test]
     fn the_recursion_gives_the_minimum_of_its_criterion() {
         let method = RlsFir {

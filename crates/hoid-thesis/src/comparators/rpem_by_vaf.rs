@@ -1,11 +1,9 @@
-//! The recursive prediction-error method of BJ(nb = 2, nd = 1, nf = 2), its covariance updated by the
-//! VAF of a validation set, as the discussion of the reference text proposes (VII: *the covariance
-//! matrix could be updated based on VAF from a validation data set, in order to reduce the strong
-//! oscillations that are given in state s2*).
+//! The recursive prediction-error method of BJ(nb = 2, nd = 1, nf = 2), its covariance updated by the VAF of a
+//! validation set, as the discussion of the thesis proposes (VII: *the covariance matrix could be updated based on VAF
+//! from a validation data set, in order to reduce the strong oscillations that are given in state s2*).
 //!
-//! It is `rpem` of `hoid_track` by the settings of the text, with [`track_validated`], where the rule
-//! stands. The validation set is a second run of the same person in the same task, with its own
-//! remnant.
+//! It is `rpem` of `hoid_track` by the settings of the text, with [`track_validated`], which contains the rule. The
+//! validation set is a second run of the same person in the same task, with its own remnant.
 
 use hoid_ident::{settings, settings::Bounds};
 use hoid_model::{PolynomialModel, Structure};
@@ -28,7 +26,7 @@ settings! {
         /// Time between two looks at the validation set
         #[setting(unit("s"), bounds(Bounds::PositiveFinite))]
         pub interval: f64 = 0.5,
-        /// Length of the validation set that is looked at
+        /// Length of the validation set that is examined
         #[setting(unit("s"), bounds(Bounds::PositiveFinite))]
         pub window: f64 = 5.12,
         /// Smallest factor of P
@@ -45,7 +43,7 @@ impl Comparator for RpemByVaf {
         About {
             name: NAME,
             help: "recursive prediction-error method, its covariance updated by the VAF of a validation set",
-            source: "the reference text, section VII",
+            source: "the thesis, section VII",
             told: "a second run of the same person in the same task",
         }
     }

@@ -45,7 +45,7 @@ pub(super) struct Run {
 }
 
 impl Run {
-    /// One replication, P_n and m0 as asked for.
+    /// One replication, P_n and m0 as requested.
     pub fn of(condition: Condition, order: usize, level: f64) -> Self {
         Self::replication(condition, order, level, 0)
     }
@@ -100,7 +100,7 @@ impl Run {
         }
     }
 
-    /// The true responses at the samples that are asked for.
+    /// The true responses at the samples that are requested.
     pub fn responses(&self) -> Vec<Vec<Complex64>> {
         let task = self.task();
         let of = |k: &usize| response_of(&self.operator(*k), self.record.sample_time(), task.omega_rad_s).unwrap();
@@ -135,7 +135,7 @@ fn names_lead_to_comparators_and_all_say_where_they_are_from() {
 }
 
 /// All of them on one run with a small remnant: before the change and long after it the response is
-/// that of the operator within half of it, and what is no number is said to be none.
+/// that of the operator within half of it, and a value that is not a number is reported to be none.
 #[test]
 fn all_follow_a_run_of_the_text() {
     let run = Run::of(Condition::C4, 1, 0.01);

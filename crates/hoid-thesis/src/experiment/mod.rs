@@ -1,4 +1,4 @@
-//! The experiment of section VI and appendix I of the reference text, with virtual people.
+//! The experiment of section VI and appendix I of the thesis, with virtual people.
 //!
 //! The recordings of the text are of three subjects in a simulator and are not public. Its procedure
 //! can be carried out all the same, on people whose truth is known: three subjects who differ, seven
@@ -9,13 +9,13 @@
 //!    and structure is the mean of the two, rounded, and T_n* that of their two time constants of the
 //!    remnant (the text: *the average between the best two sub-batch-fitting estimations made*).
 //! 2. With that n_k*, OLS and PEM of both spans again.
-//! 3. RLS and RPEM with lambda = 1 - 1/256 and P0 = 0.1 I over the run, from the fit of the first
-//!    span. T_n* is told in Table 3 and goes no further here: d1 is a parameter of RPEM and begins
-//!    with that of its fit, as in section V.B.
+//! 3. RLS and RPEM with lambda = 1 - 1/256 and P0 = 0.1 I over the run, from the fit of the first span. T_n* is
+//!    reported in Table 3 and goes no further here: d1 is a parameter of RPEM and starts with that of its fit, as in
+//!    section V.B.
 //!
-//! Figures show the average over the five runs, as the text draws them, and the median beside.
+//! Figures show the average over the five runs, as the text draws them, and the median alongside.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `people` | [`ExperimentPlan`]: the virtual people |
 //! | [`procedure`] | what is done with one run |
@@ -40,7 +40,7 @@ pub struct EvaluatedRun {
     pub condition: Condition,
     /// Run, from 1, of those of the subject and condition.
     pub run: u64,
-    /// What was found.
+    /// The findings.
     pub outcome: RunOutcome,
 }
 

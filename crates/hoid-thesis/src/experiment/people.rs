@@ -9,7 +9,7 @@ use crate::ThesisError;
 /// The plan that comes with the program.
 pub const EXPERIMENT: &str = include_str!("../../plans/experiment.toml");
 
-/// Who takes part, and what is done with their runs.
+/// Participants, and the processing of their runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExperimentPlan {
     /// Seed of all random streams.

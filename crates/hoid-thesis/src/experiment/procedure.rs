@@ -1,4 +1,4 @@
-//! What the text does with one run of the experiment.
+//! Procedure of the thesis for one run of the experiment.
 
 use hoid_ident::{Estimator, Fit, validation::vaf};
 use hoid_model::{
@@ -36,7 +36,7 @@ pub struct Course {
     pub variances: Vec<[f64; 5]>,
 }
 
-/// What was found in one run; entries by structure, ARX and Box-Jenkins, and by span.
+/// Findings in one run; entries by structure, ARX and Box-Jenkins, and by span.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunOutcome {
     /// n_k*, samples.
@@ -49,7 +49,7 @@ pub struct RunOutcome {
     pub batch: [[State; 2]; 2],
     /// RLS and RPEM.
     pub courses: [Course; 2],
-    /// What was simulated, at the beginning and at the end.
+    /// The simulated scenario, at the start and at the end.
     pub truth: [State; 2],
 }
 
@@ -72,7 +72,7 @@ pub fn evaluate(record: &Record, delays: (usize, usize)) -> Result<RunOutcome, T
     })
 }
 
-/// What was found with one structure.
+/// Results with one structure.
 struct OfStructure {
     nk: usize,
     t_n_s: f64,

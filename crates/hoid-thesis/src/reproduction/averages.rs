@@ -1,5 +1,5 @@
 //! Figs. H.1 to H.12 as the text draws them, *obtained values averaged from M realizations*: the
-//! averages over the runs with the medians beside.
+//! averages over the runs with the medians alongside.
 //!
 //! `T_L = K_e_dot/K_e` of one run in which K_e nearly vanishes decides the average of all, which is
 //! why the figures of the same number show the medians (`traces`).

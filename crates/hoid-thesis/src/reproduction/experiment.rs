@@ -24,7 +24,7 @@ const CAPTION: &str = "Three virtual subjects, mean (dark) and median (light) ov
 /// Runs of the experiment, made once.
 type Runs = Arc<OnceLock<Result<Vec<EvaluatedRun>, String>>>;
 
-/// What a panel shows.
+/// Results of a panel.
 #[derive(Debug, Clone, Copy)]
 enum Shown {
     Discrete(usize),
@@ -89,7 +89,7 @@ pub(super) fn items() -> Vec<Item> {
     let mut all = vec![Item::new(
         "table-3",
         "Model parameters n_k* and T_n* used in each run and model structure (virtual people)",
-        "Mean of those of the best fits of [0, 30.72] and [51.20, 81.92] s, condition C4; the true n_k of the subject beside.",
+        "Mean of those of the best fits of [0, 30.72] and [51.20, 81.92] s, condition C4; the true n_k of the subject alongside.",
         None,
         with(&runs, table),
     )
@@ -257,7 +257,7 @@ fn draw(item: &Item, runs: &[EvaluatedRun], condition: Condition, rows: &[Row]) 
     item.drawn(trace_panels, &grid, data)
 }
 
-/// The mean of the simulated operators: the value of the beginning, then that of the end.
+/// The mean of the simulated operators: the value of the start, then that of the end.
 fn truth(shown: Shown, own: &[&EvaluatedRun], condition: Condition) -> TraceCurve {
     let [first, last] = [0, 1].map(|end| middle(own.iter().map(|run| shown.of_state(&run.outcome.truth[end])))[0]);
     let schedule = hoid_model::scenario::Scenario::condition(condition).schedule;

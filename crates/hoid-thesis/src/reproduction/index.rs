@@ -13,7 +13,7 @@ use crate::ThesisError;
 /// The page.
 #[derive(Debug, Default)]
 pub struct IndexPage {
-    /// What was done and with what, as name and value.
+    /// The processing and its inputs, as name and value.
     pub settings: Vec<(String, String)>,
     /// Remarks for the reader.
     pub notes: Vec<String>,
@@ -31,11 +31,11 @@ pub struct StudyEntry {
     pub name: String,
     /// Its title.
     pub title: String,
-    /// Where its directory is, from the page; empty where nothing of it is kept.
+    /// Where its directory is, from the page; empty if nothing of it is kept.
     pub directory: String,
     /// Estimates that were made.
     pub estimates: u64,
-    /// Time that it took, s; none when it was there already.
+    /// Time that it took, s; none when it already existed.
     pub seconds: Option<f64>,
 }
 
@@ -50,11 +50,11 @@ impl IndexPage {
         });
     }
 
-    /// Adds the claims of the text with what the data say of them.
+    /// Adds the claims of the text with the evidence of the data on them.
     pub fn add_claims(&mut self, findings: &[(Claim, Finding)]) {
         let mut theme = "";
         for (claim, finding) in findings {
-            // The heading stands before the first claim of its theme.
+            // The heading is before the first claim of its theme.
             let heading = (claim.theme.title() != theme).then(|| claim.theme.title());
             theme = claim.theme.title();
             let class = match finding.verdict {
@@ -106,7 +106,7 @@ impl IndexPage {
             &[("reproduction.html", include_str!("../../templates/reproduction.html"))],
             "reproduction.html",
             context! {
-                title => "Reproduction of the reference text",
+                title => "Reproduction of the thesis",
                 settings => facts,
                 notes => &self.notes,
                 entries => &self.entries,
@@ -119,7 +119,7 @@ impl IndexPage {
     }
 }
 
-/// A measured value in words: with its error, and its range over the cells where there are several.
+/// A measured value as text: with its error, and its range over the cells where there are several.
 fn measured(of: &Measured) -> String {
     let (value, error) = numbers::with_uncertainty(of.value, Some(of.error).filter(|error| *error > 0.0));
     let error = if of.error > 0.0 {

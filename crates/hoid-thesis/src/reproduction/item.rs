@@ -34,11 +34,11 @@ pub(super) struct SharedRuns {
 pub struct Item {
     /// Its name, as `fig-5`, `C.1` or `table-2`.
     pub name: String,
-    /// What it is, one line.
+    /// Its definition, one line.
     pub title: String,
-    /// What to know to read it.
+    /// Notes for the reader.
     pub caption: String,
-    /// The plan whose results it shows; none where nothing is simulated.
+    /// The plan whose results it shows; none if nothing is simulated.
     pub plan: Option<&'static str>,
     pub(super) shared: Option<SharedRuns>,
     make: Maker,

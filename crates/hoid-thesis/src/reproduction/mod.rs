@@ -1,4 +1,4 @@
-//! The tables and figures of the reference text, made from the results of the named plans.
+//! The tables and figures of the thesis, made from the results of the named plans.
 //!
 //! | module | what it makes | study |
 //! |---|---|---|
@@ -8,7 +8,7 @@
 //! | `responses` | Figs. 10, D.1 to D.18: Bode plots of averaged models | `bias` |
 //! | `starts` | Figs. F.1 to F.8: other starts against the base | `initial-conditions` |
 //! | `traces` | Figs. 11, 12, G.1 to G.8, H.1 to H.12: recursive estimates | `recursive`, `recursive-arx` |
-//! | `averages` | Figs. H.1 to H.12 as the text draws them: averages, with medians beside | `recursive` |
+//! | `averages` | Figs. H.1 to H.12 as the text draws them: averages, with medians next to | `recursive` |
 //! | `experiment` | Table 3, Figs. 13, 14, I.1 to I.18 with virtual people | its own |
 //! | `further` | what the text leaves for later | the other plans |
 //! | `catalogue` | all of them in the order of the text | |

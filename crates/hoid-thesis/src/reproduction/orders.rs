@@ -14,7 +14,7 @@ use hoid_report::figures::{MapColours, MapGrid, MapPanel, maps};
 const DELAYS: [usize; 6] = [25, 26, 27, 28, 29, 30];
 const TRUE_DELAY: usize = 29;
 
-/// What a map shows.
+/// Results of a map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Shown {
     Vaf,
@@ -133,7 +133,7 @@ fn make(item: &Item, results: &Results, condition: &str, m0: usize, shown: Shown
         });
     }
     let grid = |panels: Vec<MapPanel>, titles: Vec<String>| MapGrid {
-        // Two beside each other have cells that hold their numbers. Biases of b, a and the noise
+        // Two next to each other have cells that hold their numbers. Biases of b, a and the noise
         // differ by an order of magnitude: a colour bar for each pair.
         columns: 2,
         panels,

@@ -1,8 +1,8 @@
 //! The whole reproduction in a directory: runs the plans that are needed, draws tables and figures,
 //! tests the claims, writes the index page.
 //!
-//! Studies stand in `studies/NAME`, pictures and numbers in `figures` and `tables`. A study that is
-//! there already is taken as it is, so that a reproduction that was stopped goes on.
+//! Studies are in `studies/NAME`, pictures and numbers in `figures` and `tables`. A study that is
+//! already present is taken as it is, so that a reproduction that was stopped continues.
 
 use std::{
     collections::BTreeSet,
@@ -27,7 +27,7 @@ use crate::{
     plans::TEXT_PLANS,
 };
 
-/// What is to be reproduced.
+/// Items to be reproduced.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reproduction {
     /// Tables, figures, appendices, studies, or [`CLAIMS`]; all of them where nothing is named.
@@ -55,18 +55,18 @@ pub enum ReproductionEvent<'a> {
     Progress(Progress),
     /// A study has its results.
     Study(&'a StudyEntry),
-    /// What the user should know of a study: damaged blocks that were computed again.
+    /// Warnings about a study: damaged blocks that were computed again.
     Note(&'a str),
 }
 
-/// What has been reproduced.
+/// Summary of a reproduction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReproductionSummary {
     /// The page that shows it all.
     pub index: PathBuf,
     /// Tables and figures.
     pub items: usize,
-    /// Claims that hold, hold and more so, hold in part, do not hold, cannot be tested; none where
+    /// Claims that hold, hold and more so, hold in part, do not hold, cannot be tested; none if
     /// they were not chosen.
     pub tally: Option<[usize; 5]>,
     /// Time that the studies took, s.
@@ -76,11 +76,11 @@ pub struct ReproductionSummary {
 }
 
 /// Reproduces into a directory; none when `goes_on` has stopped it, and then it can be called again
-/// to go on.
+/// to continue.
 ///
 /// # Errors
-/// [`ThesisError::UnknownItem`]; [`ThesisError::Study`] and [`ThesisError::Io`] for what cannot be
-/// run, read or written.
+/// [`ThesisError::UnknownItem`]; [`ThesisError::Study`] and [`ThesisError::Io`] for failures of
+/// running, reading or writing.
 pub fn reproduce(
     wanted: &Reproduction,
     directory: &Path,

@@ -58,7 +58,7 @@ pub(super) fn items() -> Vec<Item> {
         Item::new(
             "fig-4",
             "Error gain K_e in conditions C1 to C6",
-            "Conditions that share their states lie on each other before and after the change, so that slow and fast ones stand in panels of their own.",
+            "Conditions that share their states lie on each other before and after the change, so that slow and fast ones are in panels of their own.",
             None,
             |item, _| schedules(item),
         ),

@@ -16,7 +16,7 @@ pub(super) fn items() -> Vec<Item> {
                 format!("F.{start}"),
                 format!("Bias from start IC{start} less that from the base start, Box-Jenkins with m* = m0, condition C1"),
                 "Deviation of the relative bias of each run from that of the same run searched from the base of Table 6.1, in percentage \
-                 points. A line at zero: both searches found the same minimum, but for the tolerance of the search. Above each panel stands \
+                 points. A line at zero: both searches found the same minimum, except for the tolerance of the search. Above each panel stands \
                  the largest deviation of its runs.",
                 "initial-conditions",
                 move |item, results| make(item, results, start),

@@ -26,7 +26,8 @@ pub(super) const OPERATOR: [Row; 5] = [
     ("zeta_nm", "zeta_nm", "zeta_nm", ""),
 ];
 
-/// An estimator of a figure: method of the colour language, name in the plan, batch fits beside it.
+/// An estimator of a figure: method of the colour language, name in the plan, batch fits next to
+/// it.
 type Curves = (usize, &'static str, &'static [(&'static str, f64, f64)]);
 
 const RLS: Curves = (0, "RLS", &[("OLS first", 0.0, 30.72), ("OLS last", 51.2, 81.92)]);
@@ -200,7 +201,7 @@ fn make(
         }
     }
     let alone = orders.len() == 1;
-    // Two beside each other where that leaves no panel alone in the last row.
+    // Two next to each other where that leaves no panel alone in the last row.
     let of_one = if panels.len().is_multiple_of(2) { 2 } else { 1 };
     let grid = TraceGrid {
         panels,
@@ -219,8 +220,8 @@ fn make(
 /// From where on the estimates set the range of their panels, s: before, they leave their start.
 const SETTLED_S: f64 = 15.0;
 
-/// Every curve from [`SETTLED_S`] on but for its highest and lowest three per cent: no estimator is
-/// missing because another is better.
+/// Every curve from [`SETTLED_S`] on except for its highest and lowest three per cent: no estimator
+/// is missing because another is better.
 fn ordinate(curves: &[TraceCurve]) -> Ordinate {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for curve in curves {

@@ -1,4 +1,4 @@
-//! Errors of what a method found in one run.
+//! Errors of a method in one run.
 //!
 //! At each kept time `E(t) = sqrt(mean_i |H(j omega_i, t)/H_0(j omega_i, t) - 1|^2)` over the lines
 //! of the forcing function from 0.6 to 11 rad/s (the third to the ninth: the two below turn a few
@@ -7,12 +7,12 @@
 //!
 //! | span | from, to |
 //! |---|---|
-//! | before | 30.72 s, behind the start span, to the change (or the middle) at 40.96 s |
+//! | before | 30.72 s, after the start span, to the change (or the middle) at 40.96 s |
 //! | through | the 5.12 s after it |
 //! | after | the last 20.48 s |
 //!
-//! Of the operator's parameters it is the root mean square of the relative error from 10 s on, as in
-//! the studies.
+//! For the operator's parameters it is the root mean square of the relative error from 10 s on, as
+//! in the studies.
 
 use std::ops::Range;
 
@@ -23,7 +23,7 @@ use crate::{ThesisError, comparators::Followed, comparators::response_of};
 
 /// Spans, s.
 const SPANS_S: [(f64, f64); 3] = [(30.72, 40.96), (40.96, 46.08), (61.44, 81.93)];
-/// Parameters are looked at from here on, s.
+/// Parameters are examined from here on, s.
 const PARAMETERS_FROM_S: f64 = 10.0;
 /// Which lines of the forcing function.
 pub(super) const LINES: Range<usize> = 2..9;
@@ -31,7 +31,7 @@ pub(super) const LINES: Range<usize> = 2..9;
 /// Errors of one run, %; no number where there is no estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Errors {
-    /// Of the response: before, through, after.
+    /// For the response: before, through, after.
     pub response: [f64; 3],
     /// Of K_e, T_L, K_e_dot, omega_nm, zeta_nm.
     pub operator: [f64; 5],
@@ -58,10 +58,10 @@ fn root_mean_square(squares: &[f64]) -> f64 {
     100.0 * (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
-/// The errors of what was found after the samples `at`.
+/// The errors of the findings after the samples `at`.
 ///
 /// # Errors
-/// [`ThesisError::Model`] for a record that does not say what its operator was.
+/// [`ThesisError::Model`] for a record that does not report what its operator was.
 pub fn errors(record: &Record, at: &[usize], omega_rad_s: &[f64], found: &Followed) -> Result<Errors, ThesisError> {
     let mut spans = [const { Vec::new() }; 3];
     let mut parameters = [const { Vec::new() }; 5];
@@ -132,7 +132,7 @@ mod tests {
         let share = (81.92 - 40.96) / (81.92 - 10.0);
         assert!((errors.operator[0] - 10.0 * f64::sqrt(share)).abs() < 0.1, "{errors:?}");
         assert!(errors.operator[1] < 1e-10);
-        // Nothing found is no number.
+        // Nothing found is not a number.
         let none = Followed {
             response: vec![vec![Complex64::new(f64::NAN, 0.0); 2]; at.len()],
             operator: vec![None; at.len()],

@@ -1,9 +1,8 @@
 //! All methods of the survey on the same runs.
 //!
-//! Part II of the reference text describes the methods by which others have identified operators who
-//! change (section 2.4). A survey follows the same simulated runs with all of them: the recursive
-//! methods, as estimators of a study that anything can run, and the [`comparators`](crate::comparators),
-//! tables in a file of their own:
+//! Part II of the thesis describes the methods by which others have identified operators who change (section 2.4). A
+//! survey follows the same simulated runs with all of them: the recursive methods, as estimators of a study that
+//! anything can run, and the [`comparators`](crate::comparators), tables in a file of their own:
 //!
 //! ```toml
 //! [[comparators]]
@@ -12,13 +11,13 @@
 //! radians = 6
 //! ```
 //!
-//! What all methods give is the response `H(j omega, t)`, so that is what they are measured by
-//! ([`measure`]); the parameters only of those that have them.
+//! All methods give the response `H(j omega, t)`, so that they are compared by it ([`measure`]); parameters are
+//! compared only for methods that have them.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `plan` | [`SurveyPlan`] |
-//! | [`measure`] | errors of what a method found in one run |
+//! | [`measure`] | errors of a method in one run |
 //! | `run` | [`survey()`]: runs and methods |
 //! | `table` | the tables of `research/notes/survey-methods.md` |
 

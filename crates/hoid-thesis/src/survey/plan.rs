@@ -20,7 +20,7 @@ impl SurveyPlan {
     /// Reads and checks the texts of a study and of its comparators.
     ///
     /// # Errors
-    /// [`ThesisError::Study`] for what is wrong with the study, [`ThesisError::Unsuited`] and
+    /// [`ThesisError::Study`] for the problems of the study, [`ThesisError::Unsuited`] and
     /// [`ThesisError::Estimator`] for a comparator or an option of one.
     pub fn parse(study: &str, comparators: &str, path: &str) -> Result<Self, ThesisError> {
         let study = Plan::parse(study, path)?;
@@ -35,7 +35,7 @@ impl SurveyPlan {
             .map_err(|error: toml::de::Error| wrong("its table", error.message().to_owned(), "TOML".to_owned()))?;
         if let Some(key) = table.keys().find(|key| *key != "comparators") {
             return Err(wrong(
-                "a key beside it",
+                "a key next to it",
                 key.clone(),
                 "[[comparators]] alone".to_owned(),
             ));

@@ -30,9 +30,9 @@ pub struct MethodErrors {
     pub cell: u64,
     /// Name of the method in the plan.
     pub name: String,
-    /// What it was told beside e and u; empty for nothing.
+    /// Information given in addition to e and u; empty for none.
     pub told: &'static str,
-    /// Errors by run; why there are none where it failed.
+    /// Errors by run; why there are none if it failed.
     pub runs: Vec<Result<Errors, String>>,
     /// Processor time of one run, s, the median.
     pub seconds: f64,
@@ -42,8 +42,8 @@ pub struct MethodErrors {
 /// estimators before the comparators. `each` is called after every run.
 ///
 /// # Errors
-/// [`ThesisError`] for a scenario that cannot be simulated. A method that fails on a run says so in
-/// its errors.
+/// [`ThesisError`] for a scenario that cannot be simulated. A method that fails on a run reports it
+/// in its errors.
 pub fn survey(plan: &SurveyPlan, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<MethodErrors>, ThesisError> {
     let mut all = Vec::new();
     for cell in &plan.study.cells {
@@ -61,7 +61,7 @@ pub fn survey(plan: &SurveyPlan, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Met
             each(&format!("cell {}, run {replication}", cell.index));
             Ok::<_, ThesisError>(found)
         };
-        let runs: Vec<Vec<Found>> = (0..cell.replications)
+        let runs: Vec<Vec<MethodResult>> = (0..cell.replications)
             .into_par_iter()
             .map(one)
             .collect::<Result<_, _>>()?;
@@ -80,15 +80,15 @@ pub fn survey(plan: &SurveyPlan, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Met
     Ok(all)
 }
 
-/// What one method found in one run.
-struct Found {
+/// Result of one method in one run.
+struct MethodResult {
     name: String,
     told: &'static str,
     errors: Result<Errors, String>,
     seconds: f64,
 }
 
-fn methods_of(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Record) -> Vec<Found> {
+fn methods_of(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Record) -> Vec<MethodResult> {
     let scenario = cell.resolved.scenario();
     let lines: Vec<f64> = scenario.forcing.sinusoids().iter().map(|s| s.omega_rad_s).collect();
     let omega = &lines[LINES.start.min(lines.len())..LINES.end.min(lines.len())];
@@ -108,7 +108,7 @@ fn methods_of(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Reco
         let followed = follow();
         let seconds = begin.elapsed().as_secs_f64();
         let errors = followed.and_then(|found| errors(record, &at, omega, &found));
-        Found {
+        MethodResult {
             name: name.to_owned(),
             told,
             errors: errors.map_err(|error| error.to_string()),
@@ -126,7 +126,7 @@ fn methods_of(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Reco
     estimators.chain(comparators).collect()
 }
 
-/// What an estimator of a study finds: a recursion at each time, a batch fit the same at all.
+/// Result of an estimator of a study: a recursion at each time, a batch fit the same at all.
 fn of_estimator(estimator: &EstimatorCell, cell: &Cell, task: &Task<'_>) -> Result<Followed, ThesisError> {
     match estimator.task_for(&cell.resolved) {
         StudyTask::Track(options) => of_trace(&track(task.record, &options, EVERY)?, task),

@@ -6,7 +6,7 @@ use hoid_study::{plan::Cell, statistics::median};
 
 use super::{measure::Errors, plan::SurveyPlan, run::MethodErrors};
 
-/// What is shown of one run: three spans of the response, and K_e, K_e_dot and omega_nm.
+/// Content shown for one run: three spans of the response, and K_e, K_e_dot and omega_nm.
 fn shown(errors: &Errors) -> [f64; 6] {
     let ([before, through, after], o) = (errors.response, errors.operator);
     [before, through, after, o[0], o[2], o[3]]
@@ -90,7 +90,7 @@ pub fn survey_tables(plan: &SurveyPlan, found: &[MethodErrors]) -> String {
         .map(|(name, of)| format!("- *{name}*: {}.", of.about().told))
         .collect();
     format!(
-        "{text}\n\\* is told more than e, u and n_k:\n\n{}\n{each}",
+        "{text}\n\\* is reported more than e, u and n_k:\n\n{}\n{each}",
         told.join("\n")
     )
 }

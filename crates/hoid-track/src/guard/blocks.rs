@@ -30,7 +30,7 @@ impl Guard {
             } else if trouble.is_none() && reference.end_block(&block, self.block_length) {
                 self.start.restore(recursion);
                 self.sound_at = [0; 2];
-                self.begin_pause(GuardKind::Astray, 2, 0, 0.0);
+                self.begin_pause(GuardKind::Diverged, 2, 0, 0.0);
                 return;
             }
         }
@@ -47,7 +47,7 @@ impl Guard {
                 self.begin_pause(kind, channel, seen.min(self.samples), 0.0);
             }
             None if self.in_ring == 0 => {
-                self.profile.learn(&block);
+                self.profile.update(&block);
                 self.learn_tails(&block);
                 self.set_limits();
                 self.sound_blocks = if self.profile.is_calm() {
@@ -66,11 +66,11 @@ impl Guard {
         }
     }
 
-    /// The tails of signals of which nothing is known begin to be learnt.
+    /// The tails of signals without prior knowledge start to be learnt.
     fn learn_tails(&mut self, block: &Block) {
         if !self.profile.is_known() {
             for (channel, means) in self.channels.iter_mut().zip(block.differences) {
-                channel.begin_learning(means);
+                channel.start_learning(means);
             }
         }
     }
@@ -85,7 +85,7 @@ impl Guard {
             self.learn_anew(recursion);
             self.profile = former;
             self.set_limits();
-        } else if trouble.is_some_and(Trouble::may_be_the_new_usual) {
+        } else if trouble.is_some_and(Trouble::may_be_the_new_level) {
             self.pause.doubtful += u64::from(self.block_length);
         }
     }
@@ -107,20 +107,20 @@ impl Guard {
         if !self.profile.is_known() {
             return;
         }
-        let usual = *self.profile.usual();
-        self.centre = usual.mean;
+        let typical = *self.profile.typical();
+        self.centre = typical.mean;
         for c in 0..CHANNELS {
-            let size = usual.magnitude[c];
+            let size = typical.magnitude[c];
             self.largest[c] = if size > 0.0 { LARGEST * size } else { f64::INFINITY };
             self.channels[c].set_floor(FLOOR[c] * size);
-            let still = STILL * usual.differences[c][0];
+            let still = STILL * typical.differences[c][0];
             self.channels[c].set_resting(still);
             if !self.channels[c].is_known() {
-                self.channels[c].begin_learning(usual.differences[c]);
+                self.channels[c].start_learning(typical.differences[c]);
                 self.channels[c].watch();
             }
         }
-        self.resting.set_tolerance(STILL * usual.differences[1][0]);
+        self.resting.set_tolerance(STILL * typical.differences[1][0]);
     }
 }
 

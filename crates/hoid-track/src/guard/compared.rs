@@ -1,6 +1,6 @@
 //! When the model of the start is compared with the estimate: in the first [`COMPARED`] of every
 //! [`EVERY`] blocks, so that it costs little, and in all blocks for [`SUSPECT_FOR`] after something
-//! unusual. Its filters begin at rest, and have [`SETTLING`] blocks to forget that.
+//! unusual. Its filters start at rest, and have [`SETTLING`] blocks to forget that.
 
 use hoid_core::{
     delay::DelayLine,
@@ -47,14 +47,14 @@ impl Reference {
         }
     }
 
-    /// A round begins, with all at rest.
+    /// A round starts, with all at rest.
     pub fn begin(&mut self) {
         self.model.reset();
         (self.over, self.compared) = (0, SUSPECT_FOR);
     }
 
-    /// Something is unusual: what is said of this block does not count, and the next ones are
-    /// compared.
+    /// Something is unusual: what is reported about this block does not count, and the next ones
+    /// are compared.
     pub fn suspect(&mut self) {
         if self.over >= self.compared {
             self.begin();
@@ -73,10 +73,10 @@ impl Reference {
         }
     }
 
-    /// A block is over; true where the estimate has gone astray.
+    /// A block is over; true if the estimate has gone diverged.
     pub fn end_block(&mut self, block: &Block, length: u32) -> bool {
         self.over += 1;
-        // Blocks with samples that were held back say nothing.
+        // Blocks with samples that were held back carry no information.
         let counts = self.over > SETTLING && self.over <= self.compared && block.innovations == length;
         let astray = if counts {
             self.model.end_block(block.innovation)

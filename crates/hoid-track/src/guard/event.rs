@@ -1,28 +1,28 @@
-//! What the guard found, and what it did.
+//! Events found by the guard, and what it did.
 
 use hoid_model::SampleTime;
 
-/// What was found.
+/// The findings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GuardKind {
-    /// One to a few samples that the signal does not foretell and that it comes back from.
+    /// One to a few samples that the signal does not predict and that it comes back from.
     Outlier,
     /// A jump that the signal does not come back from.
     Step,
-    /// Samples that are no numbers, for longer than an outlier lasts.
+    /// Samples that are not numbers, for longer than an outlier lasts.
     Missing,
     /// A signal 30 times as large as it was.
     Level,
-    /// A signal that stands still.
+    /// A signal that stays constant.
     Frozen,
     /// Two signals that are nearly silent.
     Idle,
     /// e is as u was, and u as e was.
     Swapped,
-    /// A model that foretells u worse than the past of u does.
+    /// A model that predicts u worse than the past of u does.
     Misfit,
-    /// An estimate that foretells u worse than the start fit does.
-    Astray,
+    /// An estimate that predicts u worse than the start fit does.
+    Diverged,
 }
 
 hoid_model::named_choice!(GuardKind, "kind of fault", 9, {
@@ -34,19 +34,19 @@ hoid_model::named_choice!(GuardKind, "kind of fault", 9, {
     Idle => "idle",
     Swapped => "exchanged",
     Misfit => "misfit",
-    Astray => "astray",
+    Diverged => "astray",
 });
 
-/// What was done.
+/// The actions taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GuardAction {
-    /// Predictions stood in for the samples; the estimate stayed.
+    /// Predictions replaced the samples; the estimate stayed.
     Held,
     /// Held back at first, then taken as they came, as if nothing had been.
     Accepted,
-    /// The estimate stands still from here on.
+    /// The estimate stays constant from here on.
     Paused,
-    /// The estimate, which had stood still, moves again.
+    /// The estimate, which had stayed constant, moves again.
     Resumed,
     /// The estimate moves again, from where it was before the span.
     Restarted,
@@ -80,10 +80,10 @@ hoid_model::named_choice!(GuardChannel, "channel", 3, {
     Both => "e, u",
 });
 
-/// A span that was not as it should be, and what was done, as told at one of its samples or behind it.
+/// A span that was not as it should be, and the actions taken, as told at one of its samples or after it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GuardEvent {
-    /// What was found.
+    /// The findings.
     pub kind: GuardKind,
     /// In which signal.
     pub channel: GuardChannel,
@@ -92,31 +92,31 @@ pub struct GuardEvent {
     /// Samples of it so far.
     pub samples: u64,
     /// Largest distance from the prediction for outliers and steps, largest magnitude for levels, in
-    /// the unit of the signal; zero where it has no size.
+    /// the unit of the signal; zero if it has no size.
     pub size: f64,
-    /// What was done.
+    /// The actions taken.
     pub action: GuardAction,
 }
 
-/// A span of a run that was not as it should be, and what was done.
+/// A span of a run that was not as it should be, and the actions taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackFault {
-    /// What was found.
+    /// The findings.
     pub kind: GuardKind,
     /// In which signal.
     pub channel: GuardChannel,
     /// Time of its first sample, s.
     pub from_s: f64,
-    /// Time of the sample behind its last, s.
+    /// Time of the sample after its last, s.
     pub to_s: f64,
     /// As [`GuardEvent::size`].
     pub size: f64,
-    /// What was done.
+    /// The actions taken.
     pub action: GuardAction,
 }
 
 impl GuardEvent {
-    /// In times, for what was told at a sample at `now_s`.
+    /// In times, for what was reported at a sample at `now_s`.
     pub fn at(&self, now_s: f64, sample_time: SampleTime) -> TrackFault {
         let ts = sample_time.s();
         let from_s = now_s - self.ago as f64 * ts;
@@ -132,12 +132,12 @@ impl GuardEvent {
 }
 
 impl TrackFault {
-    /// True for a span in which the estimate stood still, of which the end is not known.
+    /// True for a span in which the estimate stayed constant, of which the end is not known.
     pub fn is_open(&self) -> bool {
         self.action == GuardAction::Paused
     }
 
-    /// Puts a fault behind those before it; the end of a pause takes the place of its beginning.
+    /// Puts a fault after those before it; the end of a pause takes the place of its start.
     pub(crate) fn put(self, behind: &mut Vec<Self>) {
         if behind.last().is_some_and(Self::is_open) {
             behind.pop();

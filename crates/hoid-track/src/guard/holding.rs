@@ -1,4 +1,4 @@
-//! Samples that are held back, and what becomes of them: taken again, or taken as they came.
+//! Samples that are held back, and the treatment of them: taken again, or taken as they came.
 
 use hoid_core::guard::profile::CHANNELS;
 
@@ -85,7 +85,7 @@ impl Guard {
             return false;
         };
         held >= self.shortest_pulse
-            && size <= PULSE * self.profile.usual().magnitude[1]
+            && size <= PULSE * self.profile.typical().magnitude[1]
             && (x - last).abs() <= largest_move
             && (x - last).abs() <= 0.5 * size
     }
@@ -130,9 +130,9 @@ impl Guard {
                 u: raw.values[1],
                 ..sample
             };
-            // e acts only after the delay: an innovation of now does not know it. A tenth of a second of
-            // interpolated u moves an estimate by less than the clock of births of a bank of
-            // hypotheses does that is stopped for as long.
+            // e acts only after the delay: a current innovation does not know it. A tenth of a second of interpolated u
+            // moves an estimate by less than the clock of births of a bank of hypotheses does that is stopped for as
+            // long.
             outcome = Some(if raw.moves {
                 recursion.step(taken)
             } else {
@@ -186,7 +186,7 @@ impl Guard {
         }
         // e jumps with its target and moves as before, while the person answers only after their delay.
         let ring = &self.ring[..self.in_ring];
-        // More is held than stands there only in numbers that were changed.
+        // More is held than is there only in numbers that were changed.
         let first = self.in_ring.saturating_sub(held as usize);
         let behind = ring[first..].iter().map(|raw| raw.values[0]);
         let is_target = c == 0 && !ring.iter().any(|raw| raw.held[1]) && self.channels_before[0].moves_as_usual(behind);

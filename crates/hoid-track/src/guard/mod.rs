@@ -1,21 +1,21 @@
-//! A guard in front of a recursion: what is done with samples and spans that no tracking makes.
-//! What they are is told by [`hoid_core::guard`].
+//! A guard in front of a recursion: what is done with samples and spans that no tracking makes. What they are is
+//! reported by [`hoid_core::guard`].
 //!
 //! | found | what reaches the recursion | estimate | afterwards |
 //! |---|---|---|---|
 //! | outlier of up to [`LONGEST_S`] | the prediction of e; the recursion's own prediction of u | stays | the recursion is put back to before it and takes the samples again, those that were held back interpolated |
 //! | a jump that stays, a pulse of the hand | the same | stays | the recursion is put back to before it and takes the samples as they came: the result is that without a guard |
-//! | no numbers for longer | the same | stays | goes on once the filters have settled |
-//! | 30 times the usual magnitude | the long-run mean of e, the prediction of u | stays | goes on from there once the filters have settled |
-//! | frozen, idle, larger or rescaled, swapped, misfit (by blocks of a second) | the samples, into the filters alone | is put back to before it | goes on from there once the span is over and the filters have settled |
-//! | an estimate that has gone astray by [`hoid_core::guard::reference`] | the samples, into the filters alone | is put back to the start | goes on from there once the filters have settled |
+//! | no numbers for longer | the same | stays | continues once the filters have settled |
+//! | 30 times the typical magnitude | the long-run mean of e, the prediction of u | stays | continues from there once the filters have settled |
+//! | frozen, idle, larger or rescaled, swapped, misfit (by blocks of a second) | the samples, into the filters alone | is put back to before it | continues from there once the span is over and the filters have settled |
+//! | an estimate that has gone diverged by [`hoid_core::guard::reference`] | the samples, into the filters alone | is put back to the start | continues from there once the filters have settled |
 //!
-//! **Steps and pulses.** `e = r - y`: a step of the target moves e by the same within one sample, and y goes
-//! on; so does u, for the person answers after their delay. A jump of e that stays, behind which e moves as it did
-//! while u goes on as foretold, is tracking and is not told. A sensor that is disturbed lets go as fast as it took hold: what comes back by a
-//! jump is an outlier. A hand that is fast goes out of a dead zone at once but comes back over several samples:
-//! an excursion of u of [`PULSE_S`] or more within [`PULSE`] times its mean magnitude, whose last step is within
-//! what u moves anyway, is a pulse, taken as it came.
+//! **Steps and pulses.** `e = r - y`: a step of the target moves e by the same within one sample, and y continues; so
+//! does u, for the person answers after their delay. A jump of e that stays, after which e moves as it did while u
+//! continues as predicted, is tracking and is not told. A sensor that is disturbed lets go as fast as it took hold:
+//! what comes back by a jump is an outlier. A hand that is fast goes out of a dead zone at once but comes back over
+//! several samples: an excursion of u of [`PULSE_S`] or more within [`PULSE`] times its mean magnitude, whose last step
+//! is within what u moves anyway, is a pulse, taken as it came.
 //!
 //! **Putting back.** The numbers of a recursion are few ([`hoid_core::state`]). They are kept when a
 //! sample is first held back, every [`SOUND_EVERY`] blocks in which all was well (the last two are
@@ -26,19 +26,19 @@
 //! **Filters have settled** after the delay and [`SETTLE_S`]: the slowest poles of people's
 //! neuromuscular systems (omega zeta of 2 to 4 rad/s) leave less than 2 % after that time.
 //!
-//! A misfit, swapped channels or a larger level that last for [`GIVEN_UP_S`] are taken for the new
-//! usual: the recursion begins again from its start, and what is usual is learnt anew. When after
-//! that the signals are as they were before, so is what is usual. Silence has no end.
+//! A misfit, exchanged channels or a larger level that last for [`GIVEN_UP_S`] are accepted as the new signals: the
+//! recursion restarts from its start, and the typical levels are estimated again. When after that the signals are as
+//! they were before, so is the default. Silence has no end.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
-//! | `holding` | samples that are held back, and what becomes of them |
-//! | `pausing` | pauses, from their beginning to their end |
+//! | `holding` | samples that are held back, and the treatment of them |
+//! | `pausing` | pauses, from their start to their end |
 //! | `blocks` | what is judged, learnt and kept once a second |
-//! | `prime` | what is usual, from the record of the start span |
-//! | `compared` | the model of the start beside the signals |
+//! | `prime` | the default, from the record of the start span |
+//! | `compared` | the model of the start next to the signals |
 //! | `snapshot` | the numbers of a recursion, kept and put back |
-//! | `event`, `options` | what is told of it, what is chosen |
+//! | `event`, `options` | what is reported of it, what is chosen |
 
 mod blocks;
 mod compared;
@@ -76,27 +76,27 @@ const BLOCK_S: f64 = 1.0;
 /// Sound blocks between two snapshots, and the least age in blocks of one that is gone back to.
 const SOUND_EVERY: u32 = 5;
 const LEAST_AGE: u64 = 4;
-/// Magnitude in units of the usual mean magnitude beyond which a signal is not what it was.
+/// Magnitude in units of the typical mean magnitude beyond which a signal is not what it was.
 const LARGEST: f64 = 30.0;
 /// Least limit of outliers in units of the mean magnitude: e passes a low-pass filter before it
-/// meets an innovation, u stands in the innovation itself.
+/// meets an innovation, u is in the innovation itself.
 const FLOOR: [f64; CHANNELS] = [0.3, 1e-3];
 /// A pulse of the hand takes no less, s, and goes no further, in units of the mean magnitude.
 const PULSE_S: f64 = 0.03;
 const PULSE: f64 = 6.0;
-/// A misfit or swapped channels of so long are the new usual, s.
+/// A misfit or swapped channels of so long are the new typical level, s.
 const GIVEN_UP_S: f64 = 120.0;
 
-/// What the guard made of a sample.
+/// Decision of the guard on a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Guarded {
-    /// What the recursion said; no innovation where the sample did not reach it as it came.
+    /// Report of the recursion; no innovation where the sample did not reach it as it came.
     pub outcome: Option<StepOutcome>,
-    /// True where the sample was held back or the estimate is paused.
+    /// True if the sample was held back or the estimate is paused.
     pub held: bool,
 }
 
-/// A sample as it came; NaN for what is no number.
+/// A sample as it came; NaN for a value that is not a number.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Raw {
     values: [f64; CHANNELS],
@@ -114,7 +114,7 @@ struct Pause {
     channel: usize,
     first: u64,
     size: f64,
-    /// True where the last block was not as it should be.
+    /// True if the last block was not as it should be.
     bad_block: bool,
     /// Samples in a row that are as they should be.
     good: u64,
@@ -142,7 +142,7 @@ pub(crate) struct Guard {
     channels: [ChannelGuard; CHANNELS],
     profile: Profile,
     resting: Resting,
-    /// What was usual before it was learnt anew.
+    /// The typical values before it was learnt again.
     former: Profile,
     block: Block,
     in_block: u32,
@@ -204,9 +204,9 @@ impl State for Guard {
 }
 
 impl Guard {
-    /// A guard of a recursion at its start, with a delay of nk samples. What is usual is learnt from
-    /// the record of the start span, or where there is none from the first seconds, in which only
-    /// what is no number is held back.
+    /// A guard of a recursion at its start, with a delay of nk samples. Typical values are learnt
+    /// from the record of the start span, or where there is none from the first seconds, in which
+    /// only what is not a number is held back.
     pub fn new(recursion: &mut dyn Recursion, nk: usize, span: Option<&Record>, sample_time: SampleTime) -> Self {
         let ts = sample_time.s();
         let longest = (LONGEST_S / ts).round().max(1.0) as u32;
@@ -249,7 +249,7 @@ impl Guard {
         guard
     }
 
-    /// Takes a sample, whose values are NaN where they are no numbers, to the recursion or not.
+    /// Takes a sample, whose values are NaN if they are not numbers, to the recursion or not.
     #[inline]
     pub fn take(&mut self, recursion: &mut dyn Recursion, sample: Sample, moves: bool) -> Guarded {
         self.samples += 1;
@@ -306,12 +306,12 @@ impl Guard {
         });
     }
 
-    /// What was found or done at the last sample.
+    /// Findings and actions at the last sample.
     pub fn event(&self) -> Option<GuardEvent> {
         self.event
     }
 
-    /// True while the estimate stands still.
+    /// True while the estimate stays constant.
     pub fn is_paused(&self) -> bool {
         self.pause.kind > 0
     }

@@ -5,7 +5,7 @@ use hoid_ident::{
     settings::{Kind, Value},
 };
 
-/// Whether a guard stands in front of a recursion.
+/// Whether a guard is in front of a recursion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GuardChoice {
     /// It does.
@@ -35,8 +35,8 @@ impl Value for GuardChoice {
 settings! {
     /// Whether samples and spans that no tracking makes are kept from the recursion.
     pub struct GuardOptions {
-        /// Guard: outliers of e and u are held back, spans that no tracking makes are left out, and the estimate
-        /// begins again after them
+        /// Guard: outliers of e and u are held back, spans that no tracking makes are left out, and the estimate starts
+        /// again after them
         #[setting(default("yes"))]
         pub guard: Option<GuardChoice> = None,
     }

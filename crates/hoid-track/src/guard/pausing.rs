@@ -1,4 +1,4 @@
-//! Pauses: the estimate stands still, and the samples go into the filters where they can.
+//! Pauses: the estimate stays constant, and the samples go into the filters where they can.
 
 use hoid_core::guard::profile::{Block, CHANNELS};
 
@@ -13,7 +13,7 @@ impl Guard {
         (x - self.centre[c]).abs() > self.largest[c]
     }
 
-    /// The estimate stands still from here on.
+    /// The estimate stays constant from here on.
     pub(super) fn begin_pause(&mut self, kind: GuardKind, channel: usize, samples: u64, size: f64) {
         self.in_ring = 0;
         let place = GuardKind::ALL.iter().position(|k| *k == kind).unwrap_or(0);
@@ -22,7 +22,7 @@ impl Guard {
             channel,
             first: self.samples.saturating_sub(samples),
             size,
-            bad_block: !matches!(kind, GuardKind::Missing | GuardKind::Level | GuardKind::Astray),
+            bad_block: !matches!(kind, GuardKind::Missing | GuardKind::Level | GuardKind::Diverged),
             good: 0,
             doubtful: 0,
         };
@@ -105,7 +105,7 @@ impl Guard {
         self.tell(kind, channel, self.samples - first, size, action, 0);
     }
 
-    /// The recursion begins again from its start, and nothing is known of the signals.
+    /// The recursion starts again from its start, and nothing is known about the signals.
     pub(super) fn learn_anew(&mut self, recursion: &mut dyn Recursion) {
         self.start.restore(recursion);
         self.former = std::mem::take(&mut self.profile);

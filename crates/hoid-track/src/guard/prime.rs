@@ -1,10 +1,10 @@
-//! What is usual, from the record of the start span.
+//! Typical values, from the record of the start span.
 //!
-//! Of each mean of a block ([`hoid_core::guard::profile`]) the median over all blocks is taken, and
-//! of each difference the largest of three estimates of its 99 % quantile: itself, and those that
-//! follow from the 50 and 95 % quantiles of Gaussian errors. A few outliers in the span change
-//! neither; heavy tails count. Samples at which a signal stands still are left out of the quantiles, as
-//! they are while it runs ([`hoid_core::guard::channel`]); where u rested is learnt too.
+//! For each mean of a block ([`hoid_core::guard::profile`]) the median over all blocks is taken, and of each difference
+//! the largest of three estimates of its 99 % quantile: itself, and those that follow from the 50 and 95 % quantiles of
+//! Gaussian errors. A few outliers in the span change neither; heavy tails count. Samples at which a signal stays
+//! constant are left out of the quantiles, as they are while it runs ([`hoid_core::guard::channel`]); where u rested is
+//! learnt too.
 
 use hoid_core::guard::{
     channel::ORDERS,
@@ -19,11 +19,11 @@ use super::Guard;
 const QUANTILES: [(f64, f64); 3] = [(0.5, 0.6745), (0.95, 1.96), (0.99, 2.5758)];
 /// The quantile further in, by its own count.
 const INNER: f64 = 0.9;
-/// Least blocks of a record that says what is usual.
+/// Least blocks of a record that reports the default.
 const LEAST: usize = 5;
 
 impl Guard {
-    /// Learns what is usual from a record.
+    /// Learns the default from a record.
     pub(super) fn prime(&mut self, record: &Record) {
         let output = record.output();
         let silent;
@@ -76,13 +76,13 @@ impl Guard {
             })
             .collect();
         let over = |of: &dyn Fn(&Block) -> f64| middle(blocks.iter().map(of).collect());
-        let usual = Block {
+        let typical = Block {
             differences: std::array::from_fn(|c| std::array::from_fn(|j| over(&|b| b.differences[c][j]))),
             magnitude: std::array::from_fn(|c| over(&|b| b.magnitude[c])),
             mean: centre,
             ..Block::default()
         };
-        self.profile = Profile::of(&usual);
+        self.profile = Profile::of(&typical);
         for (c, channel) in self.channels.iter_mut().enumerate() {
             channel.set_tails(outer[c], inner[c]);
         }
@@ -101,7 +101,7 @@ fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     upper_quantile(&mut values, share).unwrap_or(0.0)
 }
 
-/// True for each first difference that is more than a signal that stands still has.
+/// True for each first difference that is more than a signal that stays constant has.
 fn moving(signal: &[f64]) -> Vec<bool> {
     let sizes: Vec<f64> = signal.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     let mean = mean(&sizes);

@@ -29,7 +29,7 @@ impl Snapshot {
         recursion.visit(&mut |number| self.numbers.push(*number));
     }
 
-    /// Puts them back; false where nothing was kept.
+    /// Puts them back; false if nothing was kept.
     pub fn restore(&self, recursion: &mut dyn Recursion) -> bool {
         let mut kept = self.numbers.iter();
         recursion.visit(&mut |number| {

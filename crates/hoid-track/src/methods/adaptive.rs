@@ -1,25 +1,23 @@
-//! The recursion in the basis that people share ([`hoid_core::adaptive`]) behind the face of a
-//! recursion: what is usual of people, in seconds.
+//! The recursion in the basis that people share ([`hoid_core::adaptive`]) after the face of a recursion: the defaults
+//! for people, in seconds.
 //!
-//! It needs no start fit: it begins with what is usual of people ([`hoid_core::adaptive::usual`]). The delay begins at
-//! that of nk, .2 s where nothing is said, and at half a sample more, for an error that is held.
+//! It needs no start fit: it starts with the defaults for people ([`hoid_core::adaptive::default`]). The delay starts
+//! at that of nk, .2 s where nothing is specified, and at half a sample more, for an error that is held.
 //!
-//! **What is known of the person** before the first sample is `prior`: what is usual, next to nothing,
-//! some parameters, or an earlier fit, whose estimate and covariance it begins with
-//! (`beginning`).
+//! **What is known of the person** before the first sample is `prior`: the default, next to nothing, some parameters,
+//! or an earlier fit, whose estimate and covariance it starts with (`starting_point`).
 //!
 //! **What it reports.** The gain and lead that are nearest to the gains of the basis
 //! ([`AdaptiveFilter::operator`]). The polynomials are the hold of that, with the delay of nk.
 
-mod beginning;
+mod starting_point;
 
-use beginning::{Beginning, known};
 use hoid_core::{
     adaptive::{
-        AdaptiveFilter, GAINS, HELD, LARGEST_ORDER, LINEAR, PARAMETERS,
+        AdaptiveFilter, DYNAMICS, GAINS, LARGEST_ORDER, LINEAR, PARAMETERS,
         basis::Basis,
+        defaults::{self, DefaultOperator},
         memory_needed, through,
-        usual::{self, Usual},
     },
     state::{State, visit_all},
 };
@@ -28,6 +26,7 @@ use hoid_model::{
     SampleTime, Structure,
     uncertainty::{Estimate, OperatorEstimate},
 };
+use starting_point::{StartingPoint, initial_estimate};
 
 use crate::{
     change::Change,
@@ -38,7 +37,7 @@ use crate::{
     recursion::{Recursion, Sample, StepOutcome},
     reported::Reported,
     response::Response,
-    setup::{Setup, StartAt, USUAL_DELAY_S},
+    setup::{DEFAULT_DELAY_S, Setup, StartAt},
     start::StartState,
 };
 
@@ -53,10 +52,10 @@ settings! {
         pub limit: Option<f64> = None,
         /// Time that is read again and again; 0 for a recursion that reads each sample once, as a microcontroller does
         #[setting(unit("s"), bounds(Bounds::NonNegative))]
-        pub replay: f64 = usual::REPLAYED_S,
-        /// What is known of the person before the first sample: population, none, NAME=CENTRE:SPREAD of
-        /// omega_nm, zeta_nm, tau_e, T_I (the spread is relative), or an earlier fit of them, a file that
-        /// hoid identify --json has printed
+        pub replay: f64 = defaults::REPLAYED_S,
+        /// Prior knowledge of the person before the first sample: population, none, NAME=CENTRE:SPREAD of omega_nm,
+        /// zeta_nm, tau_e, T_I (the spread is relative), or an earlier fit of them, a file that hoid identify --json
+        /// has printed
         #[setting(default("population"))]
         pub prior: PersonPrior = PersonPrior::Population,
     }
@@ -81,12 +80,12 @@ impl RecursiveMethod for AdaptiveOptions {
         Some("population")
     }
 
-    fn usual_nd(&self) -> Option<usize> {
-        Some(usual::ORDER)
+    fn default_nd(&self) -> Option<usize> {
+        Some(defaults::ORDER)
     }
 
     /// It follows from the weights of the drifts.
-    fn usual_memory(&self, _parameter: &str) -> Memory {
+    fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Infinite
     }
 
@@ -110,7 +109,7 @@ impl RecursiveMethod for AdaptiveOptions {
             return Err(bad_option(
                 "the start of adaptive",
                 start.to_owned(),
-                "a prior in its place: it starts from what is usual of people, from next to nothing (prior = none) or from an \
+                "a prior in its place: it starts from the defaults for people, from next to nothing (prior = none) or from an \
                  earlier fit of the person; rpem, physical and rls take a start",
             ));
         }
@@ -134,7 +133,7 @@ impl RecursiveMethod for AdaptiveOptions {
         true
     }
 
-    fn memory_in_words(&self) -> Option<String> {
+    fn memory_as_text(&self) -> Option<String> {
         Some(format!(
             "since the last change where nothing changes; a change is declared so that {} false alarm{} an hour may be expected",
             self.false_alarms,
@@ -147,18 +146,18 @@ impl RecursiveMethod for AdaptiveOptions {
     }
 
     fn limit(&self) -> f64 {
-        self.limit.unwrap_or(usual::LIMIT)
+        self.limit.unwrap_or(defaults::LIMIT)
     }
 
-    fn spread_before(&self) -> Option<[f64; HELD]> {
-        // What a fit determined is known, whatever the data say.
+    fn spread_before(&self) -> Option<[f64; DYNAMICS]> {
+        // What a fit determined is known, whatever the data show.
         let known = self.prior.fit().is_some();
-        let Beginning { point, spread } = Beginning::of(&self.prior, 0.0, false, SampleTime::HUNDREDTH).ok()?;
+        let StartingPoint { point, spread } = StartingPoint::of(&self.prior, 0.0, false, SampleTime::HUNDREDTH).ok()?;
         (!known).then_some([spread[0] * point.omega, spread[1] * point.zeta, spread[2]])
     }
 
     fn lag_of_basis_s(&self) -> Option<f64> {
-        let Beginning { point, .. } = Beginning::of(&self.prior, 0.0, false, SampleTime::HUNDREDTH).ok()?;
+        let StartingPoint { point, .. } = StartingPoint::of(&self.prior, 0.0, false, SampleTime::HUNDREDTH).ok()?;
         Some(point.lag)
     }
 
@@ -188,18 +187,19 @@ impl AdaptiveRecursion {
         let ts = sample_time.s();
         let nk = setup.orders.nk;
         // A delay that is not the default one has been given.
-        let is_given = nk != sample_time.nk(USUAL_DELAY_S);
-        let beginning = Beginning::of(&options.prior, (nk as f64 - 0.5) * ts, is_given, sample_time)?;
+        let is_given = nk != sample_time.nk(DEFAULT_DELAY_S);
+        let beginning = StartingPoint::of(&options.prior, (nk as f64 - 0.5) * ts, is_given, sample_time)?;
         let point = beginning.point;
         let basis = Basis::new(point, ts).ok_or_else(|| unusable(&format!("a delay of {} s", point.tau)))?;
         let fit = options.prior.fit();
-        let known = fit.map(|fit| known(fit, &basis, sample_time)).transpose()?;
-        let supposed = Usual {
+        let known = fit.map(|fit| initial_estimate(fit, &basis, sample_time)).transpose()?;
+        let supposed = DefaultOperator {
             point,
             spread: beginning.spread,
-            // A structure without a noise model, or with one pole, does not say how it is coloured.
+            // A structure without a noise model, or with one pole, does not report how it is
+            // coloured.
             order: match setup.orders.nd {
-                0 | 1 => usual::ORDER,
+                0 | 1 => defaults::ORDER,
                 nd => nd,
             },
             limit: options.limit(),
@@ -224,7 +224,7 @@ impl AdaptiveRecursion {
 
     /// True for a response of an estimate: that of no gains at all has no size in dB and no phase.
     fn answers(&self, [re, im]: [f64; 2]) -> bool {
-        self.model.began() && (re != 0.0 || im != 0.0)
+        self.model.has_started() && (re != 0.0 || im != 0.0)
     }
 
     fn report(&mut self) {
@@ -246,7 +246,7 @@ impl AdaptiveRecursion {
             let variance = pairs.map(|(a, b)| map[i][a] * of(a, b) * map[i][b]).sum();
             Estimate::with_variance(value, variance)
         };
-        let (told, by) = (detector.told(), detector.difference());
+        let (told, by) = (detector.contrast(), detector.difference());
         let before = |i: usize| match i {
             0 | 1 => gain(i, &told.before, &|a, b| told.covariance_before[a][b]),
             _ => {
@@ -280,7 +280,7 @@ impl State for AdaptiveRecursion {
 impl Recursion for AdaptiveRecursion {
     fn step(&mut self, sample: Sample) -> StepOutcome {
         let step = self.model.step(sample.e, sample.u);
-        if self.model.began() {
+        if self.model.has_started() {
             self.report();
         }
         step.into()
@@ -299,7 +299,7 @@ impl Recursion for AdaptiveRecursion {
     }
 
     fn covariance(&self, into: &mut [f64]) -> bool {
-        if !self.model.began() {
+        if !self.model.has_started() {
             return false;
         }
         let c = self.model.operator_covariance();
@@ -318,7 +318,7 @@ impl Recursion for AdaptiveRecursion {
 
     fn operator(&self) -> Option<OperatorEstimate> {
         let (values, covariance) = (self.model.operator(), self.model.operator_covariance());
-        let [lead, lead_variance] = match self.model.began() {
+        let [lead, lead_variance] = match self.model.has_started() {
             true => self.model.lead_time(),
             false => [f64::NAN; 2],
         };
@@ -334,7 +334,7 @@ impl Recursion for AdaptiveRecursion {
     }
 
     fn change_odds(&self) -> Option<f64> {
-        Some(self.model.detector().against_chance())
+        Some(self.model.detector().log_significance())
     }
 
     fn change(&self) -> Option<Change> {
@@ -356,10 +356,10 @@ impl Recursion for AdaptiveRecursion {
             },
         };
         let pair = |i: usize| [old[i], new(i)];
-        let told = detector.told();
+        let told = detector.contrast();
         let variance = detector.innovation_variances();
         let log_variance = 2.0 / told.samples[0] + 2.0 / told.samples[1];
-        let level = (variance[1] / variance[0]).ln() / (log_variance * detector.usual_level()).sqrt();
+        let level = (variance[1] / variance[0]).ln() / (log_variance * detector.typical_level()).sqrt();
         Some(Change {
             seconds_ago: detector.ago_s(),
             odds: self.change_odds()?,

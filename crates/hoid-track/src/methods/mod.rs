@@ -1,5 +1,5 @@
-//! A recursive method with its options, and those that track people: the default, and the two of the
-//! reference text. Those that they are compared with are in `hoid-survey`, and so is the list of all.
+//! A recursive method with its options, and those that track people: the default, and the two of the thesis. Those that
+//! they are compared with are in `hoid-survey`, and so is the list of all.
 
 mod adaptive;
 mod rls;
@@ -20,9 +20,9 @@ use crate::{
 
 pub use adaptive::AdaptiveOptions;
 pub use rls::RlsOptions;
-pub use rpem::{RpemOptions, USUAL_LIMIT, short_for_b};
+pub use rpem::{DEFAULT_LIMIT, RpemOptions, short_for_b};
 
-/// A recursive method with its options; what it says of itself is that of [`RecursiveMethod`].
+/// A recursive method with its options; its self-description is that of [`RecursiveMethod`].
 #[derive(Debug)]
 pub struct Method(Box<dyn RecursiveMethod>);
 
@@ -72,7 +72,7 @@ impl Method {
         &mut *self.0
     }
 
-    /// What is known of it.
+    /// Known properties of it.
     pub fn spec(&self) -> MethodSpec {
         spec(&*self.0)
     }
@@ -96,8 +96,8 @@ impl Method {
     /// Sets an option from its text.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for an option that the method does not have, or a text that is no
-    /// value of it.
+    /// [`IdentError::BadOption`] for an option that the method does not have, or a text that is not
+    /// a value of it.
     pub fn set(&mut self, name: &str, text: &str) -> Result<(), IdentError> {
         if self.0.set(name, text)? {
             return Ok(());
@@ -116,10 +116,10 @@ impl Method {
         Ok(self)
     }
 
-    /// Begins with an earlier fit of the person.
+    /// Starts with an earlier fit of the person.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a method that begins with the record.
+    /// [`IdentError::BadOption`] for a method that starts with the record.
     pub fn start_from(&mut self, fit: FittedOperator) -> Result<(), IdentError> {
         let source = fit.source.clone();
         match self.0.set_person_prior(PersonPrior::Fit(Box::new(fit))) {
@@ -127,16 +127,16 @@ impl Method {
             false => Err(bad(
                 "prior",
                 source,
-                "the method adaptive, which alone begins with a fit",
+                "the method adaptive, which alone starts with a fit",
             )),
         }
     }
 
     /// The operator's orders with the noise model that the method takes when none is named: that of the
     /// structure, or of the order that the method names.
-    pub fn usual_orders(&self, nk: usize) -> Orders {
-        let orders = self.usual_structure().operator_orders(nk);
-        match self.usual_nd() {
+    pub fn default_orders(&self, nk: usize) -> Orders {
+        let orders = self.default_structure().operator_orders(nk);
+        match self.default_nd() {
             Some(nd) => Orders { nd, ..orders },
             None => orders,
         }
@@ -144,7 +144,7 @@ impl Method {
 
     /// The structure that the method takes when none is named: Box-Jenkins, or the first that it
     /// serves.
-    pub fn usual_structure(&self) -> Structure {
+    pub fn default_structure(&self) -> Structure {
         let served = self.about().structures;
         match served.first() {
             Some(first) if !served.contains(&Structure::BoxJenkins) => *first,
@@ -153,7 +153,7 @@ impl Method {
     }
 }
 
-/// [`Method::adaptive`]: it needs nothing to begin with, and holds on recorded people.
+/// [`Method::adaptive`]: it needs no start, and works for recorded people.
 impl Default for Method {
     fn default() -> Self {
         Self::adaptive()

@@ -26,7 +26,7 @@ settings! {
     }
 }
 
-/// The default of the guard against windup, in words.
+/// The default of the guard against windup, as text.
 const WINDUP_GUARD: &str =
     "off for arx with a covariance and exponential forgetting (the text's recursion), else as for physical";
 
@@ -35,7 +35,7 @@ impl RecursiveMethod for RlsOptions {
         About {
             name: "rls",
             help: "recursive least squares",
-            source: "Ljung 1999, section 11.2; the reference text, section III",
+            source: "Ljung 1999, section 11.2; the thesis, section III",
             structures: &[Structure::Arx, Structure::Fir],
             defaults: &[
                 ("memory", "2.56s"),
@@ -47,7 +47,7 @@ impl RecursiveMethod for RlsOptions {
     }
 
     /// The text's 256 samples at 100 Hz.
-    fn usual_memory(&self, _parameter: &str) -> Memory {
+    fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Seconds(2.56)
     }
 

@@ -29,22 +29,22 @@ settings! {
         pub gain: GainOptions,
         /// Stability.
         pub stability: StabilityOptions,
-        /// A delay that is followed.
+        /// A tracked delay.
         pub delay: DelayOptions,
         /// The guard.
         pub guard: GuardOptions,
     }
 }
 
-/// What an innovation may move an estimate at most, in standard deviations.
-pub const USUAL_LIMIT: f64 = 5.0;
+/// Limit of an innovation in the update, in standard deviations.
+pub const DEFAULT_LIMIT: f64 = 5.0;
 
 impl RecursiveMethod for RpemOptions {
     fn about(&self) -> About {
         About {
             name: "rpem",
             help: "recursive prediction-error method, for every structure",
-            source: "Ljung 1999, section 11.5; the reference text, section III",
+            source: "Ljung 1999, section 11.5; the thesis, section III",
             structures: &Structure::ALL,
             defaults: &[
                 ("memory", "2.56s for b, 20.48s for the others"),
@@ -58,7 +58,7 @@ impl RecursiveMethod for RpemOptions {
         }
     }
 
-    fn usual_memory(&self, parameter: &str) -> Memory {
+    fn default_memory(&self, parameter: &str) -> Memory {
         short_for_b(parameter)
     }
 
@@ -103,7 +103,7 @@ impl RecursiveMethod for RpemOptions {
     }
 
     fn limit(&self) -> f64 {
-        self.gain.limit_or(USUAL_LIMIT)
+        self.gain.limit_or(DEFAULT_LIMIT)
     }
 
     fn track_delay_s(&self) -> Option<(f64, f64)> {

@@ -1,7 +1,7 @@
 """What the peers share: the data, the clock and the lines of JSON that `cargo xtask bench` collects.
 
 A peer is called as `python PEER.py RECORD.csv [RUNS [TASK,...]]`; RECORD.csv has the columns e, u without their names, and the folder holds what
-the example `tasks` has written beside it. For each task it prints {"task", "peer", "seconds", "answer"} and, where its answer is another by
+the example `tasks` has written next to it. For each task it prints {"task", "peer", "seconds", "answer"} and, where its answer is another by
 design, "differs" with the reason; or {"task", "peer", "skipped"} with the reason.
 """
 
@@ -45,7 +45,7 @@ def truth():
 
 
 def median(work):
-    """Median time of the runs and the last answer: as many runs as asked for, fewer where they would take more than 4 s, and the first
+    """Median time of the runs and the last answer: as many runs as requested, fewer where they would take more than 4 s, and the first
     alone where that took more than 10 s."""
     begin = time.perf_counter()
     answer = work()
@@ -61,7 +61,7 @@ def median(work):
 
 
 def measure(task, peer, work, answer=lambda a: a, differs=None, compile_first=False):
-    """Measures a task where it is asked for, and prints its line."""
+    """Measures a task where it is requested, and prints its line."""
     if len(sys.argv) > 3 and sys.argv[3] and task not in sys.argv[3].split(","):
         return
     line = {"task": task, "peer": peer}

@@ -2,7 +2,7 @@
 what is recursive.
 
 The Box-Jenkins fit goes in two stages: zeros before the record, then with the two values of w before the first one used as parameters
-too, by which the answer is that of hoid. It is given a start near the answer, as the ARX start leads astray here; hoid gets none.
+too, by which the answer is that of hoid. It is given a start near the answer, as the ARX start misleads here; hoid gets none.
 `own LM` is a Levenberg-Marquardt method by hand, `least_squares` that of SciPy; both have the analytic Jacobian.
 """
 

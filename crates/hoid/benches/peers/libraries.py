@@ -1,7 +1,7 @@
-"""Libraries from PyPI that fit ARX or Box-Jenkins models or run a recursion, called as their documentation says: pysib, timeseries-toolbox,
+"""Libraries from PyPI that fit ARX or Box-Jenkins models or run a recursion, called as their documentation states: pysib, timeseries-toolbox,
 SIPPY and padasip. Given no start where they take none.
 
-What the answers mean: pysib begins its search at the ARX fit with zeros before the record, SIPPY gives the whole output and its optimiser the
+What the answers mean: pysib starts its search at the ARX fit with zeros before the record, SIPPY gives the whole output and its optimiser the
 same, timeseries-toolbox starts at random. All three therefore end with another theta than a fit that estimates the initial states.
 """
 

@@ -2,7 +2,7 @@
 
 Called by `cargo run --release -p hoid-evidence --example evidence -- speed`, which gives it a record (columns e, u) and prints the ratio
 of the times. Needs numpy and scipy. Orders nb = 2, nc = 0, nd = 1, nf = 2, nk = 29; zeros before the record. It is given a start
-near the answer, as the ARX start leads astray here; hoid gets none.
+near the answer, as the ARX start misleads here; hoid gets none.
 """
 
 import sys

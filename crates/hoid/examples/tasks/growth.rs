@@ -132,7 +132,7 @@ fn write(record: &Record, file: &str) {
     hoid::io::write_record(std::path::Path::new(file), record).unwrap();
 }
 
-/// Largest resident memory so far, bytes; zero where the system does not say.
+/// Largest resident memory so far, bytes; zero if the system does not report.
 fn resident_peak() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));

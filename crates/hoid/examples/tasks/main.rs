@@ -1,6 +1,5 @@
-//! The tasks by which hoid is compared with what people would use instead: our side.
-//! `cargo xtask bench` runs it beside the peers in `crates/hoid/benches/peers` and makes the table
-//! of the book.
+//! The tasks by which hoid is compared with what people would use instead: our side. `cargo xtask bench` runs it next
+//! to the peers in `crates/hoid/benches/peers` and makes the table of the book.
 //!
 //! `cargo run --release -p hoid --example tasks -- DIRECTORY [--task NAME,...] [--seconds S | --times K] [--reproduce M]`
 //!
@@ -245,7 +244,7 @@ pub fn rpem(e: &[f64], u: &[f64], history: &mut Vec<[f64; 5]>) -> [f64; 5] {
 
 /// The same start and memory through `track`.
 pub fn traced(method: Method) -> TrackOptions {
-    let structure = method.usual_structure();
+    let structure = method.default_structure();
     let start = StartAt::Theta(match method == Method::rls() {
         true => vec![0.0; 4],
         false => RPEM_START.to_vec(),
@@ -259,7 +258,7 @@ pub fn traced(method: Method) -> TrackOptions {
         .unwrap()
 }
 
-/// What a measurement gives: median time in s, and the last answer.
+/// Result of a measurement: median time in s, and the last answer.
 trait Measured<T> {
     fn map_answer<U>(self, map: impl FnOnce(T) -> U) -> (f64, U);
 }
@@ -283,7 +282,7 @@ impl Default for Effort {
     }
 }
 
-/// Runs the work once to warm up, and then as long and as often as the effort says at least.
+/// Runs the work once to warm up, and then as long and as often as the effort reports at least.
 fn median<T>(effort: Effort, mut work: impl FnMut() -> T) -> (f64, T) {
     let begun = Instant::now();
     let mut answer = black_box(work());

@@ -76,7 +76,7 @@ impl Truth<'_> {
         self.record_behind(500, n, noise, seed)
     }
 
-    /// A record of n samples behind a run-in, with white input of unit variance and innovations of
+    /// A record of n samples after a run-in, with white input of unit variance and innovations of
     /// the given size.
     pub fn record_behind(&self, run_in: usize, n: usize, noise: f64, seed: u64) -> Record {
         let mut draw = Draw(seed);

@@ -14,7 +14,7 @@ pub struct Shown<'a> {
 }
 
 impl Shown<'_> {
-    /// What was described, in a line.
+    /// The described response, in a line.
     pub fn title(&self) -> String {
         let (found, names) = (
             &self.described.found,
@@ -41,7 +41,7 @@ impl Shown<'_> {
         )
     }
 
-    /// The page: what it is worth first; with `verbose` every setting.
+    /// The page: its reliability first; with `verbose` every setting.
     pub fn page(&self, verbose: bool) -> String {
         let Described { found, data, settings } = self.described;
         let function = &found.function;
@@ -80,7 +80,7 @@ impl Shown<'_> {
             format!("{scaled} %")
         };
         page.push_str(&format!(
-            "Remnant: {} of the power of the output off the lines, {} with its part at the lines (P_n).\n",
+            "Remnant: {} of the power of the output at non-excited frequencies, {} with its part at the lines (P_n).\n",
             percent(&function.off_line_share),
             percent(&function.noise_ratio),
         ));

@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::form::Shown;
 use crate::{
     args::DescribeArgs,
-    commands::{figure, paper_table, places, reading},
+    commands::{figure, output_paths, paper_table, reading},
     error::CliError,
     json, output,
 };
@@ -21,7 +21,7 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
     }
     let inputs: Vec<&Path> = args.records.iter().map(PathBuf::as_path).collect();
     paper_table::check(&args.show)?;
-    places::check(
+    output_paths::check(
         &inputs,
         &[args.picture.figure.as_deref(), args.show.table.as_deref()],
         &[],

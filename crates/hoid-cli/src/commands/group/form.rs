@@ -51,7 +51,7 @@ impl Finished<'_> {
         } else if let Some(first) = self.pages.first() {
             let count = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
             page.push_str(&format!(
-                "Report: {first}; {} and {} beside it, named by -v.\n",
+                "Report: {first}; {} and {} next to it, named by -v.\n",
                 count(self.pages.len() - 1, "page"),
                 count(self.tables.len(), "table")
             ));

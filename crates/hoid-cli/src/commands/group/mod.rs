@@ -6,7 +6,7 @@ mod pooled;
 
 use std::path::{Path, PathBuf};
 
-use hoid::analysis::Known;
+use hoid::analysis::LookOptions;
 use hoid::model::{SampleTime, VerdictLevel};
 use hoid::report::{group_figures, write_group_pages};
 use hoid::sim::people::{Population, Range};
@@ -20,7 +20,7 @@ use hoid::study::{
 
 use form::Finished;
 
-use super::{figure, paper_table, places, study::with_progress};
+use super::{figure, output_paths, paper_table, study::with_progress};
 use crate::{
     args::{GroupArgs, GroupCommand, GroupInitArgs, GroupRunArgs, SimulateGroupArgs},
     error::CliError,
@@ -106,12 +106,12 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
     let piped = path.as_os_str() == "-";
     if !piped && path.exists() {
         return Err(CliError::Usage(format!(
-            "{} is there already; remove it or name another with --out",
+            "{} is already present; remove it or name another with --out",
             path.display()
         )));
     }
     let (mut manifest, others) = Manifest::of_directory(&args.directory, &pattern)?;
-    let known = Known {
+    let known = LookOptions {
         offset_samples: args.offset,
         ..args.look.known()
     };
@@ -166,12 +166,12 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
     }
     if let Some(figure) = &args.picture.figure {
         figure::check(figure)?;
-        places::check(&[&path], &[Some(figure)], &[])?;
+        output_paths::check(&[&path], &[Some(figure)], &[])?;
     }
     paper_table::check(&args.show)?;
-    places::check(&[&path], &[args.show.table.as_deref()], &[])?;
+    output_paths::check(&[&path], &[args.show.table.as_deref()], &[])?;
     let manifest = Manifest::read(&path)?;
-    // What goes on writes no manifest.
+    // What continues writes no manifest.
     if !args.resume {
         hoid::io::check_output_directory(out, &[&path])?;
     }
@@ -222,7 +222,7 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
     Ok(())
 }
 
-/// A file for each condition: the name as it is typed for one, with the condition behind it for
+/// A file for each condition: the name as it is typed for one, with the condition after it for
 /// several.
 fn draw(figures: &[(String, String)], place: &Path, width_mm: Option<f64>) -> Result<(), CliError> {
     if figures.is_empty() {

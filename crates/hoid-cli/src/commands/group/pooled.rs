@@ -46,7 +46,7 @@ pub fn objects(populations: &[Population]) -> Value {
     populations.iter().map(Population::json).collect()
 }
 
-/// What the page says of them.
+/// Statement of the page about them.
 pub fn page(populations: &[Population], files: &[PathBuf]) -> String {
     let mut rows = text::table(&[
         "condition",

@@ -4,7 +4,7 @@ use hoid::analysis::{Identification, Identified, Recordings};
 use hoid::report::{Report, operator_figure, write_report};
 use serde_json::Value;
 
-use super::family_form::Found;
+use super::family_form::FamilyReport;
 use crate::{
     args::IdentifyArgs,
     commands::{figure, paper_table},
@@ -22,7 +22,7 @@ pub fn run(
     let model = &identified.fit.operator(0).polynomial_fit;
     let validation = other.map(|other| identified.validated(model, other)).transpose()?;
     let Identified { fit, data, .. } = &identified;
-    let found = Found {
+    let found = FamilyReport {
         identified: &identified,
         fit,
         files: &data.names,

@@ -18,8 +18,8 @@ const LEAST_HALF_S: f64 = 0.007;
 /// Frequencies at which a response to a target is shown with the controlled element, rad/s.
 const AT_RAD_S: [f64; 3] = [1.0, 2.5, 4.0];
 
-/// Everything that was found.
-pub struct Found<'a> {
+/// All results.
+pub struct FamilyReport<'a> {
     pub identified: &'a Identified,
     pub fit: &'a FamilyFit,
     pub files: &'a [String],
@@ -31,8 +31,8 @@ pub struct Found<'a> {
     pub settings: &'a [Setting],
 }
 
-impl Found<'_> {
-    /// The answer, and with `verbose` what is behind it.
+impl FamilyReport<'_> {
+    /// The answer, and with `verbose` the rest.
     pub fn page(&self, verbose: bool) -> Result<String, CliError> {
         let mut page = self.answer(verbose)?;
         if !verbose {
@@ -82,7 +82,7 @@ impl Found<'_> {
             coherence.map_or_else(String::new, |share| format!(
                 "; coherence of u with the excitation {share:.2}"
             )),
-            // Where they do not, a finding says so.
+            // Where they do not, a finding reports it.
             match fit.agreement.is_some() && fit.verdict.findings().iter().all(|found| found.kind != "agreement") {
                 true => "; the methods agree",
                 false => "",
@@ -165,8 +165,8 @@ impl Found<'_> {
         )
     }
 
-    /// What tau_e owes to the course of the error between its samples: the other delay that the data may mean, where half
-    /// a sample is more than the error bar says.
+    /// Effect of the intersample behaviour of the error on tau_e: the alternative delay, if half a sample exceeds the
+    /// standard error.
     fn between_samples(&self) -> String {
         let fit = self.fit;
         let named = fit.operator(0).parameters.iter().find(|p| p.name == "tau_e");
@@ -216,7 +216,7 @@ impl Found<'_> {
         match all.as_slice() {
             [] => String::new(),
             all => format!(
-                "Errors are those of {runs}. Of the person, whose gain varies by some {:.0} % beyond: {}.\n",
+                "Errors are those of {runs}. For the person, whose gain varies by some {:.0} % beyond: {}.\n",
                 100.0 * fit.run_to_run,
                 all.join(", ")
             ),
@@ -315,7 +315,7 @@ impl Found<'_> {
         ));
         let quality = self.identified.quality()?;
         page.push_str(&format!(
-            "VAF prediction {:.2} %; simulation {:.2} %, which says little of people: an operator with a lag integrates offset and \
+            "VAF prediction {:.2} %; simulation {:.2} %, which carries little information about people: an operator with a lag integrates offset and \
              drift of e{}.\n",
             quality.vaf_prediction,
             quality.vaf_simulation,

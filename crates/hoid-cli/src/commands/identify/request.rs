@@ -1,20 +1,20 @@
-//! From the options of `hoid identify` to what is asked of the library.
+//! Converts the options of `hoid identify` to a request to the library.
 
 use std::collections::BTreeMap;
 
-use hoid::analysis::{Asked, Request};
+use hoid::analysis::{Request, ResolvedRequest};
 
 use crate::{args::IdentifyArgs, error::CliError, output};
 
-/// The option of inputs beside the error, and what the error itself is.
+/// The option of inputs other than the error, and the role of the error.
 const ROLE: &str = "role";
 const FEEDBACK: &str = "feedback";
 
-/// What is asked for, the options checked against each other.
+/// The request, the options checked against each other.
 ///
 /// # Errors
 /// [`CliError::Usage`].
-pub fn asked(args: &IdentifyArgs) -> Result<Asked, CliError> {
+pub fn asked(args: &IdentifyArgs) -> Result<ResolvedRequest, CliError> {
     let request = Request {
         structure: args.structure.clone(),
         method: Some(args.method.clone()),
@@ -22,7 +22,7 @@ pub fn asked(args: &IdentifyArgs) -> Result<Asked, CliError> {
         faults: args.faults.faults,
         rate: args.read.prepare.rate.decimate,
     };
-    let (asked, notes) = request.asked().map_err(CliError::of_options)?;
+    let (asked, notes) = request.resolve().map_err(CliError::of_options)?;
     for note in notes {
         output::notice("", format!("note: {note}"));
     }
@@ -65,8 +65,8 @@ fn options(args: &IdentifyArgs) -> Result<BTreeMap<String, String>, CliError> {
 }
 
 /// The first option of reading and writing that has no meaning for what is asked, and what it belongs to.
-fn misplaced(args: &IdentifyArgs, asked: &Asked) -> Option<(&'static str, &'static str)> {
-    let changing = matches!(asked, Asked::Change(_));
+fn misplaced(args: &IdentifyArgs, asked: &ResolvedRequest) -> Option<(&'static str, &'static str)> {
+    let changing = matches!(asked, ResolvedRequest::Change(_));
     let steady = "a model that does not change";
     let all = [
         (

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use hoid::analysis::{
-    Asked, Excitation, Identified, PolynomialFit, Recordings,
+    Excitation, Identified, PolynomialFit, Recordings, ResolvedRequest,
     json::{BatchAnswer, PolynomialAnswer},
 };
 use hoid::ident::{
@@ -12,13 +12,13 @@ use hoid::ident::{
     validation::{nrmse_fit, vaf},
 };
 use hoid::model::{GainUnit, Record};
-use hoid::report::{Answer, ModelSection, Report, known_operator, model_figure, model_picture, write_report};
+use hoid::report::{FitSummary, ModelSection, Report, known_operator, model_figure, model_picture, write_report};
 use serde_json::Value;
 
 use super::{family, request, sigmoid};
 use crate::{
     args::{IdentifyArgs, ReadArgs},
-    commands::{figure, paper_table, places, reading},
+    commands::{figure, output_paths, paper_table, reading},
     error::CliError,
     family_operator, json, output, text,
 };
@@ -43,9 +43,9 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let other = args.validate.as_deref();
     let other = other.map(|path| reading.file(path, reading::told)).transpose()?;
     match asked {
-        Asked::Operator(identification) => family::run(args, &identification, read, other),
-        Asked::Change(identification) => sigmoid::run(args, &identification, read),
-        Asked::Remnant(identification) => {
+        ResolvedRequest::Operator(identification) => family::run(args, &identification, read, other),
+        ResolvedRequest::Change(identification) => sigmoid::run(args, &identification, read),
+        ResolvedRequest::Remnant(identification) => {
             let found = output::watched("fitting", || identification.run(read))?;
             show(
                 args,
@@ -55,7 +55,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
                 other,
             )
         }
-        Asked::Polynomials(identification) => {
+        ResolvedRequest::Polynomials(identification) => {
             let found = output::watched("fitting", || identification.run(read))?;
             let PolynomialFit { fit, choice } = &found.fit;
             show(args, &found, fit, (choice.as_ref(), None), other)
@@ -100,7 +100,7 @@ fn show<F: BatchAnswer>(
                 truth: known_operator(records),
                 margins: answer.margins,
             }],
-            answer: Some(Answer {
+            answer: Some(FitSummary {
                 verdict: verdict.clone(),
                 sentence: sentence(&answer),
                 parameters: Vec::new(),
@@ -127,12 +127,12 @@ fn description(args: &IdentifyArgs, data: &Recordings) -> Option<Description> {
         .flatten()
 }
 
-/// What is written takes the place of nothing that is read; `--prior` may name a file.
+/// Outputs must not overwrite inputs; `--prior` may name a file.
 fn check_places(args: &IdentifyArgs) -> Result<(), CliError> {
     let mut inputs: Vec<&Path> = args.records.iter().map(PathBuf::as_path).collect();
     inputs.extend(args.validate.as_deref());
     inputs.extend(args.options.text("prior").map(Path::new));
-    places::check(
+    output_paths::check(
         &inputs,
         &[
             args.picture.figure.as_deref(),
@@ -154,7 +154,7 @@ fn prediction_ahead(fit: &Fit, records: &[Record], k: usize) -> Result<(usize, f
     Ok((k, vaf(&measured, &predicted), nrmse_fit(&measured, &predicted)))
 }
 
-/// The answer in words.
+/// The answer as text.
 fn sentence(found: &PolynomialAnswer<'_>) -> Option<String> {
     let of = found.operator.as_ref().ok().filter(|_| found.has_operator());
     let named = of.iter().flat_map(|o| o.rows()).map(|(name, _, e)| (name, e.value));
@@ -166,7 +166,7 @@ fn sentence(found: &PolynomialAnswer<'_>) -> Option<String> {
     )
 }
 
-/// The answer, and with `verbose` what is behind it.
+/// The answer, and with `verbose` the rest.
 fn page(found: &PolynomialAnswer<'_>, verbose: bool) -> String {
     let mut page = answer(found);
     if verbose {
@@ -232,7 +232,7 @@ fn answer(found: &PolynomialAnswer<'_>) -> String {
     page
 }
 
-/// What was tried, coefficients, roots, tests of the residuals, settings.
+/// The candidates tried, coefficients, roots, tests of the residuals, settings.
 fn details(found: &PolynomialAnswer<'_>) -> String {
     let fit = found.fit;
     let mut page = "\n".to_owned();
@@ -250,7 +250,7 @@ fn details(found: &PolynomialAnswer<'_>) -> String {
     page.push_str(&text::quality(fit, &found.quality));
     page.push('\n');
     page.push_str(&text::roots(fit));
-    // Residuals that are rounding say nothing.
+    // Residuals that are rounding carry no information.
     if fit.covariance().is_some() {
         page.push_str(&text::residual_tests(found.files, &found.validations));
     }

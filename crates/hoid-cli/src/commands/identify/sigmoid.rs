@@ -29,7 +29,7 @@ pub fn run(
         .iter()
         .map(test)
         .collect::<Result<Vec<Option<LjungBox>>, CliError>>()?;
-    let found = Found {
+    let found = SigmoidReport {
         fit,
         verdict,
         files: &data.names,
@@ -47,7 +47,7 @@ pub fn run(
     CliError::of_verdict(verdict)
 }
 
-/// What changes over the time of a record, with standard errors where they are all known.
+/// Parameters that change over a record, with standard errors if all are known.
 fn trace(fit: &SigmoidFit, record: &Record) -> Result<Record, CliError> {
     let gains = fit.trace(record);
     let mut trace: Option<Record> = None;
@@ -83,8 +83,8 @@ fn before_and_after(fit: &SigmoidFit) -> String {
     rows.to_string()
 }
 
-/// Everything that was found.
-struct Found<'a> {
+/// All results.
+struct SigmoidReport<'a> {
     fit: &'a SigmoidFit,
     verdict: &'a Verdict,
     files: &'a [String],
@@ -95,8 +95,8 @@ struct Found<'a> {
     settings: &'a [Setting],
 }
 
-impl Found<'_> {
-    /// The answer, and with `verbose` what is behind it.
+impl SigmoidReport<'_> {
+    /// The answer, and with `verbose` the rest.
     fn page(&self, verbose: bool) -> String {
         let Self {
             fit,
@@ -171,7 +171,7 @@ impl Found<'_> {
             fit.residual_count(),
             numbers::plain(fit.innovation_variance())
         ));
-        // Residuals that are rounding say nothing.
+        // Residuals that are rounding carry no information.
         if fit.covariance().is_some() {
             let mut coloured = false;
             for (file, test) in files.iter().zip(tests) {

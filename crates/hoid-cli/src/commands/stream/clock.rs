@@ -9,10 +9,10 @@
 const GAIN: f64 = 0.1;
 /// Longest gap that is bridged, s.
 pub const LONGEST_GAP_S: f64 = 10.0;
-/// Lines in a row, each later than the one before, after which a clock is believed to have been set
+/// Lines in a row, each later than the one before, after which a clock is trusted to have been set
 /// back.
 const SET_BACK: usize = 10;
-/// Samples by which the grid may run ahead of the times before that is said.
+/// Samples by which the grid may run ahead of the times before that is reported.
 const AHEAD: f64 = 2.0;
 
 /// Lines over which the rate of the times is judged.
@@ -20,7 +20,7 @@ const JUDGED: usize = 128;
 /// Share by which the rate may differ from `--fs`.
 const OFF: f64 = 0.05;
 
-/// What the time of a line says.
+/// Content of the time of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Arrival {
     /// The next sample, after a number of missing ones that are to be bridged; `left_out` when the
@@ -101,9 +101,9 @@ impl Clock {
         }
     }
 
-    /// The rate of the times in Hz, where it is another than `--fs`: asked after each line, it answers
-    /// once in [`JUDGED`] lines. The median of the differences stands against single gaps, their
-    /// mean against times that are rounded; both have to be off.
+    /// The rate of the times in Hz, where it is another than `--fs`: asked after each line, it answers once in
+    /// [`JUDGED`] lines. The median of the differences is compared with single gaps, their mean against times that are
+    /// rounded; both have to be off.
     pub fn other_rate(&mut self) -> Option<f64> {
         if self.steps.len() < JUDGED {
             return None;
@@ -116,7 +116,7 @@ impl Clock {
         (is_off(median) && is_off(mean)).then_some(1.0 / median)
     }
 
-    /// True once when the lines have come faster than the sampling frequency says.
+    /// True once when the lines have come faster than the sampling frequency reports.
     pub fn hurried(&mut self) -> bool {
         std::mem::take(&mut self.hurried)
     }

@@ -25,14 +25,14 @@
 use hoid::model::{SampleTime, VerdictLevel, uncertainty::Estimate};
 use hoid::track::{Change, Live};
 
-use super::lines::Read;
+use super::lines::StreamSample;
 
 const MAGIC: &[u8; 4] = b"hoid";
 /// Bytes of a sample and of an estimate.
 const SAMPLE: usize = 40;
 const ESTIMATE: usize = 168;
 
-/// What a datagram is.
+/// Definition of a datagram.
 #[derive(Debug, PartialEq)]
 pub enum Datagram<'b> {
     Sample(SampleDatagram),
@@ -56,7 +56,7 @@ impl<'b> Datagram<'b> {
             return match rest.first_chunk::<{ SAMPLE - 4 }>() {
                 Some(all) if rest.len() == SAMPLE - 4 => Self::Sample(SampleDatagram::of(all)),
                 _ => Self::Unreadable(format!(
-                    "a datagram of {} bytes that begins as a sample, which has {SAMPLE}",
+                    "a datagram of {} bytes that starts as a sample, which has {SAMPLE}",
                     bytes.len()
                 )),
             };
@@ -87,12 +87,12 @@ impl SampleDatagram {
     }
 
     /// As a line would be read: a value with a fault is NaN.
-    pub fn read(&self, sample_time: SampleTime, largest: f64) -> Read {
+    pub fn read(&self, sample_time: SampleTime, largest: f64) -> StreamSample {
         let sound = |v: f64| v.abs() <= largest;
         let told = |name: &str, v: f64| (!sound(v)).then(|| format!("{name} is {v}"));
         let faults: Vec<String> = [told("e", self.e), told("u", self.u)].into_iter().flatten().collect();
         let value = |v: f64| if sound(v) { v } else { f64::NAN };
-        Read {
+        StreamSample {
             t: Some(if self.t.is_finite() {
                 self.t
             } else {

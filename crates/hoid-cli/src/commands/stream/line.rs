@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::json;
 
-/// Counts since the beginning.
+/// Counts since the start.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Counts {
     /// Samples, those with a fault and missing ones included.
@@ -15,11 +15,11 @@ pub struct Counts {
     pub samples: u64,
     /// Samples with a fault in e or u, missing ones included.
     pub skipped: u64,
-    /// Samples that the guard held back, or during which it let the estimate stand still.
+    /// Samples that the guard held back, or during which it let the estimate stay constant.
     pub held: u64,
-    /// How often the guard began the estimate again.
+    /// How often the guard started the estimate again.
     pub restarts: u64,
-    /// Of these, samples that were missing by the column t.
+    /// For these, samples that were missing by the column t.
     #[serde(skip)]
     pub bridged: u64,
     /// Steps that stability or a bound made shorter.
@@ -43,7 +43,7 @@ struct Line<'a> {
     change: Option<ChangeLine>,
     #[serde(flatten)]
     counts: Counts,
-    /// What the guard found since the last line, the last where there is more.
+    /// Last event of the guard since the last line.
     #[serde(skip_serializing_if = "Option::is_none")]
     event: Option<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -56,7 +56,7 @@ struct Line<'a> {
     warm_up: Option<WarmUp<'a>>,
 }
 
-/// What is known of a change: the odds at every line, the rest at the first line after one was
+/// Known properties of a change: the odds at every line, the rest at the first line after one was
 /// declared.
 #[derive(Serialize)]
 struct ChangeLine {
@@ -65,7 +65,7 @@ struct ChangeLine {
     declared: Option<Value>,
 }
 
-/// The rate at which a fast stream is tracked, and by how much the estimate is behind its line.
+/// The rate at which a fast stream is tracked, and by how much the estimate is after its line.
 #[derive(Serialize)]
 struct Rate {
     factor: usize,
@@ -120,8 +120,8 @@ impl From<&Estimate> for Number {
     }
 }
 
-/// Where the recursion stands after a line of the input.
-pub struct Standing<'a> {
+/// Where the recursion is after a line of the input.
+pub struct StreamStatus<'a> {
     /// Time of the last sample, s.
     pub t: Option<f64>,
     pub live: &'a Live,
@@ -131,21 +131,21 @@ pub struct Standing<'a> {
     /// The last change since the last line, with the time at which it was declared, s.
     pub change: Option<(Option<f64>, Change)>,
     pub counts: Counts,
-    /// What the guard found last since the last line.
+    /// Last event of the guard since the last line.
     pub event: Option<TrackFault>,
     /// Faults since the last line.
     pub fault: Option<String>,
     /// How the rate was lowered.
     pub decimated: Option<Decimated>,
-    /// What makes the whole stream doubtful.
+    /// Findings that make the whole stream doubtful.
     pub finding: Option<&'a Finding>,
 }
 
-impl Standing<'_> {
+impl StreamStatus<'_> {
     /// Writes the line into a buffer, its end included.
     ///
     /// # Errors
-    /// Those of the serialiser, which a buffer in memory does not have.
+    /// The errors of the serialiser, which a buffer in memory does not have.
     pub fn write(&self, buffer: &mut Vec<u8>) -> serde_json::Result<()> {
         let tracker: Option<&Tracker> = match self.live {
             Live::Tracking(tracker) => Some(tracker),

@@ -9,8 +9,8 @@ use serde_json::{Map, Value};
 
 use crate::error::CliError;
 
-/// Longest line that is looked at, bytes; of a longer one the rest is left out, so that memory
-/// stays bounded.
+/// Longest line that is examined, bytes; of a longer one the rest is left out, so that memory stays
+/// bounded.
 const LONGEST: usize = 1 << 16;
 /// Characters of a faulty cell that are shown.
 const SHOWN: usize = 24;
@@ -62,33 +62,33 @@ impl<R: BufRead> Lines<R> {
     }
 }
 
-/// What a line means.
+/// Meaning of a line.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Meaning {
+pub enum ParsedLine {
     /// Nothing: blank, a comment, a header.
     Nothing,
     /// A sample.
-    Sample(Read),
+    Sample(StreamSample),
     /// A line that cannot be taken for a sample of its own, with the reason.
     Unreadable(String),
 }
 
 /// A sample as read; a value with a fault is NaN.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Read {
+pub struct StreamSample {
     /// Time in s; `None` without a column t.
     pub t: Option<f64>,
     pub e: f64,
     pub u: f64,
     /// External signal, where there is a column f_t and it holds a number.
     pub reference: Option<f64>,
-    /// What is wrong with e or u.
+    /// Problems with e or u.
     pub fault: Option<String>,
 }
 
 /// Where the columns are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Places {
+struct ColumnPositions {
     count: usize,
     t: Option<usize>,
     e: Option<usize>,
@@ -103,7 +103,7 @@ pub struct Columns {
     output: String,
     with_input: bool,
     largest: f64,
-    places: Option<Places>,
+    places: Option<ColumnPositions>,
 }
 
 impl Columns {
@@ -127,14 +127,14 @@ impl Columns {
         self.places.is_some()
     }
 
-    /// What a line means.
+    /// Meaning of a line.
     ///
     /// # Errors
     /// [`CliError::Stream`] for a header without the columns.
-    pub fn read(&mut self, line: &str) -> Result<Meaning, CliError> {
+    pub fn read(&mut self, line: &str) -> Result<ParsedLine, CliError> {
         let line = line.trim_matches(['\r', ' ', '\u{feff}']);
         if line.trim().is_empty() && !line.contains('\t') || line.starts_with('#') {
-            return Ok(Meaning::Nothing);
+            return Ok(ParsedLine::Nothing);
         }
         if line.starts_with('{') {
             return Ok(self.object(line));
@@ -146,16 +146,16 @@ impl Columns {
             None => {
                 if is_header(&cells) {
                     self.places = Some(self.by_header(&cells)?);
-                    return Ok(Meaning::Nothing);
+                    return Ok(ParsedLine::Nothing);
                 }
                 match self.by_position(&cells) {
                     Some(places) => *self.places.insert(places),
-                    None => return Ok(Meaning::Unreadable(format!("no numbers: {}", shown(line)))),
+                    None => return Ok(ParsedLine::Unreadable(format!("no numbers: {}", shown(line)))),
                 }
             }
         };
         if cells.len() != places.count {
-            return Ok(Meaning::Unreadable(format!(
+            return Ok(ParsedLine::Unreadable(format!(
                 "{} cells, expected {}: {}",
                 cells.len(),
                 places.count,
@@ -172,32 +172,32 @@ impl Columns {
     }
 
     /// An object of JSON, by the names of the channels: `{"t": 0.01, "e": 0.5, "u": -1.0}`.
-    fn object(&self, line: &str) -> Meaning {
+    fn object(&self, line: &str) -> ParsedLine {
         let object: Map<String, Value> = match serde_json::from_str(line) {
             Ok(object) => object,
-            Err(error) => return Meaning::Unreadable(format!("no object of JSON ({error}): {}", shown(line))),
+            Err(error) => return ParsedLine::Unreadable(format!("no object of JSON ({error}): {}", shown(line))),
         };
         let of = |name: &str| object.get(name).map(number_of_json);
         let e = of(&self.input).filter(|_| self.with_input);
         match of(&self.output) {
             Some(u) if e.is_some() || !self.with_input => self.sample(of("t"), e, u, of("f_t")),
-            _ => Meaning::Unreadable(format!("an object without {}: {}", self.names(), shown(line))),
+            _ => ParsedLine::Unreadable(format!("an object without {}: {}", self.names(), shown(line))),
         }
     }
 
-    /// A sample of its numbers; those that are not there are `None`.
+    /// A sample of its numbers; those that do not exist are `None`.
     fn sample(
         &self,
         t: Option<Result<f64, Fault>>,
         e: Option<Result<f64, Fault>>,
         u: Result<f64, Fault>,
         reference: Option<Result<f64, Fault>>,
-    ) -> Meaning {
+    ) -> ParsedLine {
         let t = match t {
             None => None,
             Some(Ok(t)) if t.is_finite() => Some(t),
-            Some(Ok(t)) => return Meaning::Unreadable(format!("t is {t}")),
-            Some(Err(what)) => return Meaning::Unreadable(format!("t is {what}")),
+            Some(Ok(t)) => return ParsedLine::Unreadable(format!("t is {t}")),
+            Some(Err(what)) => return ParsedLine::Unreadable(format!("t is {what}")),
         };
         let mut faults = Vec::new();
         let mut value = |name: &str, number: Result<f64, Fault>| match number {
@@ -217,7 +217,7 @@ impl Columns {
         };
         let e = e.map_or(0.0, |e| value(&self.input, e));
         let u = value(&self.output, u);
-        Meaning::Sample(Read {
+        ParsedLine::Sample(StreamSample {
             t,
             e,
             u,
@@ -236,11 +236,11 @@ impl Columns {
         format!("{input}{}", self.output)
     }
 
-    fn by_header(&self, cells: &[&str]) -> Result<Places, CliError> {
+    fn by_header(&self, cells: &[&str]) -> Result<ColumnPositions, CliError> {
         let place = |name: &str| cells.iter().position(|c| *c == name);
         let e = place(&self.input);
         match (e, place(&self.output)) {
-            (e, Some(u)) if e.is_some() || !self.with_input => Ok(Places {
+            (e, Some(u)) if e.is_some() || !self.with_input => Ok(ColumnPositions {
                 count: cells.len(),
                 t: place("t"),
                 e: e.filter(|_| self.with_input),
@@ -251,13 +251,13 @@ impl Columns {
                 "the header has the columns {}, expected {}; choose by --input and --output{}",
                 cells.join(", "),
                 self.names(),
-                self.meant(cells, (e.is_none(), u.is_none()))
+                self.hint(cells, (e.is_none(), u.is_none()))
             ))),
         }
     }
 
-    /// ", as --input err --output stick" for what is missing and there by another name.
-    fn meant(&self, cells: &[&str], (no_input, no_output): (bool, bool)) -> String {
+    /// ", as --input err --output stick" for missing values and there by another name.
+    fn hint(&self, cells: &[&str], (no_input, no_output): (bool, bool)) -> String {
         let input = error_among(cells).filter(|_| no_input && self.with_input);
         let output = control_among(cells).filter(|_| no_output);
         let named = [("--input", input), ("--output", output)];
@@ -273,13 +273,13 @@ impl Columns {
     }
 
     /// `e,u`, `t,e,u` or `t,e,u,f_t`; without input `u` or `t,u`.
-    fn by_position(&self, cells: &[&str]) -> Option<Places> {
+    fn by_position(&self, cells: &[&str]) -> Option<ColumnPositions> {
         let readable = |c: &str| matches!(number(c), Ok(_) | Err(Fault::Missing));
         let any = cells.iter().any(|c| number(c).is_ok_and(f64::is_finite));
         if !any || !cells.iter().all(|c| readable(c)) {
             return None;
         }
-        let places = |t, e, u, reference| Places {
+        let places = |t, e, u, reference| ColumnPositions {
             count: cells.len(),
             t,
             e,
@@ -297,7 +297,7 @@ impl Columns {
     }
 }
 
-/// Why a cell is no number.
+/// Why a cell is not a number.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Fault {
     Missing,
@@ -361,21 +361,21 @@ fn is_header(cells: &[&str]) -> bool {
 mod tests {
     use super::*;
 
-    fn sample(columns: &mut Columns, line: &str) -> Read {
+    fn sample(columns: &mut Columns, line: &str) -> StreamSample {
         match columns.read(line).unwrap() {
-            Meaning::Sample(read) => read,
+            ParsedLine::Sample(read) => read,
             other => panic!("{line}: {other:?}"),
         }
     }
 
-    fn usual() -> Columns {
+    fn default_columns() -> Columns {
         Columns::new("e", "u", true, 1e6)
     }
 
     #[test]
     fn objects_by_the_names_of_the_channels() {
         let read = sample(
-            &mut usual(),
+            &mut default_columns(),
             r#"{"t": 2, "e": 0.5, "u": -1e0, "f_t": 7, "button": [1]}"#,
         );
         assert_eq!(
@@ -383,7 +383,7 @@ mod tests {
             (Some(2.0), 0.5, -1.0, Some(7.0))
         );
         assert!(read.fault.is_none());
-        // Cells beside objects, in any order.
+        // Cells next to objects, in any order.
         let mut columns = Columns::new("error", "stick", true, 10.0);
         let read = sample(&mut columns, r#"{"stick": "3", "error": null}"#);
         assert!(read.t.is_none() && read.e.is_nan() && read.u == 3.0 && !columns.are_known());
@@ -400,8 +400,8 @@ mod tests {
             ("{\"t\": null, \"e\": 1, \"u\": 1}", "t is missing"),
             ("{\"e\": 1e999, \"u\": 1}", "no object of JSON"),
         ] {
-            match usual().read(line).unwrap() {
-                Meaning::Unreadable(said) => assert!(said.contains(reason), "{line}: {said}"),
+            match default_columns().read(line).unwrap() {
+                ParsedLine::Unreadable(said) => assert!(said.contains(reason), "{line}: {said}"),
                 other => panic!("{line}: {other:?}"),
             }
         }
@@ -415,20 +415,20 @@ mod tests {
             ("2 ; 0.5; -1", Some(2.0), None),
             ("2\t.5\t-1e0\t7\r", Some(2.0), Some(7.0)),
         ] {
-            let read = sample(&mut usual(), line);
+            let read = sample(&mut default_columns(), line);
             assert_eq!((read.t, read.e, read.u, read.reference), (t, 0.5, -1.0, reference));
             assert!(read.fault.is_none());
         }
-        let mut columns = usual();
+        let mut columns = default_columns();
         for nothing in ["", "  ", "# a comment", "t,f_t,\"e\",u,x"] {
-            assert_eq!(columns.read(nothing).unwrap(), Meaning::Nothing);
+            assert_eq!(columns.read(nothing).unwrap(), ParsedLine::Nothing);
         }
         let read = sample(&mut columns, "1,2,3,4,abc");
         assert_eq!(
             (read.t, read.reference, read.e, read.u),
             (Some(1.0), Some(2.0), 3.0, 4.0)
         );
-        let message = |header: &str| usual().read(header).unwrap_err().to_string();
+        let message = |header: &str| default_columns().read(header).unwrap_err().to_string();
         assert!(message("t,y,z").ends_with("choose by --input and --output"));
         assert!(message("t,err,Stick [V]").ends_with("--output, as --input \"err\" --output \"Stick [V]\""));
         assert!(message("t,e,stick").ends_with("--output, as --output \"stick\""));
@@ -438,10 +438,10 @@ mod tests {
 
     #[test]
     fn faults_are_told_and_end_nothing() {
-        let mut columns = usual();
+        let mut columns = default_columns();
         for unreadable in ["garbage", "\u{0}\u{1}", ",", "1,2,3,4,5"] {
             assert!(
-                matches!(columns.read(unreadable).unwrap(), Meaning::Unreadable(_)),
+                matches!(columns.read(unreadable).unwrap(), ParsedLine::Unreadable(_)),
                 "{unreadable}"
             );
         }
@@ -459,7 +459,7 @@ mod tests {
             assert!(read.e.is_nan() || read.u.is_nan());
         }
         for unreadable in ["1", "1,2,3", "e,u,t", "t"] {
-            assert!(matches!(columns.read(unreadable).unwrap(), Meaning::Unreadable(_)));
+            assert!(matches!(columns.read(unreadable).unwrap(), ParsedLine::Unreadable(_)));
         }
     }
 

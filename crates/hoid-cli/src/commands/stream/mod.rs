@@ -1,10 +1,10 @@
-//! `hoid stream`: a recursive estimate, live. Each line of standard input that is no comment gives
-//! one line of JSON on standard output, flushed, whatever the line holds; or each datagram one
-//! datagram.
+//! `hoid stream`: a recursive estimate, live. Each line of standard input that is not a comment
+//! gives one line of JSON on standard output, flushed, whatever the line holds; or each datagram
+//! one datagram.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
-//! | `session` | the samples in their order, and where the recursion stands |
+//! | `session` | the samples in their order, and the state of the recursion |
 //! | `lines`, `clock` | what a line means, and its time |
 //! | `line` | one line of the output |
 //! | `datagram`, `udp` | binary samples and estimates; the socket |
@@ -48,14 +48,14 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
     let decimation = args.rate.of(asked.counts_samples());
     let decimator = match decimation.factor(sample_time) {
         1 => None,
-        // Of the output alone nothing is held.
+        // For the output alone nothing is held.
         factor => Some(Decimator::new(factor, sample_time, [true, false, false])?),
     };
     let tracked = decimator.as_ref().map_or(sample_time, Decimator::sample_time);
     let plan = plan_of(&asked, tracked)?;
     if plan.options().method.smooths() {
         return Err(CliError::Usage(
-            "--smooth belongs to hoid track: what is still to come cannot say anything of a stream".to_owned(),
+            "--smooth belongs to hoid track: a stream has no future samples".to_owned(),
         ));
     }
     if args.warm_up.is_some() && plan.options().method.starts_itself() {

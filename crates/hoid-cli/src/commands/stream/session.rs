@@ -1,4 +1,4 @@
-//! A stream: its samples in their order, and where the recursion stands.
+//! A stream: its samples in their order, and the state of the recursion.
 
 use std::collections::VecDeque;
 
@@ -10,13 +10,13 @@ use hoid::track::{Change, Live, LiveOutcome, Sample, TrackFault, TrackOptions, T
 use super::{
     clock::{Arrival, Clock, LONGEST_GAP_S},
     datagram::{Datagram, EstimateDatagram},
-    line::{Counts, Standing},
-    lines::{Columns, Meaning, Read, is_object},
+    line::{Counts, StreamStatus},
+    lines::{Columns, ParsedLine, StreamSample, is_object},
 };
 use crate::{args::StreamArgs, commands::reading, error::CliError, output, recursion, text};
 
 /// Length of the warm-up when none is typed, s.
-const USUAL_WARM_UP_S: f64 = 20.0;
+const DEFAULT_WARM_UP_S: f64 = 20.0;
 /// Faults that are kept for the next line.
 const FAULTS_TOLD: usize = 4;
 
@@ -29,9 +29,9 @@ pub struct Session {
     live: Live,
     /// Time between two samples of the stream.
     sample_time: SampleTime,
-    /// What lowers a high rate: error, control, target.
+    /// Decimator of error, control and target.
     decimator: Option<Decimator<3>>,
-    /// What e and u are multiplied by.
+    /// Factor of e and u.
     scale: (f64, f64),
     every: u64,
     /// Lines that count for `every`.
@@ -44,13 +44,13 @@ pub struct Session {
     innovation: Option<f64>,
     /// A change that no line has reported yet, and when it was declared, s.
     change: Option<(Option<f64>, Change)>,
-    /// What the guard found and no line has reported yet.
+    /// Events of the guard that no line has reported yet.
     event: Option<TrackFault>,
     names: Vec<String>,
     faults: VecDeque<String>,
-    /// That the times go at another rate has been said.
+    /// That the times go at another rate has been reported.
     rate_told: bool,
-    /// What they go at.
+    /// Rate of the time stamps.
     rate: Option<Finding>,
 }
 
@@ -61,7 +61,7 @@ impl Session {
         sample_time: SampleTime,
         decimator: Option<Decimator<3>>,
     ) -> Result<Self, CliError> {
-        let length_s = args.warm_up.unwrap_or(USUAL_WARM_UP_S);
+        let length_s = args.warm_up.unwrap_or(DEFAULT_WARM_UP_S);
         let tracked = decimator.as_ref().map_or(sample_time, Decimator::sample_time);
         let samples = (length_s / tracked.s()).round();
         if !(1.0..=1e7).contains(&samples) {
@@ -123,24 +123,24 @@ impl Session {
 
     /// Takes a line; true when the output has a line for it.
     pub fn take(&mut self, text: Result<String, String>) -> Result<bool, CliError> {
-        let meaning = match text {
+        let line = match text {
             Ok(text) => self.columns.read(&text)?,
-            Err(reason) => Meaning::Unreadable(reason),
+            Err(reason) => ParsedLine::Unreadable(reason),
         };
-        Ok(self.meant(meaning))
+        Ok(self.handle(line))
     }
 
-    /// Takes what a line means; true when the output has a line for it.
-    fn meant(&mut self, meaning: Meaning) -> bool {
+    /// Handles a parsed line; true if the output has a line for it.
+    fn handle(&mut self, line: ParsedLine) -> bool {
         self.forget_innovation();
-        match meaning {
-            Meaning::Nothing => return false,
-            Meaning::Sample(read) => self.timed(read),
-            // By its time the next line will tell whether a sample is missing.
-            Meaning::Unreadable(reason) if self.columns.have_time() || !self.columns.are_known() => {
+        match line {
+            ParsedLine::Nothing => return false,
+            ParsedLine::Sample(read) => self.timed(read),
+            // By its time the next line will show whether a sample is missing.
+            ParsedLine::Unreadable(reason) if self.columns.have_time() || !self.columns.are_known() => {
                 self.dropped(format!("{reason}: dropped"));
             }
-            Meaning::Unreadable(reason) => {
+            ParsedLine::Unreadable(reason) => {
                 self.fault(reason);
                 self.sample(f64::NAN, f64::NAN, None);
             }
@@ -149,11 +149,11 @@ impl Session {
         self.lines.is_multiple_of(self.every)
     }
 
-    /// Takes what came as a datagram, of which the samples that count for an answer are told one by
-    /// one. What is no sample is dropped: it may come from anybody.
+    /// Handles a datagram, of which the samples that count for an answer are reported one by one.
+    /// What is not a sample is dropped: it may come from anyone.
     ///
     /// # Errors
-    /// Those of the answers.
+    /// The errors of the answers.
     pub fn take_datagram(
         &mut self,
         bytes: &[u8],
@@ -176,10 +176,10 @@ impl Session {
                 };
                 for line in lines {
                     match self.columns.read(line) {
-                        Ok(Meaning::Unreadable(reason)) => self.dropped(format!("{reason}: dropped")),
+                        Ok(ParsedLine::Unreadable(reason)) => self.dropped(format!("{reason}: dropped")),
                         Err(error) => self.dropped(format!("{error}: dropped")),
-                        Ok(meaning) => {
-                            if self.meant(meaning) {
+                        Ok(line) => {
+                            if self.handle(line) {
                                 answer(self, None)?;
                             }
                         }
@@ -191,7 +191,7 @@ impl Session {
         Ok(())
     }
 
-    /// Where the recursion stands, as the answer to a binary sample.
+    /// State of the recursion, as the answer to a binary sample.
     pub fn estimate(&mut self, sequence: u32) -> EstimateDatagram {
         let answer = EstimateDatagram::new(sequence, self.t, &self.live, self.innovation, self.change.as_ref());
         self.change = None;
@@ -201,7 +201,7 @@ impl Session {
     }
 
     /// Takes a sample at its place in time.
-    fn timed(&mut self, read: Read) {
+    fn timed(&mut self, read: StreamSample) {
         if let Some(t) = read.t {
             self.has_time = true;
             match self.clock.take(t) {
@@ -231,8 +231,8 @@ impl Session {
         self.sample(self.scale.0 * read.e, self.scale.1 * read.u, read.reference);
     }
 
-    /// Says once that the times go at another rate than `--fs`; from there on every line carries the
-    /// finding.
+    /// Reports once that the times go at another rate than `--fs`; from there on every line carries
+    /// the finding.
     fn judge_rate(&mut self, t: f64) {
         let fs = 1.0 / self.sample_time.s();
         let (hurried, other) = (self.clock.hurried(), self.clock.other_rate());
@@ -243,7 +243,7 @@ impl Session {
         };
         if let Some(hz) = other.filter(|_| self.rate.is_none()) {
             let words = format!(
-                "up to t = {t} s the times go at {hz:.4} Hz and --fs says {fs} Hz: delay, lead and frequency of the estimate \
+                "up to t = {t} s the times go at {hz:.4} Hz and --fs reports {fs} Hz: delay, lead and frequency of the estimate \
                  are scaled by that; give the rate of the times to --fs, or correct t"
             );
             warn(&words);
@@ -276,7 +276,7 @@ impl Session {
             };
             let reference = Some(f_t).filter(|f| f.is_finite());
             (sample, tracked) = (Sample { e, u, reference }, decimator.sample_time());
-            behind_s = decimator.behind() as f64 * self.sample_time.s();
+            behind_s = decimator.lag_samples() as f64 * self.sample_time.s();
             self.innovation = None;
         }
         // The time that the recursion has come to.
@@ -320,7 +320,7 @@ impl Session {
     /// Writes the line of the output into a buffer.
     pub fn write(&mut self, buffer: &mut Vec<u8>) -> Result<(), CliError> {
         let fault = (!self.faults.is_empty()).then(|| self.faults.drain(..).collect::<Vec<_>>().join("; "));
-        let standing = Standing {
+        let standing = StreamStatus {
             t: self.t,
             live: &self.live,
             names: &self.names,
@@ -342,7 +342,7 @@ impl Session {
         if c.samples == 0 && c.dropped > 0 {
             return Err(CliError::NotDetermined(format!(
                 "no line of the stream was a sample, {} dropped; expected e,u or t,e,u with decimal points, or an object of JSON; \
-                 what was wrong stands in the lines of the output",
+                 what was wrong is in the lines of the output",
                 text::counted(c.dropped, "line")
             )));
         }
@@ -354,7 +354,7 @@ impl Session {
         }
     }
 
-    /// What there was, for the end.
+    /// Summary for the end.
     pub fn summary(&self) -> String {
         let c = self.counts;
         let mut text = format!(
@@ -367,7 +367,7 @@ impl Session {
         );
         if c.held > 0 || c.restarts > 0 {
             text.push_str(&format!(
-                " {} held back by the guard; the estimate was begun again {}.",
+                " {} held back by the guard; the estimate was started again {}.",
                 text::counted(c.held, "sample"),
                 text::counted(c.restarts, "time")
             ));
@@ -384,7 +384,7 @@ impl Session {
     }
 }
 
-/// What e and u are multiplied by.
+/// Factor of e and u.
 fn scale(args: &StreamArgs) -> Result<(f64, f64), CliError> {
     let mut all = reading::by_channel("--scale", &args.scale)?;
     let mut take = |name: &str| all.remove(name).map_or(1.0, |scaling| scaling.factor());

@@ -62,7 +62,7 @@ impl Udp {
         loop {
             match self.socket.recv(bytes) {
                 Ok(length) => return Ok(&bytes[..length]),
-                // An answer that nobody took is told here.
+                // An answer that no one took is reported here.
                 Err(error) if is_passing(&error) => {}
                 Err(error) => return Err(CliError::Stream(format!("the socket cannot be read: {error}"))),
             }

@@ -13,10 +13,10 @@ const ROWS_SHOWN: usize = 8;
 /// Coefficients that are printed where there is no operator.
 const COEFFICIENTS_SHOWN: usize = 6;
 
-/// A summary for people, and with `verbose` what is behind it.
+/// A summary for people, and with `verbose` the rest.
 ///
 /// # Errors
-/// Those of the quality of the start fit.
+/// The errors of the quality of the start fit.
 pub fn page(tracked: &Tracked, out: Option<&str>, verbose: bool) -> Result<String, CliError> {
     let mut page = text::verdict(&tracked.verdict);
     page.push_str(&rows_shown(tracked));
@@ -57,7 +57,7 @@ pub fn page(tracked: &Tracked, out: Option<&str>, verbose: bool) -> Result<Strin
     Ok(page)
 }
 
-/// What was tried, the start fit, settings.
+/// The candidates tried, the start fit, settings.
 fn details(tracked: &Tracked) -> Result<String, CliError> {
     let mut page = String::new();
     if let Some(choice) = &tracked.choice {
@@ -122,7 +122,7 @@ fn rows_shown(tracked: &Tracked) -> String {
     } else {
         header.extend(trace.parameter_names().into_iter().take(COEFFICIENTS_SHOWN));
     }
-    let mut rows = text::table(&header.iter().map(String::as_str).collect::<Vec<_>>()).in_course();
+    let mut rows = text::table(&header.iter().map(String::as_str).collect::<Vec<_>>()).as_time_series();
     for row in picked {
         let mut cells = vec![format!("{:.2}", trace.times_s()[row])];
         if with_operator {
@@ -219,7 +219,7 @@ fn counts(tracked: &Tracked) -> String {
     );
     if c.held > 0 || c.restarts > 0 {
         text.push_str(&format!(
-            "{} held back by the guard; the estimate was begun again {}.\n",
+            "{} held back by the guard; the estimate was started again {}.\n",
             text::counted(c.held, "sample"),
             text::counted(c.restarts, "time")
         ));

@@ -8,7 +8,7 @@ use serde_json::Value;
 use super::{page, report};
 use crate::{
     args::TrackArgs,
-    commands::{figure, paper_table, places, reading},
+    commands::{figure, output_paths, paper_table, reading},
     error::CliError,
     json, output, recursion,
 };
@@ -39,7 +39,7 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     .flatten()
     .collect();
     paper_table::check(&args.show)?;
-    places::check(
+    output_paths::check(
         &inputs,
         &[
             args.out.as_deref(),

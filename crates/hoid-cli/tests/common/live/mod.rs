@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `udp` | a stream over UDP and the socket of who asks it |
 //! | `paced` | samples at a rate, and how long their answers take |
-//! | `troubles` | readers that stop, either side begun again, clocks that jump, hostile datagrams |
+//! | `troubles` | readers that stop, either side started again, clocks that jump, hostile datagrams |
 
 #[path = "../draw.rs"]
 mod draw;
@@ -19,13 +19,13 @@ use std::{
 
 pub use draw::Draw;
 
-/// e and u at t: sinusoids, and what they have besides.
+/// e and u at t: sinusoids, and what they have in addition.
 pub fn sample(t_s: f64, draw: &mut Draw) -> (f64, f64) {
     let waves = |at: f64| (0.9 * at).sin() + 0.5 * (2.3 * at).sin() + 0.2 * (7.1 * at).sin();
     (waves(t_s), 0.1 * waves(t_s - 0.3) + 0.05 * (2.0 * draw.share() - 1.0))
 }
 
-/// What a stream says of itself at its end.
+/// Self-description of a stream at its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Summary {
     pub samples: usize,
@@ -65,7 +65,7 @@ pub fn signal(child: &Child, name: &str) {
     assert!(Command::new("kill").args([name, &id]).status().unwrap().success());
 }
 
-/// What a program that ends still says; it ends well.
+/// Report of a program that ends still; it ends well.
 pub fn last_words(child: &mut Child, said: &mut BufReader<ChildStderr>) -> String {
     let mut words = String::new();
     said.read_to_string(&mut words).unwrap();

@@ -1,8 +1,8 @@
 //! Samples at a rate, and how long their answers take.
 //!
-//! Each sample is sent at its time, whether or not the last one was answered. What is told is the time from
-//! the call that sends it to the return of the call that has its answer: both ways through the system, the
-//! estimate between, and what else the machine did.
+//! Each sample is sent at its time, whether or not the last one was answered. What is reported is the time from the
+//! call that sends it to the return of the call that has its answer: both ways through the system, the estimate
+//! between, and what else the machine did.
 
 use std::{
     io::{BufRead, BufReader, Write},
@@ -25,7 +25,7 @@ const SILENCE: Duration = Duration::from_secs(5);
 pub struct Tally {
     pub sent: usize,
     pub trips: Vec<Duration>,
-    /// What the stream says of them.
+    /// Report of the stream on them.
     pub summary: Summary,
 }
 

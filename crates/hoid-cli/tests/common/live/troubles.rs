@@ -1,5 +1,5 @@
-//! Readers that stop, either side begun again, clocks that jump, hostile datagrams: nothing crashes, and what was lost
-//! is counted. Each returns samples sent, answers, and what the stream says.
+//! Readers that stop, either side started again, clocks that jump, hostile datagrams: nothing crashes, and what was
+//! lost is counted. Each returns samples sent, answers, and what the stream reports.
 
 use std::{net::UdpSocket, path::Path, time::Duration};
 
@@ -84,7 +84,7 @@ fn until_answered(stream: &Stream, sent: usize, mut send: impl FnMut(usize)) -> 
     }
 }
 
-/// Answers that nobody takes are lost, samples are not.
+/// Answers that no one takes are lost, samples are not.
 pub fn reader_of_udp_stops(program: &Path, pause: Duration, draw: &mut Draw) -> Outcome {
     let stream = Stream::new(program, RATE, &[]);
     let mut send = |k: usize| {
@@ -101,7 +101,7 @@ pub fn reader_of_udp_stops(program: &Path, pause: Duration, draw: &mut Draw) -> 
     outcome
 }
 
-/// Samples that the system lost while the stream stood still are found by their sequence.
+/// Samples that the system lost while the stream stayed constant are found by their sequence.
 pub fn stream_stops(program: &Path, pause: Duration, draw: &mut Draw) -> Outcome {
     let stream = Stream::new(program, RATE, &[]);
     let mut send = |k: usize| {
@@ -115,14 +115,14 @@ pub fn stream_stops(program: &Path, pause: Duration, draw: &mut Draw) -> Outcome
     paced(RATE, n, |k| send(k + 1));
     signal(&stream.child, "-CONT");
     let (sent, answered) = until_answered(&stream, n + 1, send);
-    let outcome = outcome("the stream stands still", sent, answered + 1, stream);
+    let outcome = outcome("the stream stays constant", sent, answered + 1, stream);
     let summary = outcome.summary;
     assert_eq!((summary.samples, summary.dropped), (sent, 0));
     assert!(outcome.answered <= sent - summary.missing);
     outcome
 }
 
-/// A sender that comes back with its sequence at zero is believed after ten samples.
+/// A sender that comes back with its sequence at zero is trusted after ten samples.
 pub fn sender_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
     let mut stream = Stream::new(program, SLOW, &[]);
     let ask = |stream: &Stream, draw: &mut Draw| {
@@ -140,12 +140,12 @@ pub fn sender_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
     stream.socket.connect(("127.0.0.1", stream.port)).unwrap();
     stream.socket.set_read_timeout(Some(PATIENCE)).unwrap();
     ask(&stream, draw);
-    let outcome = outcome("the sender begins again", 400, 400, stream);
+    let outcome = outcome("the sender starts again", 400, 400, stream);
     assert_eq!((outcome.summary.dropped, outcome.summary.missing), (9, 9));
     outcome
 }
 
-/// A stream that was killed and begun again answers from its first sample on; what was sent meanwhile is lost.
+/// A stream that was killed and started again answers from its first sample on; what was sent meanwhile is lost.
 pub fn stream_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
     let stream = Stream::new(program, SLOW, &[]);
     let datagram = |k: u32, draw: &mut Draw| {
@@ -159,23 +159,23 @@ pub fn stream_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
     let (port, socket) = stream.killed();
     let mut refused = 0;
     for k in 100..150 {
-        // The system tells at the next call that nobody listens.
+        // The system reports at the next call that no one listens.
         refused += usize::from(socket.send(&datagram(k, draw)).is_err());
     }
     assert!(refused > 0);
-    // What the system still has to tell of it.
+    // What the system still has to report it.
     let _ = socket.take_error();
     let stream = Stream::at(program, SLOW, port, socket, &[]);
     for k in 150..250 {
         stream.send(&datagram(k, draw));
         assert_eq!(stream.estimate().0, k);
     }
-    let outcome = outcome("the stream is killed and begins again", 250, 200, stream);
+    let outcome = outcome("the stream is killed and starts again", 250, 200, stream);
     assert_eq!((outcome.summary.samples, outcome.summary.skipped), (100, 0));
     outcome
 }
 
-/// Times that jump forth are a gap, those that jump back are believed after ten samples.
+/// Times that jump forth are a gap, those that jump back are trusted after ten samples.
 pub fn clock_jumps(program: &Path, draw: &mut Draw) -> Outcome {
     let stream = Stream::new(program, SLOW, &[]);
     let mut sequence = 0;
@@ -193,7 +193,7 @@ pub fn clock_jumps(program: &Path, draw: &mut Draw) -> Outcome {
     outcome
 }
 
-/// Datagrams that are no samples, between those that are.
+/// Datagrams that are not samples, between those that are.
 pub fn hostile_datagrams(program: &Path, hostile: usize, draw: &mut Draw) -> Outcome {
     let stream = Stream::new(program, SLOW, &[]);
     let mut sent = 0;
@@ -217,7 +217,7 @@ fn no_sample(draw: &mut Draw) -> Vec<u8> {
     let any: Vec<u8> = (0..length).map(|_| draw.bits() as u8).collect();
     let text: String = any.iter().map(|byte| char::from(b'a' + byte % 26)).collect();
     match draw.below(6) {
-        // No text begins so.
+        // No text starts so.
         0 => [&[0xff], any.as_slice()].concat(),
         1 => {
             let mut whole = as_struct(7, f64::NAN, 0.1, 0.1);

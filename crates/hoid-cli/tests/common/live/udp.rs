@@ -44,7 +44,7 @@ impl Stream {
             .spawn()
             .unwrap();
         let mut said = BufReader::new(child.stderr.take().unwrap());
-        // Where the system has chosen the port, it is said.
+        // Where the system has chosen the port, it is reported.
         let port = loop {
             let mut line = String::new();
             assert!(said.read_line(&mut line).unwrap() > 0, "the stream has ended");
@@ -85,13 +85,13 @@ impl Stream {
         (word(4), std::array::from_fn(number), word(160).cast_signed(), word(164))
     }
 
-    /// Interrupts the stream; what it has said.
+    /// Interrupts the stream; what it has reported.
     pub fn end(mut self) -> String {
         signal(&self.child, "-INT");
         last_words(&mut self.child, &mut self.said)
     }
 
-    /// Ends the stream without a word; its port and the socket.
+    /// Ends the stream silently; its port and the socket.
     pub fn killed(mut self) -> (u16, UdpSocket) {
         self.child.kill().unwrap();
         self.child.wait().unwrap();
@@ -99,7 +99,7 @@ impl Stream {
     }
 }
 
-/// A sample as a struct; t is NaN where the sequence is to tell it.
+/// A sample as a struct; t is NaN if the sequence determines it.
 pub fn as_struct(sequence: u32, t: f64, e: f64, u: f64) -> Vec<u8> {
     let mut bytes = b"hoid".to_vec();
     bytes.extend_from_slice(&sequence.to_le_bytes());

@@ -77,7 +77,7 @@ fn weights_are_those_of_the_regressors() {
     let r = basis.regressors(&z);
     let expected: f64 = (0..GAINS)
         .map(|i| {
-            let corrected: f64 = (0..HELD).map(|j| state[4 + j] * r.by[j][i]).sum();
+            let corrected: f64 = (0..DYNAMICS).map(|j| state[4 + j] * r.by[j][i]).sum();
             state[i] * (r.x[i] + corrected)
         })
         .sum();

@@ -23,7 +23,7 @@ const ORDERS: Orders = Orders {
 };
 const SYSTEM: [f64; 4] = [-1.5, 0.7, 1.0, 0.5];
 
-/// Output of the system in the middle of its life: nothing is at rest when the record begins.
+/// Output of the system in the middle of its life: nothing is at rest when the record starts.
 fn record() -> (Vec<f64>, Vec<f64>) {
     let x = white(600);
     let mut u = vec![0.0; 600];

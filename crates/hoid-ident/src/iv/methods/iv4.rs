@@ -3,7 +3,7 @@
 //!
 //! 1. Least squares of `A u = B q^-nk e + v`.
 //! 2. Instruments simulated with that A and B; first IV estimate.
-//! 3. Autoregression `L v = eps` of what is left.
+//! 3. Autoregression `L v = eps` of the residual.
 //! 4. Instruments simulated with the second A and B; IV estimate of the equation filtered with L.
 //!
 //! Consistent whatever v is; of the smallest variance where L makes v white. In the closed-loop
@@ -36,9 +36,12 @@ const ORDERS: usize = 4;
 const ROWS_EACH: usize = 10;
 
 fn solve(problem: &IvProblem<'_>, _: &Criterion<'_>, _: IterationLimits) -> Result<IvSolution, IdentError> {
+    // Step 1: biased by the coloured v, but correlated with the true output, which is all that instruments need.
     let (start, _) = problem.stabilised(&problem.least_squares(Prefilter::default())?)?;
+    // Step 2.
     let second = problem.equation(Prefilter::default(), &start);
     let system = problem.solve(&second)?;
+    // Step 3: L whitens v, for the smallest variance (Ljung 1999, eq. 15.24).
     let rows = problem.rows(0);
     let shortest = rows.iter().min().copied().unwrap_or(0);
     let order = (ORDERS * (problem.poles + problem.nb)).min(shortest / ROWS_EACH);
@@ -47,6 +50,7 @@ fn solve(problem: &IvProblem<'_>, _: &Criterion<'_>, _: IterationLimits) -> Resu
         d: &whitening,
         ..Prefilter::default()
     };
+    // Step 4.
     let (stable, _) = problem.stabilised(&system)?;
     let last = problem.equation(filter, &stable);
     let theta = problem.solve(&last)?;

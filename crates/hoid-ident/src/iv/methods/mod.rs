@@ -1,4 +1,4 @@
-//! The methods of instrumental variables. A new one is a file beside these with its [`Algorithm`],
+//! The methods of instrumental variables. A new one is a file next to these with its [`Algorithm`],
 //! its `mod` line and its line in the list below.
 
 mod iv4;
@@ -49,7 +49,7 @@ impl IvMethod {
         self.algorithm().name
     }
 
-    /// What it is, in a line without a full stop.
+    /// Its definition, in a line without a full stop.
     pub fn help(self) -> &'static str {
         self.algorithm().help
     }

@@ -76,6 +76,7 @@ fn noise_of(
     let (poles, b) = system.split_at(problem.poles);
     let left = simulation_error(&[b, poles].concat(), criterion);
     let (c, d) = noise_model(&left, nc, nd);
+    // An autoregression is linear least squares; with C the ARMA model needs a search.
     if nc == 0 {
         return NoiseModel { c, d };
     }
@@ -92,6 +93,8 @@ fn noise_of(
         weights: None,
         further: Vec::new(),
     };
+    // From the noise model of the iteration before: the search then stays at the same minimum, without which the
+    // iteration would not settle.
     let start = before.map_or_else(|| [d.as_slice(), &c].concat(), |n| [n.d.as_slice(), &n.c].concat());
     match minimise(
         &arma,

@@ -20,7 +20,7 @@ fn leading(columns: &[Vec<f64>]) -> Vec<Lagged<'_>> {
         .collect()
 }
 
-/// The product as it is defined: partial sums in turn, added in this order, then what lies behind
+/// The product as it is defined: partial sums in turn, added in this order, then what lies after
 /// the last whole block.
 fn in_partial_sums(x: &[f64], y: &[f64], count: usize) -> f64 {
     let mut sums = [0.0; 8];

@@ -1,7 +1,7 @@
 //! Products of eps and the columns of psi, for a record in each lane.
 //!
 //! A column that is the one before it, a sample later, needs no pass of its own:
-//! `sum x(t-1) y(t-1)` over a span is `sum x(t) y(t)` but for the samples at both ends, as in
+//! `sum x(t-1) y(t-1)` over a span is `sum x(t) y(t)` except for the samples at both ends, as in
 //! [`crate::linalg::products`].
 
 use hoid_lanes::Number;

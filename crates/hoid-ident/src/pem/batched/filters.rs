@@ -154,7 +154,7 @@ pub(super) fn filter_response<R: Number>(zero: R, [d, f]: [&[f64]; 2], r: &mut [
     whiten(zero, d, r, x_f, at);
 }
 
-/// `y = x/F` from place `at` on, where y goes on from what stands before.
+/// `y = x/F` from place `at` on, where y continues from what is before.
 #[inline(always)]
 fn divide<R: Number>(zero: R, f: &[f64], x: &[f64], y: &mut [f64], at: usize) {
     y[at..at + x.len()].copy_from_slice(x);
@@ -162,7 +162,7 @@ fn divide<R: Number>(zero: R, f: &[f64], x: &[f64], y: &mut [f64], at: usize) {
     divide_again(zero, f, &mut y[..end], at);
 }
 
-/// `y <- y/F` from place `at` on; before it stands what was divided already.
+/// `y <- y/F` from place `at` on; before it is what was divided already.
 #[inline(always)]
 fn divide_again<R: Number>(zero: R, f: &[f64], y: &mut [f64], at: usize) {
     let width = zero.lanes();
@@ -210,7 +210,7 @@ pub(super) fn whiten<R: Number>(zero: R, d: &[f64], x: &[f64], y: &mut [f64], at
     }
 }
 
-/// `y = D x` of order N in one pass; x begins N rows before y.
+/// `y = D x` of order N in one pass; x starts N rows before y.
 #[inline(always)]
 fn whiten_by<R: Number, const N: usize>(zero: R, d: &[f64], x: &[f64], y: &mut [f64]) {
     let width = zero.lanes();

@@ -67,7 +67,7 @@ pub(crate) fn fit_each(
     )
 }
 
-/// What the averages of each record propose.
+/// Poles proposed by the averages of each record.
 fn poles_of_averages(
     constrained: &[Result<(ConstrainedCriterion<'_, '_>, SampleTime), &IdentError>],
     path: InstructionSet,

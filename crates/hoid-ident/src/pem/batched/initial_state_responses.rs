@@ -1,5 +1,5 @@
-//! The responses to the initial states of 1/F, of a record in each lane, and what is best said of
-//! the states.
+//! The responses to the initial states of 1/F, of a record in each lane, and what is best reported
+//! of the states.
 //!
 //! With h the impulse response of 1/F and g that of D/F, a state that enters w k samples after its
 //! first value adds `x_k h(t-k)` to w and takes `x_k g(t-k)` from the residuals. The columns
@@ -7,8 +7,8 @@
 //! twice, as once leaves what rounding makes of columns that are nearly parallel (Y. Yamamoto et
 //! al., *Electronic Trans. Numerical Analysis* 44 (2015) 306-326). As they are shifts of one, the
 //! first matrix takes nf products. The criterion alone has an orthonormal basis by Gram and Schmidt
-//! ([`crate::criterion::initial_state_responses`]), the same but for rounding; a lane whose columns
-//! depend on each other is left to it.
+//! ([`crate::criterion::initial_state_responses`]), the same except for rounding; a lane whose
+//! columns depend on each other is left to it.
 
 use hoid_lanes::Number;
 
@@ -20,13 +20,13 @@ use super::{
 
 /// Samples of an impulse response between two looks at whether it has died away.
 const LOOK: usize = 128;
-/// Size of the last values of a response that has died away; it began with 1.
+/// Size of the last values of a response that has died away; it started with 1.
 const NOTHING: f64 = 1e-17;
 /// Share of a column's square that must not lie in the space of those before it.
 const OWN: f64 = 1e-12;
 
-/// The responses: h and g stand in [`SignalBuffers::h`] and [`SignalBuffers::g`] with nf zeros
-/// before and behind, the orthogonal columns q in [`SignalBuffers::q`].
+/// The responses: h and g are in [`SignalBuffers::h`] and [`SignalBuffers::g`] with nf zeros before
+/// and after, the orthogonal columns q in [`SignalBuffers::q`].
 pub(super) struct InitialStateResponses<R> {
     /// Rows of a column, from the first residual on.
     pub rows: usize,
@@ -41,7 +41,7 @@ pub(super) struct InitialStateResponses<R> {
 }
 
 impl<R: Number> InitialStateResponses<R> {
-    /// Those of so many residuals.
+    /// The entries of a given number of residuals.
     #[inline(always)]
     pub fn of(
         zero: R,
@@ -148,7 +148,7 @@ impl<R: Number> InitialStateResponses<R> {
         &signals.q[k * self.rows * width..(k + 1) * self.rows * width]
     }
 
-    /// Takes the best initial states into w (in the place of r), v and eps: w begins in row
+    /// Takes the best initial states into w (in the place of r), v and eps: w starts in row
     /// `regressed` of the span, the residuals in row `counted`.
     #[inline(always)]
     pub fn eliminate(&self, zero: R, signals: &mut SignalBuffers, regressed: usize, counted: usize) {
@@ -272,7 +272,7 @@ fn add_shifts<R: Number>(zero: R, x: &[R], s: &[f64], at: usize, y: &mut [f64]) 
 }
 
 /// Impulse response of 1/F until it has died away in all lanes or `longest` is reached, with nf
-/// zeros before and behind; zero in a lane in which it has died away before. Returns its length.
+/// zeros before and after; zero in a lane in which it has died away before. Returns its length.
 #[inline(always)]
 fn impulse_response<R: Number>(zero: R, f: &[f64], longest: usize, h: &mut [f64]) -> usize {
     let (width, nf) = (zero.lanes(), f.len() / zero.lanes());

@@ -47,7 +47,7 @@ thread_local! {
     static LEFT: Cell<Option<Memory>> = const { Cell::new(None) };
 }
 
-/// Most numbers of a signal that are kept.
+/// Largest number of numbers of a signal that are kept.
 const KEPT: usize = 1 << 18;
 
 impl Drop for Lanes {
@@ -142,7 +142,7 @@ impl Lanes {
         }
     }
 
-    /// What a pass has found in a lane.
+    /// Result of a pass in a lane.
     pub fn linearisation(&self, lane: usize) -> Linearisation {
         let o = &self.orders;
         let p = o.parameters();

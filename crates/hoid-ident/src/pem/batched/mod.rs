@@ -7,7 +7,7 @@
 //! way. What needs more than the criterion (the border of stability, starts where the averages do
 //! not suffice, dependent responses to the initial states) is done alone.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `fits` | the fit of each record |
 //! | `lanes` | which record is in which lane, and where it is to be linearised |

@@ -1,4 +1,4 @@
-//! What a pass finds: the normal equations of the record in each lane.
+//! Result of a pass: the normal equations of the record in each lane.
 
 /// Sums over one record in each lane.
 #[derive(Debug, Default)]

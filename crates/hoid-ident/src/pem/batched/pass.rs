@@ -7,8 +7,8 @@
 //!
 //! The columns of psi are shifts of `x_b`, `-v` and `-x_f`. A recursion over t waits for its own
 //! last value, and eight records fill the waiting time. All signals of some samples are made and
-//! multiplied before the next samples are begun, so that they stay in the nearest memory; only the
-//! record itself is read from further away. The first of these spans reaches as far as the free
+//! multiplied before the next samples are started, so that they stay in the nearest memory; only
+//! the record itself is read from further away. The first of these spans reaches as far as the free
 //! responses do, because the initial states must be known before w is filtered again.
 //!
 //! Every operation acts on each lane alone, and what one lane needs longer than another is zero

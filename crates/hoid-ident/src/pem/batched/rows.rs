@@ -1,4 +1,4 @@
-//! Rows of numbers, one for each lane, that begin at the border of a line of the nearest memory.
+//! Rows of numbers, one for each lane, that start at the border of a line of the nearest memory.
 
 use std::ops::{Deref, DerefMut};
 
@@ -14,7 +14,7 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    /// Room for so many numbers, whose values are whatever was there.
+    /// Room for a given number of numbers, whose values are whatever was there.
     pub fn make_room(&mut self, count: usize) {
         let spare = LINE / size_of::<f64>();
         if self.all.len() < count + spare {

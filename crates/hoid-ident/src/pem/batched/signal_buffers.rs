@@ -20,7 +20,7 @@ pub(super) struct SignalBuffers {
 }
 
 impl SignalBuffers {
-    /// Makes room for spans of so many samples, with zeros before the first.
+    /// Makes room for spans of a given number of samples, with zeros before the first.
     pub fn begin(&mut self, history: usize, longest: usize, width: usize) {
         for signal in [
             &mut self.s,

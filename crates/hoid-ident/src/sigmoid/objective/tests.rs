@@ -115,7 +115,7 @@ fn columns_are_the_derivatives_of_the_residuals_up_to_the_initial_states() {
         // Kaufman's approximation leaves out a term of the size of the residual's share in the
         // moved basis.
         assert!(error < 0.05 * size, "parameter {i}: {error} of {size}");
-        // Behind the initial transient nothing is left out.
+        // After the initial transient nothing is left out.
         let late = |x: &[f64]| dot(&x[800..], &x[800..]).sqrt();
         assert!(late(&apart) < 1e-5 * size, "parameter {i}: {} of {size}", late(&apart));
     }

@@ -1,8 +1,8 @@
 //! Arrays as columns.
 //!
-//! An array with one long side is a column. Of a matrix, time runs along the longer side, and each
+//! An array with one long side is a column. For a matrix, time runs along the longer side, and each
 //! line along it is a column with a path of its own: `x(:,2)` or `x(2,:)` in MATLAB's words,
-//! counted from 1, `x[:,1]` or `x[1,:]` in Python's, counted from 0. Of a square one the first
+//! counted from 1, `x[:,1]` or `x[1,:]` in Python's, counted from 0. For a square one the first
 //! index is time.
 
 use super::contents::{Contents, Entry, Indexing, OBJECT, Value};
@@ -17,13 +17,13 @@ const MOST_LINES: usize = 256;
 #[derive(Debug, Clone)]
 pub(crate) struct ColumnPath {
     pub(crate) path: String,
-    /// The structure that it stands in; empty at top level.
+    /// The structure that it is in; empty at top level.
     pub(crate) parent: String,
     pub(crate) unit: String,
     pub(crate) holds: Holds,
 }
 
-/// What a column holds.
+/// Contents of a column.
 #[derive(Debug, Clone)]
 pub(crate) enum Holds {
     Numbers(Numbers),
@@ -59,7 +59,7 @@ impl ColumnPath {
         }
     }
 
-    /// Why it is no column of numbers.
+    /// Why it is not a column of numbers.
     pub(super) fn refused(&self, file: &str) -> IoError {
         IoError::Unsupported {
             file: file.to_owned(),
@@ -73,7 +73,7 @@ impl ColumnPath {
         matches!(&self.holds, Holds::Unread(what) if what.starts_with(OBJECT))
     }
 
-    /// What it holds, in words.
+    /// Contents of it, as text.
     pub(crate) fn what(&self) -> String {
         match &self.holds {
             Holds::Numbers(numbers) => numbers.kind().name().to_owned(),

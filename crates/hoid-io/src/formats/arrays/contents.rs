@@ -1,4 +1,4 @@
-//! What stands in a file of named arrays: paths, each with a value.
+//! Contents of a file of named arrays: paths, each with a value.
 
 use super::array::Array;
 
@@ -12,15 +12,15 @@ pub(crate) enum Indexing {
 /// The name under which comments are kept as text.
 pub(crate) const COMMENTS: &str = "hoid_comments";
 
-/// How the words on an object of MATLAB begin.
+/// How the words on an object of MATLAB start.
 pub(crate) const OBJECT: &str = "an object of the class";
 
-/// What stands under a path.
+/// Contents of a path.
 #[derive(Debug, Clone)]
 pub(crate) enum Value {
     Array(Array),
     Texts(Vec<String>),
-    /// What is not read, in words.
+    /// Unsupported content, as text.
     Unread(String),
 }
 
@@ -29,7 +29,7 @@ pub(crate) enum Value {
 pub(crate) struct Entry {
     /// Such as `e`, `data.run(3).e` or `c{2}`.
     pub(crate) path: String,
-    /// The structure that it stands in, such as `data.run(3)`; empty at top level.
+    /// The structure that it is in, such as `data.run(3)`; empty at top level.
     pub(crate) parent: String,
     pub(crate) value: Value,
     /// Unit; empty when unknown.
@@ -61,18 +61,18 @@ impl Entry {
     }
 }
 
-/// What stands in a file.
+/// Contents of a file.
 #[derive(Debug)]
 pub(crate) struct Contents {
     pub(crate) entries: Vec<Entry>,
-    /// The lines that hoid wrote beside the columns.
+    /// The lines that hoid wrote next to the columns.
     pub(crate) comments: Vec<String>,
-    /// What to know about how it was read.
+    /// Notes on reading.
     pub(crate) notes: Vec<String>,
     /// How the lines of a matrix are named.
     pub(crate) indexing: Indexing,
     /// Whether each structure holds times of its own on one common clock, so that its columns can
-    /// be put beside those of another.
+    /// be put next to those of another.
     pub(crate) own_clocks: bool,
 }
 

@@ -2,13 +2,13 @@
 //! a text or something that is not read; records and tables are made of it here, the same way for
 //! all of them.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `numbers` | [`Numbers`]: bytes with a type |
 //! | `array` | [`Array`]: numbers with dimensions |
-//! | `contents` | [`Contents`]: what stands in a file |
+//! | `contents` | [`Contents`]: what is in a file |
 //! | `column_path` | [`ColumnPath`]: arrays as columns, matrices line by line |
-//! | `selection` | [`table_of`]: the columns of a record, and those beside them |
+//! | `selection` | [`table_of`]: the columns of a record, and those next to them |
 //! | `clocks` | columns at the times of another |
 //! | `results` | [`output_table_of`]: all columns, as a table of results |
 

@@ -1,5 +1,5 @@
-//! Numbers as they stand in a file: bytes, a type, and where each begins. They become `f64` when
-//! they are asked for.
+//! Numbers as they are in a file: bytes, a type, and where each starts. They become `f64` when they
+//! are requested.
 
 use std::rc::Rc;
 
@@ -72,7 +72,7 @@ pub(crate) struct Numbers {
 }
 
 impl Numbers {
-    /// The numbers that fill the bytes; a rest shorter than one is not looked at.
+    /// The numbers that fill the bytes; a rest shorter than one is not examined.
     pub(crate) fn new(bytes: Vec<u8>, kind: Kind, big_endian: bool) -> Self {
         let len = bytes.len() / kind.size();
         Self {
@@ -85,7 +85,7 @@ impl Numbers {
         }
     }
 
-    /// One number out of each item of `item` bytes, `offset` bytes from its beginning.
+    /// One number out of each item of `item` bytes, `offset` bytes from its start.
     pub(crate) fn field(bytes: &Rc<Vec<u8>>, kind: Kind, big_endian: bool, offset: usize, item: usize) -> Self {
         let fits = item > 0 && offset + kind.size() <= item;
         Self {
@@ -111,7 +111,7 @@ impl Numbers {
         self.kind
     }
 
-    /// Each `stride`-th number from `first` on, `len` of them; those that are not there are left
+    /// Each `stride`-th number from `first` on, `len` of them; those that do not exist are left
     /// away.
     pub(crate) fn line(&self, first: usize, stride: usize, len: usize) -> Self {
         let there = if first >= self.len {
@@ -127,7 +127,7 @@ impl Numbers {
         }
     }
 
-    /// The number at a place; NaN where there is none.
+    /// The number at a place; NaN if there is none.
     pub(crate) fn value(&self, at: usize) -> f64 {
         let Some(bytes) = self.bytes_of(at) else {
             return f64::NAN;
@@ -169,7 +169,7 @@ impl Numbers {
         (0..self.len).map(count).collect()
     }
 
-    /// The bytes of a number, the little end first, with zeros behind.
+    /// The bytes of a number, the little end first, followed by zeros.
     fn bytes_of(&self, at: usize) -> Option<[u8; 8]> {
         let size = self.kind.size();
         let from = self.start + at * self.step;

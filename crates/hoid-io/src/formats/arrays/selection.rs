@@ -2,7 +2,7 @@
 //!
 //! A name is a path (`data.run(3).e`), or its end where only one path ends so (`run(3).e`, or `e`);
 //! a path that is the name wins. `run(1).e` also finds the only element `run.e`. The time is `t`,
-//! or `time`, beside the output or in the next structure around it. The other arrays beside the
+//! or `time`, next to the output or in the next structure around it. The other arrays next to the
 //! output become channels where they are as long.
 
 use std::ops::Range;
@@ -57,7 +57,7 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
     let mut used: Vec<usize> = Vec::new();
     for expression in &expressions {
         let resolved = expression.resolve(&named.names(), file).map_err(|error| {
-            // Where there is an object, the signals stand in it.
+            // Where there is an object, the signals are in it.
             let object = column_paths.iter().find(|column_path| column_path.holds_object());
             object.map_or(error, |object| object.refused(file))
         });
@@ -124,7 +124,7 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
     }
     if !left_out.is_empty() {
         notes.push(format!(
-            "left out, for they are no columns of {rows} numbers: {}",
+            "left out, for they are not columns of {rows} numbers: {}",
             list(&left_out)
         ));
     }
@@ -180,7 +180,7 @@ fn column(name: &str, column_path: &ColumnPath, numbers: &Numbers) -> Column {
 
 /// Columns by the names that expressions may use.
 struct Named<'a> {
-    /// The paths, then the names that stand for one of them.
+    /// The paths, then the names that represent one of them.
     columns: Vec<(String, &'a ColumnPath)>,
 }
 

@@ -34,8 +34,8 @@ impl RowWriter for CsvColumns {
                 cell.clear();
                 let written = match column {
                     Values::Real(values) if values[row].is_nan() => Ok(()),
-                    // The fewest digits, with a point or an exponent, which tells them from whole
-                    // numbers.
+                    // The fewest digits, with a point or an exponent, which distinguishes them from
+                    // whole numbers.
                     Values::Real(values) => write!(cell, "{:?}", values[row]),
                     Values::Whole(values) => write!(cell, "{}", values[row]),
                     Values::Text(values) => {

@@ -6,13 +6,13 @@
 use super::text::{is_aside, separator};
 use crate::table::{Cell, with_decimal_point};
 
-/// Lines among which the header is looked for.
+/// Lines among which the header is searched for.
 const LINES: usize = 60;
 
 /// Letters and signs of Latin 1 that units and names of columns have; other bytes are damage.
 const LATIN: &[u8] = b"\xb0\xb2\xb3\xb5\xc4\xc9\xd6\xdc\xdf\xe0\xe4\xe7\xe8\xe9\xea\xf1\xf6\xfc";
 
-/// Rewrites the bytes of a table, and says what was done.
+/// Rewrites the bytes of a table, and reports the actions taken.
 pub(super) fn made_plain(bytes: &mut Vec<u8>) -> Vec<String> {
     let mut notes = Vec::new();
     if let Some(text) = utf16(bytes) {
@@ -39,7 +39,7 @@ pub(super) fn made_plain(bytes: &mut Vec<u8>) -> Vec<String> {
     notes
 }
 
-/// Text in UTF-16, which a mark at its beginning says.
+/// Text in UTF-16, which a mark at its start reports.
 fn utf16(bytes: &[u8]) -> Option<String> {
     let unit: fn([u8; 2]) -> u16 = match bytes {
         [0xff, 0xfe, ..] => u16::from_le_bytes,
@@ -51,7 +51,7 @@ fn utf16(bytes: &[u8]) -> Option<String> {
     String::from_utf16(&units).ok().filter(|_| rest.len().is_multiple_of(2))
 }
 
-/// Whether each byte that is no ASCII is one of a name or a unit.
+/// Whether each byte that is not an ASCII is one of a name or a unit.
 fn is_latin(bytes: &[u8]) -> bool {
     bytes.iter().all(|byte| byte.is_ascii() || LATIN.contains(byte))
 }
@@ -104,7 +104,7 @@ fn without_preamble(text: &str) -> Option<(usize, String)> {
     let above: Vec<usize> = filled.into_iter().filter(|at| *at < header).collect();
     let mark = char::from(separator(lines[header]));
     let cells = |at: usize| lines[at].split(mark).count();
-    // A line of as many cells is the header, and that of the units stands below it.
+    // A line of as many cells is the header, and that of the units is below it.
     if above.is_empty() || above.iter().any(|at| cells(*at) == cells(header)) {
         return None;
     }

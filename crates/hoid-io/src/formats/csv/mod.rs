@@ -1,6 +1,6 @@
 //! CSV: text with a header and one line a row, divided by commas, semicolons or tabs.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `foreign` | what other programs write, made plain |
 //! | `text` | encoding, comments, separator, lines |

@@ -5,16 +5,16 @@
 //! run, and is the reader's of whole CSV ([`super::table`]). The numbers are the same, correctly
 //! rounded by both (D. Lemire, *Software: Practice and Experience* 51 (2021) 1700-1727).
 //!
-//! A long text is taken in parts that end with a line, side by side. Each part says how far it was
-//! plain; what stands behind the first that was not is left.
+//! A long text is taken in parts that end with a line, side by side. Each part reports how far it
+//! was plain; anything after the first that was not is left.
 
 use std::ops::Range;
 use std::thread;
 
 use crate::table::Precision;
 
-/// Bytes of a part: enough rows that a thread is worth its start, few enough to be small beside the
-/// columns.
+/// Bytes of a part: enough rows that a thread is worth its start, few enough to be small compared
+/// with the columns.
 const PART: usize = 4 << 20;
 /// Bytes of the first part, which is read without a thread: where rows that are not plain stand often, it holds one.
 const FIRST: usize = 64 << 10;
@@ -23,7 +23,7 @@ const THREADS: usize = 8;
 /// Rows between two whose place is kept.
 const KEPT: usize = 1024;
 
-/// Where the rows of a table begin in its text: every [`KEPT`]-th, and the last.
+/// Where the rows of a table start in its text: every [`KEPT`]-th, and the last.
 #[derive(Debug, Default)]
 pub(super) struct RowStarts {
     kept: Vec<usize>,
@@ -46,12 +46,12 @@ impl RowStarts {
         self.rows
     }
 
-    /// Where the last row begins.
+    /// Where the last row starts.
     pub(super) fn last(&self) -> Option<usize> {
         (self.rows > 0).then_some(self.last)
     }
 
-    /// The nearest row at or before `row` whose place is kept, and where it begins.
+    /// The nearest row at or before `row` whose place is kept, and where it starts.
     pub(super) fn before(&self, row: usize) -> Option<(usize, usize)> {
         let at = self.kept.get(row / KEPT)?;
         Some((row / KEPT * KEPT, *at))
@@ -63,15 +63,15 @@ impl RowStarts {
 pub(super) struct Plain {
     /// Values by column.
     pub(super) values: Vec<Vec<f64>>,
-    /// Precision of the columns where it was asked for.
+    /// Precision of the columns where it was requested.
     pub(super) precision: Vec<Precision>,
-    /// Where the rows begin.
+    /// Where the rows start.
     pub(super) starts: Vec<usize>,
-    /// Where the first row begins that is not plain; the end of the text where there is none.
+    /// Where the first row starts that is not plain; the end of the text where there is none.
     pub(super) end: usize,
 }
 
-/// A table as its rows are read: what divides the cells, and the columns whose precision is asked for.
+/// A table as its rows are read: what divides the cells, and the columns whose precision is requested.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Layout<'a> {
     pub(super) separator: u8,
@@ -126,7 +126,8 @@ pub(super) fn plain_rows(bytes: &[u8], from: usize, layout: Layout<'_>, mut take
     at
 }
 
-/// The end of the part that begins at `start`: behind the first end of a line after so many bytes.
+/// The end of the part that starts at `start`: after the first end of a line after a given number
+/// of bytes.
 fn end_of_part(bytes: &[u8], start: usize, length: usize) -> usize {
     let behind = start.saturating_add(length).min(bytes.len());
     let line = bytes[behind..].iter().position(|byte| *byte == b'\n');
@@ -173,7 +174,7 @@ fn run(bytes: &[u8], part: Range<usize>, layout: Layout<'_>) -> Plain {
     found
 }
 
-/// The numbers of a row and where they are printed, and where the row ends; `None` where it is not plain.
+/// The numbers of a row and where they are printed, and where the row ends; `None` if it is not plain.
 #[inline]
 fn plain_row(
     bytes: &[u8],

@@ -10,8 +10,9 @@
 //! Where semicolons or tabs divide the cells, as in what a spreadsheet saves in half of Europe, the
 //! numbers may have decimal commas.
 //!
-//! Blank lines are skipped; a byte order mark and CRLF are tolerated. The stated sample time says
-//! without rounding what t can only say up to its last digit; it counts where t agrees with it.
+//! Blank lines are skipped; a byte order mark and CRLF are tolerated. The stated sample time
+//! reports without rounding what t can only state up to its last digit; it counts where t agrees
+//! with it.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -37,7 +38,7 @@ struct CsvSource<'a> {
 }
 
 impl CsvSource<'_> {
-    /// Where a row begins, and its cells.
+    /// Where a row starts, and its cells.
     fn row(&self, row: usize) -> Option<(usize, csv::ByteRecord)> {
         let (mut at_row, from) = self.starts.before(row)?;
         let bytes = self.text.as_bytes();
@@ -56,7 +57,7 @@ impl CsvSource<'_> {
     }
 }
 
-/// Where a record begins, with what the reader skips before it.
+/// Where a record starts, with what the reader skips before it.
 fn position(record: &csv::ByteRecord) -> usize {
     record.position().map_or(0, |p| p.byte() as usize)
 }
@@ -122,7 +123,7 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
     let Rows {
         starts, empty_at_end, ..
     } = rows;
-    // Spreadsheets leave rows of bare separators behind the table.
+    // Spreadsheets leave rows of bare separators after the table.
     let count = starts.len() - empty_at_end;
     for column in &mut columns {
         column.values.truncate(count);
@@ -153,7 +154,7 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
     })
 }
 
-/// The first record that is no blank line, and the bytes that it takes.
+/// The first record that is not a blank line, and the bytes that it takes.
 fn first_record(bytes: &[u8], separator: u8) -> Option<(csv::ByteRecord, Range<usize>)> {
     let mut reader = reader(bytes, separator);
     let mut record = csv::ByteRecord::new();
@@ -167,7 +168,7 @@ fn first_record(bytes: &[u8], separator: u8) -> Option<(csv::ByteRecord, Range<u
     None
 }
 
-/// Rows that are read as whole CSV before plain ones are looked for again.
+/// Rows that are read as whole CSV before plain ones are searched for again.
 const WHOLE: usize = 256;
 
 /// The rows of a table on their way into its columns.
@@ -185,7 +186,7 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// Takes the rows of plain numbers from `from` on; where the first begins that is none.
+    /// Takes the rows of plain numbers from `from` on; where the first starts that is invalid.
     fn plain(&mut self, from: usize, columns: &mut [Column]) -> usize {
         if self.commas {
             return from;
@@ -212,7 +213,7 @@ impl Rows<'_> {
         })
     }
 
-    /// Takes the rows from `from` on as whole CSV, [`WHOLE`] at most; where the next begins.
+    /// Takes the rows from `from` on as whole CSV, [`WHOLE`] at most; where the next starts.
     fn whole(&mut self, from: usize, columns: &mut [Column]) -> Result<usize, IoError> {
         let mut reader = reader(&self.bytes[from..], self.separator);
         let mut record = csv::ByteRecord::new();
@@ -271,12 +272,12 @@ impl Rows<'_> {
     }
 }
 
-/// Lines above the last one whose numbers say how long one is.
+/// Lines above the last one whose numbers show how long one is.
 const COMPARED: usize = 8;
 
-/// That the last number of a file may be cut: the last line lacks its end, and its last cell is
-/// shorter by two characters or more than that of each of the [`COMPARED`] lines before, which have
-/// digits behind a point.
+/// The last number of a file may be cut: the last line lacks its end, and its last cell is shorter
+/// by two characters or more than that of each of the [`COMPARED`] lines before, which have digits
+/// after a point.
 fn cut_number(source: &CsvSource<'_>, rows: usize) -> Option<String> {
     let last_cell = |row: usize| {
         let (start, _) = source.row(row)?;
@@ -527,7 +528,7 @@ mod tests {
             found.contains("run.csv is cut in line 21, its last: 2 of 3 values"),
             "{found}"
         );
-        // In the middle of a file that is no cut.
+        // In the middle of a file that is not a cut.
         assert!(message(b"t,e,u\n0,1\n1,2,3").contains("line 2: 2 values, expected 3"));
         let table = parse(b"t,e,u\n0,1,2\n1,2,-", "run.csv").unwrap();
         let error = table.bad_value(2, 1, 0..2).to_string();

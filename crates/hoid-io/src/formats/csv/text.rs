@@ -21,7 +21,7 @@ pub(crate) fn text<'a>(bytes: &'a [u8], file: &str) -> Result<&'a str, IoError> 
     })
 }
 
-/// Characters that make a spreadsheet run what begins with them.
+/// Characters that make a spreadsheet run what starts with them.
 const RUN: [char; 6] = ['=', '+', '-', '@', '\t', '\r'];
 
 /// Whether a spreadsheet may run a cell: numbers and a sign alone are none of that.
@@ -47,7 +47,7 @@ pub(crate) fn as_meant(cell: &str) -> &str {
     }
 }
 
-/// Whether the last line lacks its end, and where it begins.
+/// Whether the last line lacks its end, and where it starts.
 pub(crate) fn open_line(text: &str) -> Option<usize> {
     let ends = ['\n', '\r'];
     (!text.ends_with(ends)).then(|| text.rfind(ends).map_or(0, |at| at + 1))
@@ -98,7 +98,7 @@ pub(crate) fn refuse_blanks(header: &str, first: Option<&str>, file: &str) -> Re
 }
 
 /// Whether the numbers of a table have decimal commas: some cell is a number with a comma, and none
-/// has a point, beside which a comma may be one of thousands. Commas must not divide the cells.
+/// has a point, next to which a comma may be one of thousands. Commas must not divide the cells.
 pub(crate) fn has_decimal_commas(text: &str, separator: u8) -> bool {
     let mut reader = reader(text.as_bytes(), separator);
     let mut record = csv::ByteRecord::new();
@@ -120,7 +120,7 @@ pub(crate) fn comments(text: &str) -> impl Iterator<Item = &str> {
     lines.filter_map(|line| line.strip_prefix('#'))
 }
 
-/// The start of a row, behind the comments and blank lines that the reader skips with it.
+/// The start of a row, after the comments and blank lines that the reader skips with it.
 pub(crate) fn row_start(bytes: &[u8], mut at: usize) -> usize {
     while let Some(byte) = bytes.get(at) {
         match byte {

@@ -1,5 +1,5 @@
 //! Data elements of version 5: a tag of type and length, then the data, filled up to a multiple of
-//! 8 bytes. Data of up to 4 bytes may stand in the tag.
+//! 8 bytes. Data of up to 4 bytes may be in the tag.
 
 /// Length of the header of version 5.
 pub(super) const HEADER: usize = 128;
@@ -49,7 +49,7 @@ impl<'a> Elements<'a> {
         self.rest.is_empty()
     }
 
-    /// The next element, or what contradicts the format.
+    /// The next element, or the violation of the format.
     pub(super) fn next(&mut self) -> Result<Element<'a>, String> {
         let ends = |left: usize| format!("an element ends {left} bytes into its tag");
         let first = self

@@ -1,6 +1,6 @@
 //! Variables of MATLAB.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `read` | the variables of a file of any version |
 //! | `elements` | tags and data of version 5, damaged or not |
@@ -34,7 +34,7 @@ pub(super) const MAT: Format = Format {
     record: None,
 };
 
-/// HDF5 of other programs: datasets in groups, whose sizes stand as numpy counts them.
+/// HDF5 of other programs: datasets in groups, whose sizes are given as numpy counts them.
 pub(super) const HDF5: Format = Format {
     name: "HDF5",
     endings: &["h5", "hdf5"],

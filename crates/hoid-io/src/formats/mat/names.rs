@@ -1,14 +1,14 @@
 //! Names of columns and names of variables.
 //!
 //! A name that MATLAB does not take, such as `K e` or `f-y`, is written as the nearest that it
-//! does, and kept beside.
+//! does, and kept alongside.
 
 use crate::formats::arrays::{COMMENTS, Entry, Value};
 
-/// The variable that keeps the names that are no names of variables, each line a variable and the
-/// name it stands for.
+/// The variable that keeps the names that are not names of variables, each line a variable and the
+/// name it represents.
 pub(super) const NAMES: &str = "hoid_names";
-/// MATLAB cuts what is longer.
+/// MATLAB truncates longer names.
 const LONGEST_NAME: usize = 63;
 const KEYWORDS: [&str; 20] = [
     "break",

@@ -1,8 +1,8 @@
-//! Objects of MATLAB: only MATLAB reads what stands in them, and a line there takes their numbers out.
+//! Objects of MATLAB: only MATLAB reads what is in them, and a line there takes their numbers out.
 
 use crate::formats::arrays::OBJECT;
 
-/// An object of a class in words, with the line of MATLAB that saves its numbers.
+/// An object of a class as text, with the line of MATLAB that saves its numbers.
 pub(super) fn object(class: &str) -> String {
     let line = match class {
         "timetable" => "t = seconds(x.Properties.RowTimes - x.Properties.RowTimes(1)); e = x.e; u = x.u;",

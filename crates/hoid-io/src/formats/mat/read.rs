@@ -1,4 +1,4 @@
-//! The variables of a file of any version, told by its first bytes.
+//! The variables of a file of any version, given by its first bytes.
 
 use super::elements::HEADER;
 use super::names::named;
@@ -29,7 +29,7 @@ pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<Contents, IoError> {
     let entries = match bytes.get(HEADER - 4..HEADER) {
         Some([.., b'I', b'M']) => version5::read(bytes, false, &mut budget, file)?,
         Some([.., b'M', b'I']) => version5::read(bytes, true, &mut budget, file)?,
-        // Version 4 begins with a number below 5000, the later ones with text.
+        // Version 4 starts with a number below 5000, the later ones with text.
         _ if bytes[..bytes.len().min(4)].contains(&0) => version4::read(bytes, &mut budget, file)?,
         _ => {
             let start = String::from_utf8_lossy(&bytes[..bytes.len().min(12)]).into_owned();

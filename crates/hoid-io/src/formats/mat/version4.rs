@@ -1,4 +1,4 @@
-//! Version 4 (MathWorks, "MAT-File Format", 2019, chapter 2): matrices behind a header of five
+//! Version 4 (MathWorks, "MAT-File Format", 2019, chapter 2): matrices after a header of five
 //! numbers each.
 
 use crate::IoError;
@@ -75,7 +75,7 @@ fn variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
         _ if imaginary != 0 => Value::Unread(String::from("complex numbers")),
         0 => {
             let numbers = numbers();
-            // Whole numbers stand for any: version 4 has one class.
+            // Whole numbers represent any: version 4 has one class.
             let numbers = if kind.is_whole() {
                 Numbers::from_f64(&numbers.values())
             } else {

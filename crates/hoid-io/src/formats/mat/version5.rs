@@ -26,7 +26,7 @@ const OPAQUE: u32 = 17;
 const COMPLEX: u32 = 0x800;
 /// MATLAB takes 63 characters.
 const LONGEST_NAME: usize = 256;
-/// What an entry takes beside its path and its values, about.
+/// Approximate memory of an entry in addition to its path and its values, bytes.
 const ENTRY_BYTES: u64 = 256;
 
 /// Why a variable is not read: the format is contradicted, or something else is wrong.
@@ -75,9 +75,9 @@ struct Reader<'a> {
     file: &'a str,
 }
 
-/// Where something stands.
+/// Position of something.
 #[derive(Clone, Copy)]
-struct Place<'a> {
+struct VariablePath<'a> {
     /// The structure around it; empty at top level.
     parent: &'a str,
     /// Its path; at top level the name that the variable has itself.
@@ -90,7 +90,7 @@ impl Reader<'_> {
         // At top level an element that goes beyond the file is what a cut leaves.
         let cut = |found: String| format!("the file is cut, or a length is wrong: {found}");
         let element = elements.next().map_err(cut)?;
-        let top = Place {
+        let top = VariablePath {
             parent: "",
             path: "",
             depth: 0,
@@ -106,8 +106,8 @@ impl Reader<'_> {
         }
     }
 
-    /// The data of the matrix in deflated bytes. Its tag says how long it is at most: Octave counts
-    /// the data that stand in a tag twice.
+    /// The data of the matrix in deflated bytes. Its tag states how long it is at most: Octave
+    /// counts the data that are in a tag twice.
     fn inflated(&mut self, bytes: &[u8], big_endian: bool) -> Result<Vec<u8>, Stop> {
         let failed = |error: std::io::Error| Stop::Damaged(told(&error.to_string()));
         let mut decoder = ZlibDecoder::new(bytes);
@@ -131,8 +131,8 @@ impl Reader<'_> {
         Ok(inflated)
     }
 
-    /// An array of any class, its parts behind one another.
-    fn matrix(&mut self, bytes: &[u8], big_endian: bool, place: Place<'_>) -> Result<(), Stop> {
+    /// An array of any class, its parts after one another.
+    fn matrix(&mut self, bytes: &[u8], big_endian: bool, place: VariablePath<'_>) -> Result<(), Stop> {
         // A field that was never set.
         if bytes.is_empty() {
             return self.push(place, place.path, Value::Array(Array::vector(Numbers::from_f64(&[]))));
@@ -165,11 +165,11 @@ impl Reader<'_> {
             return Err(format!("an array of {} dimensions", dims.len()).into());
         }
         let name = name(parts.next()?.bytes)?;
-        // What has no name is no variable: MATLAB keeps the parts of objects there.
+        // What has no name is not a variable: MATLAB keeps the parts of objects there.
         if place.depth == 0 && name.is_empty() {
             return Ok(());
         }
-        let place = Place {
+        let place = VariablePath {
             path: if place.depth == 0 { &name } else { place.path },
             ..place
         };
@@ -234,7 +234,7 @@ impl Reader<'_> {
     }
 
     /// One or more structures of the same fields.
-    fn structure(&mut self, mut parts: Elements<'_>, count: usize, place: Place<'_>) -> Result<(), Stop> {
+    fn structure(&mut self, mut parts: Elements<'_>, count: usize, place: VariablePath<'_>) -> Result<(), Stop> {
         let depth = deeper(place)?;
         let length = parts.of(data::INT32, "the length of the names of fields")?;
         let length = parts.u32s(length).first().map_or(0, |length| *length as usize);
@@ -254,7 +254,7 @@ impl Reader<'_> {
             for name in &names {
                 let matrix = parts.of(data::MATRIX, "a field")?;
                 let path = format!("{parent}.{name}");
-                let place = Place {
+                let place = VariablePath {
                     parent: &parent,
                     path: &path,
                     depth,
@@ -266,7 +266,7 @@ impl Reader<'_> {
     }
 
     /// The cells, each under a path of its own; texts alone are one column.
-    fn cell(&mut self, mut parts: Elements<'_>, count: usize, place: Place<'_>) -> Result<(), Stop> {
+    fn cell(&mut self, mut parts: Elements<'_>, count: usize, place: VariablePath<'_>) -> Result<(), Stop> {
         let depth = deeper(place)?;
         let before = self.entries.len();
         for at in 0..count {
@@ -275,7 +275,7 @@ impl Reader<'_> {
             self.matrix(
                 matrix,
                 parts.big_endian,
-                Place {
+                VariablePath {
                     path: &path,
                     depth,
                     ..place
@@ -294,11 +294,11 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn unread(&mut self, place: Place<'_>, what: &str) -> Result<(), Stop> {
+    fn unread(&mut self, place: VariablePath<'_>, what: &str) -> Result<(), Stop> {
         self.push(place, place.path, Value::Unread(what.to_owned()))
     }
 
-    fn push(&mut self, place: Place<'_>, path: &str, value: Value) -> Result<(), Stop> {
+    fn push(&mut self, place: VariablePath<'_>, path: &str, value: Value) -> Result<(), Stop> {
         let bytes = (path.len() + place.parent.len()) as u64 + ENTRY_BYTES;
         self.budget.take(bytes, self.file)?;
         let mut entry = Entry::new(path, value);
@@ -308,7 +308,7 @@ impl Reader<'_> {
     }
 }
 
-fn deeper(place: Place<'_>) -> Result<usize, Stop> {
+fn deeper(place: VariablePath<'_>) -> Result<usize, Stop> {
     if place.depth == MOST_NESTED {
         return Err(format!("structures more than {MOST_NESTED} deep").into());
     }

@@ -1,8 +1,7 @@
-//! Version 7.3: HDF5 in MATLAB's manner, and HDF5 of other programs. Structures are groups, arrays of structures and cells are
-//! references to what stands under `/#refs#`, sizes stand in the order of C and so read backwards,
-//! `MATLAB_class` says what a dataset is and `MATLAB_object_decode` that it is an object. Datasets
-//! without them, as other programs write them, are numbers; where no MATLAB is expected, sizes stay
-//! in the order of C.
+//! Version 7.3: HDF5 in MATLAB's manner, and HDF5 of other programs. Structures are groups, arrays of structures and
+//! cells are references to what is under `/#refs#`, sizes are in the order of C and so read backwards, `MATLAB_class`
+//! states what a dataset is and `MATLAB_object_decode` that it is an object. Datasets without them, as other programs
+//! write them, are numbers; where no MATLAB is expected, sizes stay in the order of C.
 
 use hdf5_pure::{AttrValue, DType, Dataset, Error, File, Group, H5Element, Object};
 
@@ -13,7 +12,7 @@ use crate::formats::budget::{Budget, MOST_NESTED};
 use crate::formats::guarded::guarded;
 use crate::wording::told;
 
-/// What the visit of a group or a dataset counts for, bytes: links may lead in circles.
+/// Cost of visiting a group or a dataset, bytes: links may be circular.
 const VISIT: u64 = 1 << 13;
 /// Arrays of structures and cells of more elements are not columns.
 const MOST_REFERENCES: u64 = 1 << 16;
@@ -41,7 +40,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// What the crate says: damage, or what it does not know.
+    /// Error of the crate: damage, or an unsupported feature.
     fn damaged(&self, place: &str, error: &Error) -> IoError {
         let what = error.to_string();
         let cut = if what.contains("unexpected EOF") {
@@ -63,7 +62,7 @@ impl Reader<'_> {
         }
     }
 
-    /// What stands in a group, which is a structure or the whole file.
+    /// Contents of a group, which is a structure or the whole file.
     fn group(&mut self, group: &Group, path: &str, depth: usize) -> Result<(), IoError> {
         self.budget.take(VISIT, self.file)?;
         if depth > MOST_NESTED {
@@ -93,7 +92,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// A dataset. The parent of one in an array of structures is the element, and its path begins
+    /// A dataset. The parent of one in an array of structures is the element, and its path starts
     /// with it.
     fn dataset(&mut self, dataset: &Dataset, parent: &str, path: &str, depth: usize) -> Result<(), IoError> {
         self.budget.take(VISIT, self.file)?;
@@ -179,7 +178,7 @@ impl Reader<'_> {
         }
         let objects = match dataset.dereference() {
             Ok(objects) => objects,
-            // A reference to nothing is no damage.
+            // A reference to nothing is not damage.
             Err(error) => {
                 let what = format!("references that lead nowhere ({})", told(&error.to_string()));
                 return self.push(parent, path, Value::Unread(what));

@@ -76,7 +76,7 @@ fn column(name: &str, values: Values<'_>) -> io::Result<Vec<u8>> {
     Ok(element.bytes)
 }
 
-/// The parts of an array, one behind the other.
+/// The parts of an array, one after the other.
 #[derive(Default)]
 struct Matrix {
     bytes: Vec<u8>,

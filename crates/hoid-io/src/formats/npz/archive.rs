@@ -55,7 +55,7 @@ fn members(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
         };
         let size = member.size();
         budget.take(size, file)?;
-        // What is promised is not reserved: memory grows with what is there.
+        // What is promised is not reserved: memory grows with the existing data.
         let mut data = Vec::new();
         let read = (&mut member).take(size.saturating_add(1)).read_to_end(&mut data);
         read.map_err(|error| damaged(&told(&error.to_string())))?;
@@ -71,7 +71,7 @@ fn members(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
     let mut contents = Contents::new(entries, Indexing::Python);
     if !others.is_empty() {
         contents.notes.push(format!(
-            "members that are no arrays are left out: {}",
+            "members that are not arrays are left out: {}",
             others.join(", ")
         ));
     }

@@ -2,9 +2,9 @@
 //! 1 to 3).
 //!
 //! The literal is read here because it is small, and because a general reader of Python literals
-//! recurses as deep as a hostile header says.
+//! recurses as deep as a hostile header states.
 
-/// What a header says.
+/// Content of a header.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Header {
     pub(super) descr: Descr,
@@ -17,7 +17,7 @@ pub(super) struct Header {
 pub(super) enum Descr {
     /// Such as `<f8`.
     Plain(String),
-    /// The fields of a structured array, each with what stands behind its type, if anything does.
+    /// The fields of a structured array, each with anything after its type, if anything does.
     Fields(Vec<(String, Option<String>)>),
 }
 
@@ -111,7 +111,7 @@ impl Reader<'_> {
                 }
                 (_, '\\') => match characters.next()?.1 {
                     c @ ('\\' | '\'' | '"') => text.push(c),
-                    // Python's other escapes do not stand in names that hoid could show.
+                    // Python's other escapes do not be in names that hoid could show.
                     c => text.extend(['\\', c]),
                 },
                 (_, c) => text.push(c),

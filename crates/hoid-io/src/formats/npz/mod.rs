@@ -1,6 +1,6 @@
 //! NPZ, the archive of arrays of numpy, and NPY, one array of it.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `header` | what numpy writes in front of the numbers, a Python literal |
 //! | `npy` | one array, in and out |

@@ -12,10 +12,10 @@ use crate::wording::shown;
 const MAGIC: &[u8] = b"\x93NUMPY";
 /// A header of more bytes is damage.
 const LONGEST_HEADER: usize = 1 << 20;
-/// The numbers begin at a multiple of it.
+/// The numbers start at a multiple of it.
 const ALIGNMENT: usize = 64;
 
-/// What is wrong with an array.
+/// Problems with an array.
 #[derive(Debug)]
 pub(super) enum NpyError {
     NoMagic(String),
@@ -97,7 +97,7 @@ impl Item {
         Self::Numbers { kind, big_endian }
     }
 
-    /// The unit that a type says.
+    /// The unit that a type states.
     fn unit(&self) -> String {
         String::from(match self {
             Self::Clock { moments: true, .. } => MOMENTS,
@@ -117,8 +117,8 @@ impl Item {
     }
 }
 
-/// What stands in an array: one entry, or one for each field, at the top level where there is no
-/// other array.
+/// Contents of an array: one entry, or one for each field, at the top level where there is no other
+/// array.
 pub(super) fn entries(
     bytes: Vec<u8>,
     name: &str,
@@ -144,7 +144,7 @@ pub(super) fn entries(
     Ok(entries)
 }
 
-/// What the items take as they are read, beside the bytes that they stand in.
+/// Memory of the items when read, in addition to their bytes.
 fn unpacked(header: &Header, budget: &mut Budget, file: &str) -> Result<(), IoError> {
     let count = header
         .shape
@@ -190,7 +190,7 @@ fn header_of(bytes: &[u8]) -> Result<(Header, usize), NpyError> {
     let text = bytes
         .get(before..before + length)
         .ok_or_else(|| damaged("the array ends in its header"))?;
-    // Latin 1 before version 3; what hoid needs is ASCII in both, but for names.
+    // Latin 1 before version 3; what hoid needs is ASCII in both, except for names.
     let text = String::from_utf8_lossy(text);
     let header = header::parse(&text)
         .ok_or_else(|| NpyError::Damaged(format!("the header of an array reads {}", shown(&text))))?;
@@ -261,7 +261,7 @@ fn clock_unit(descr: &str) -> Option<f64> {
     Some(count * unit_s)
 }
 
-/// The numbers of a clock in s, moments from the first; those that are none (NaT) are NaN.
+/// The numbers of a clock in s, moments from the first; those that is invalid (NaT) are NaN.
 fn clock(counts: &Numbers, unit_s: f64, moments: bool) -> Numbers {
     let known: Vec<Option<i64>> = (0..counts.len())
         .map(|at| counts.whole(at).filter(|n| *n != i64::MIN))

@@ -12,7 +12,7 @@ pub(super) enum Data {
     Text(Vec<String>),
     /// Moments of a clock, or times of day, ns.
     Moments(Vec<i64>),
-    /// What is not read, in words.
+    /// Unsupported content, as text.
     Unread(&'static str),
 }
 

@@ -1,7 +1,7 @@
 //! Apache Parquet (<https://parquet.apache.org/docs/file-format/>) by the crate `parquet`, as far
 //! as flat tables need it.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `columns` | columns as they were read |
 //! | `pages` | what the pages of a column unpack to |

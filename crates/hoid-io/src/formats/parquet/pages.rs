@@ -1,10 +1,10 @@
-//! What the pages of a column unpack to, before any of them is unpacked.
+//! Unpacked size of the pages of a column, before unpacking.
 //!
-//! The footer says how long a column is when unpacked, each page says it again in its header, and nobody
-//! has to be right: a page of a few kB may state 2 GB, which Snappy and LZ4 then fill with zeros, and gzip
-//! unpacks until it ends, whatever was stated. So the headers are read here first, in the compact protocol
-//! of Thrift (<https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md>): a field
-//! is a byte `delta << 4 | type`, numbers are zigzag varints, and a struct ends with a 0. Of `PageHeader`
+//! The footer states how long a column is when unpacked, each page states it again in its header, and no one has to be
+//! right: a page of a few kB may state 2 GB, which Snappy and LZ4 then fill with zeros, and gzip unpacks until it ends,
+//! whatever was stated. So the headers are read here first, in the compact protocol of Thrift
+//! (<https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md>): a field is a byte
+//! `delta << 4 | type`, numbers are zigzag varints, and a struct ends with a 0. Of `PageHeader`
 //! (<https://github.com/apache/parquet-format>, `parquet.thrift`) are taken
 //!
 //! | field | what |
@@ -13,7 +13,7 @@
 //! | 5.1, 8.1 | values of a data page |
 //! | 8.5, 8.6, 8.7 | bytes of levels in front of the values, and whether these are packed |
 //!
-//! What is not packed, or packed by Snappy and LZ4, is as long as stated or refused by the crate. A page in
+//! Pages without compression, or with Snappy and LZ4, have the stated length or are refused by the crate. A page in
 //! gzip is unpacked here into nothing, as far as it is stated and one byte further.
 
 use std::io::{self, Read as _};
@@ -35,19 +35,19 @@ const SET: u8 = 10;
 const MAP: u8 = 11;
 const STRUCT: u8 = 12;
 
-/// What the header of a page states.
+/// Content of the header of a page.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct PageHeader {
     unpacked: u64,
     packed: u64,
     values: u64,
-    /// Bytes of levels that stand in front of what is packed.
+    /// Bytes of levels that are in front of what is packed.
     levels: u64,
     is_packed: bool,
 }
 
-/// Bytes that the pages of a column state to unpack to; `None` where a header is none, or a page in gzip is
-/// longer than it states. `column` holds the pages, and `values` are in all of them.
+/// Bytes that the pages of a column state to unpack to; `None` if a header is none, or a page in gzip is longer than it
+/// states. `column` holds the pages, and `values` are in all of them.
 pub(super) fn unpacked(column: &[u8], compression: Compression, values: u64) -> Option<u64> {
     let (mut rest, mut all, mut seen) = (column, 0_u64, 0_u64);
     while !rest.is_empty() && seen < values {
@@ -56,7 +56,7 @@ pub(super) fn unpacked(column: &[u8], compression: Compression, values: u64) -> 
         if matches!(compression, Compression::GZIP(_)) && header.is_packed {
             let packed = page.get(usize::try_from(header.levels).ok()?..)?;
             let stated = header.unpacked.checked_sub(header.levels)?;
-            // What is damaged otherwise is told by who reads it.
+            // What is damaged otherwise is reported by who reads it.
             let mut limited = MultiGzDecoder::new(packed).take(stated.saturating_add(1));
             if io::copy(&mut limited, &mut io::sink()).is_ok_and(|bytes| bytes > stated) {
                 return None;
@@ -127,7 +127,7 @@ impl PageHeader {
         Some(())
     }
 
-    /// A value that says nothing here.
+    /// A value that carries no information here.
     fn pass_over(&mut self, bytes: &mut &[u8], kind: u8, depth: usize) -> Option<()> {
         match kind {
             TRUE | FALSE | BYTE => drop(byte(bytes)?),
@@ -207,7 +207,7 @@ mod tests {
 
     const GZIP: fn() -> Compression = || Compression::GZIP(GzipLevel::default());
 
-    /// A header of a data page with a text and a list that say nothing, and its page.
+    /// A header of a data page with a text and a list that carry no information, and its page.
     fn page(unpacked: i64, values: i64, packed: &[u8]) -> Vec<u8> {
         let put = |bytes: &mut Vec<u8>, value: i64| {
             let mut rest = ((value << 1) ^ (value >> 63)).cast_unsigned();
@@ -241,7 +241,7 @@ mod tests {
     fn pages_say_what_they_unpack_to_and_gzip_is_held_to_it() {
         let honest = page(800, 100, &zipped(&[0; 800]));
         assert_eq!(unpacked(&honest, GZIP(), 100), Some(800));
-        // Of two pages, the second behind the last value is not looked at.
+        // For two pages, the second after the last value is not examined.
         let two = [honest.clone(), vec![0xff; 40]].concat();
         assert_eq!(unpacked(&two, GZIP(), 100), Some(800));
         assert_eq!(unpacked(&two, GZIP(), 101), None);

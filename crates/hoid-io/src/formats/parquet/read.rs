@@ -33,8 +33,8 @@ const TIME: &str = "a date or time";
 /// ns in a µs and in a ms.
 const MICRO: i64 = 1_000;
 const MILLI: i64 = 1_000_000;
-/// What a value takes as a number and as its place among those that are none, and a text beside its
-/// letters, bytes.
+/// Memory of a value as a number and as an index of missing ones, and of a text in addition to its
+/// characters, bytes.
 const VALUE: u64 = 16;
 const TEXT: u64 = 24;
 /// Values that are fetched together.
@@ -46,7 +46,7 @@ pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<ReadFile, IoError> {
     guarded(file, || columns(bytes.into(), file))
 }
 
-/// Whether this is Parquet at all, in words that say what it is instead.
+/// Whether this is Parquet at all, as text that describes the actual content.
 fn check_ends(bytes: &[u8], file: &str) -> Result<(), IoError> {
     let file = || file.to_owned();
     let found = if bytes.is_empty() {
@@ -61,11 +61,11 @@ fn check_ends(bytes: &[u8], file: &str) -> Result<(), IoError> {
         let start = String::from_utf8_lossy(&bytes[..bytes.len().min(12)]).into_owned();
         format!("it starts with \"{}\"", start.escape_debug())
     } else if bytes.len() < 12 {
-        String::from("it ends behind its first bytes")
+        String::from("it ends after its first bytes")
     } else if !bytes.ends_with(MAGIC) {
         return Err(IoError::Damaged {
             file: file(),
-            found: String::from("it is cut, for its end is missing, which says where the columns stand"),
+            found: String::from("it is cut, for its end is missing, which reports where the columns stand"),
         });
     } else {
         return Ok(());
@@ -123,7 +123,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
             let values = u64::try_from(chunk.num_values()).unwrap_or(0);
             let Some(stated) = pages::unpacked(pages, chunk.compression(), values) else {
                 return Err(damaged(format!(
-                    "{}: a page is longer than it says, or does not say how long it is",
+                    "{}: a page is longer than it reports, or does not report how long it is",
                     place()
                 )));
             };
@@ -278,14 +278,14 @@ impl ColumnPath<'_> {
         Ok(())
     }
 
-    /// Takes what values hold beside themselves.
+    /// Takes what values hold next to themselves.
     fn weigh<V: Weight>(&mut self, values: &[V]) -> Result<(), ParquetError> {
         let bytes = values.iter().map(Weight::bytes).sum();
         let taken = self.budget.take(bytes, self.file);
         taken.map_err(|error| ParquetError::External(Box::new(error)))
     }
 
-    /// What the crate says, with the place.
+    /// Report of the crate, with the place.
     fn error(&self, group: usize, error: ParquetError) -> IoError {
         let file = self.file.to_owned();
         let place = format!("column {}, row group {}", shown(&self.name), group + 1);
@@ -310,7 +310,7 @@ impl ColumnPath<'_> {
     }
 }
 
-/// What a value holds beside itself.
+/// Memory of a value in addition to itself.
 trait Weight {
     /// Bytes.
     fn bytes(&self) -> u64 {
@@ -348,7 +348,7 @@ fn clock_ns(column: &ColumnDescriptor) -> Option<i64> {
     })
 }
 
-/// What is correct and not read here.
+/// Valid content that is not supported here.
 fn refused(what: &str) -> ParquetError {
     ParquetError::NYI(what.to_owned())
 }

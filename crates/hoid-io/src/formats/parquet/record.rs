@@ -1,7 +1,7 @@
 //! Records in Parquet.
 //!
 //! Numeric columns of any type are numbers here, a null is a missing value, and text counts as in
-//! CSV. Units and sample time stand in the comments, in the words of CSV.
+//! CSV. Units and sample time are in the comments, in the words of CSV.
 
 use super::columns::{Data, ReadColumn};
 use super::read::read;
@@ -10,13 +10,13 @@ use crate::table::{Cell, Column, Precision, Source, Table, asides, check_names};
 use crate::time::{Moments, is_time, seconds};
 use crate::wording::shown;
 
-/// What stood in the cells that are no finite numbers.
+/// Contents of the cells that are not finite numbers.
 struct ParquetSource<'a> {
     file: &'a str,
     columns: Vec<Cells>,
 }
 
-/// The cells of a column, as far as its values do not say it.
+/// The cells of a column, as far as its values do not report it.
 enum Cells {
     Numbers {
         nulls: Vec<usize>,

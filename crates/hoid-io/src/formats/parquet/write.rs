@@ -27,7 +27,7 @@ struct Writer {
     inner: SerializedFileWriter<Vec<u8>>,
 }
 
-/// Begins a file.
+/// Starts a file.
 pub(super) fn start(file: &mut dyn Write, schema: &TableSchema) -> io::Result<Box<dyn RowWriter>> {
     Ok(Box::new(Writer::start(file, schema)?))
 }

@@ -15,7 +15,7 @@ const SAMPLES: u16 = 3;
 const CLOCK_OFFSET: u16 = 4;
 const STREAM_FOOTER: u16 = 6;
 
-/// One stream as it stands in the file.
+/// One stream as it is in the file.
 #[derive(Debug)]
 pub(super) struct Stream {
     pub(super) id: u32,
@@ -25,7 +25,7 @@ pub(super) struct Stream {
     pub(super) samples: Samples,
     /// When the offset to the clock of the recorder was measured, and the offset, s.
     pub(super) offsets: Vec<(f64, f64)>,
-    /// None where the recorder has not closed the file, or its end is lost.
+    /// None if the recorder has not closed the file, or its end is lost.
     pub(super) footer: Option<Footer>,
     /// Why a footer that is there cannot be read.
     pub(super) unread_footer: Option<String>,
@@ -54,7 +54,7 @@ impl<'a> Bytes<'a> {
         self.take(N)?.try_into().ok()
     }
 
-    /// A length of 1, 4 or 8 bytes behind their number.
+    /// A length of 1, 4 or 8 bytes after their number.
     fn length(&mut self) -> Option<usize> {
         match self.array::<1>()? {
             [1] => self.array().map(|[n]| usize::from(n)),
@@ -69,8 +69,8 @@ impl<'a> Bytes<'a> {
     }
 }
 
-/// The streams of a file that begins with its magic bytes, in the order of their headers; and where
-/// it is cut: the place of a last chunk that goes beyond the end. What stands before it is whole.
+/// The streams of a file that starts with its magic bytes, in the order of their headers; and where
+/// it is cut: the place of a last chunk that goes beyond the end. What is before it is whole.
 pub(super) fn streams(bytes: &[u8]) -> Result<(Vec<Stream>, Option<usize>), String> {
     let mut rest = Bytes {
         rest: bytes.get(4..).unwrap_or_default(),
@@ -99,7 +99,7 @@ pub(super) fn streams(bytes: &[u8]) -> Result<(Vec<Stream>, Option<usize>), Stri
             let samples =
                 empty(&header.format).ok_or_else(|| damaged(format!("its format is \"{}\"", shown(&header.format))))?;
             if known.insert(id, streams.len()).is_some() {
-                return Err(damaged(String::from("its header stands there a second time")));
+                return Err(damaged(String::from("its header is duplicated")));
             }
             streams.push(Stream {
                 id,
@@ -150,10 +150,10 @@ fn empty(format: &str) -> Option<Samples> {
 }
 
 impl Stream {
-    /// What the footer says against what was read.
+    /// Compares the footer with the data.
     ///
     /// # Errors
-    /// What is not there.
+    /// What is missing.
     pub(super) fn check_footer(&self) -> Result<(), String> {
         let Some(footer) = self.footer else { return Ok(()) };
         let read = self.stamps.len();
@@ -171,11 +171,11 @@ impl Stream {
             .into_iter()
             .flat_map(|((from, to), (first, last))| [("first", from, *first), ("last", to, *last)])
         {
-            // Recorders print them with six digits, and may leave out what a sample time says.
+            // Recorders print them with six digits, and may leave out what a sample time reports.
             let slack_s = self.nominal_step_s().max(1e-5 * stated.abs()).max(1e-6);
             if (stated - found).abs() > slack_s {
                 return Err(format!(
-                    "stream {} ({}): its footer says that the {what} sample stands at {stated} s, and it stands at {found} s: \
+                    "stream {} ({}): its footer states that the {what} sample is at {stated} s, and it is at {found} s: \
                      the file lost a part",
                     self.id,
                     shown(&self.header.name)

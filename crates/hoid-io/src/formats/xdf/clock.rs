@@ -2,17 +2,16 @@
 //! (Kothe et al., "The Lab Streaming Layer for synchronized multimodal recording", 2024; pyxdf
 //! 1.17).
 //!
-//! The offset `o_k` of the recorder's clock was measured at the times `c_k`. A line
-//! `o = b_0 + b_1 c` is fitted under Huber's loss by the alternating direction method of
-//! multipliers (Boyd et al., 2011, section 6.1.1), in units of 1e-4 s, so that a measurement over a
-//! busy network counts little. Then `t <- t + b_0 + b_1 t`. Where the clock was set anew, each part
-//! has a line of its own. At last, of a stream with a nominal rate, the time stamps between two
-//! breaks are replaced by their least-squares line over the number of the sample.
+//! The offset `o_k` of the recorder's clock was measured at the times `c_k`. A line `o = b_0 + b_1 c` is fitted under
+//! Huber's loss by the alternating direction method of multipliers (Boyd et al., 2011, section 6.1.1), in units of 1e-4
+//! s, so that a measurement over a busy network counts little. Then `t <- t + b_0 + b_1 t`. Where the clock was set
+//! again, each part has a line of its own. At last, of a stream with a nominal rate, the time stamps between two breaks
+//! are replaced by their least-squares line over the number of the sample.
 //!
-//! Beyond pyxdf, lost samples are a break as well: a step of more than [`LOST_SAMPLES`] nominal
-//! sample times `T` behind which the time stamps stay late, even after as many samples as are late,
-//! by the medians of `t_k - k T` on both sides. Samples that are late and then catch up are jitter. Without this a second that is lost
-//! would be spread over the recording, as a lower rate without a gap.
+//! Beyond pyxdf, lost samples are a break as well: a step of more than [`LOST_SAMPLES`] nominal sample times `T` after
+//! which the time stamps stay late, even after as many samples as are late, by the medians of `t_k - k T` on both
+//! sides. Samples that are late and then catch up are jitter. Without this a second that is lost would be spread over
+//! the recording, as a lower rate without a gap.
 
 use super::chunks::Stream;
 use crate::wording::shown;
@@ -20,19 +19,19 @@ use crate::wording::shown;
 /// The unit of the fit, s: deviations beyond it count linearly.
 const UNIT_S: f64 = 1e-4;
 const ITERATIONS: usize = 1000;
-/// A reset: time between offsets off its median by more than so many deviations and s, and the
-/// offsets likewise.
+/// A reset: time between offsets off its median by more than a given number of deviations and s,
+/// and the offsets likewise.
 const RESET_TIME: (f64, f64) = (5.0, 5.0);
 const RESET_VALUE: (f64, f64) = (10.0, 1.0);
-/// A break: the longer of so many s and so many samples.
+/// A break: the longer of a given number of s and so many samples.
 const BREAK_S: f64 = 1.0;
 const BREAK_SAMPLES: f64 = 500.0;
 
-/// Lost samples: a step, and then a lateness, of so many sample times.
+/// Lost samples: a step, and then a lateness, of a given number of sample times.
 const LOST_SAMPLES: f64 = 4.0;
-/// Samples on each side whose median says how late they are.
+/// Samples on each side whose median shows how late they are.
 const BESIDE: usize = 25;
-/// Share by which the rate may be off the stated one before that is said.
+/// Share by which the rate may be off the stated one before that is reported.
 const OFF: f64 = 0.02;
 
 /// The times of the samples, s.
@@ -47,7 +46,7 @@ pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
         0 => String::from("no clock offsets were recorded: its time stamps are taken for those of the recorder"),
         1 => format!("clock aligned by a line through {} offsets", stream.offsets.len()),
         parts => format!(
-            "clock aligned by {parts} lines through {} offsets, for it was set anew",
+            "clock aligned by {parts} lines through {} offsets, for it was set again",
             stream.offsets.len()
         ),
     };
@@ -113,8 +112,8 @@ fn resets(offsets: &[(f64, f64)]) -> Vec<(usize, usize)> {
     parts(breaks, offsets.len())
 }
 
-/// Where a step differs from the median by more than so many median absolute deviations, and by
-/// more than so much.
+/// Where a step differs from the median by more than a given number of median absolute deviations,
+/// and by more than so much.
 fn glitches(steps: &[f64], (deviations, least): (f64, f64)) -> Vec<bool> {
     let middle = median(steps);
     let off: Vec<f64> = steps.iter().map(|step| (step - middle).abs()).collect();
@@ -134,7 +133,7 @@ fn median(values: &[f64]) -> f64 {
     }
 }
 
-/// First and last of `count` where there are breaks behind some.
+/// First and last of `count` if there are breaks after some.
 fn parts(breaks: impl Iterator<Item = usize>, count: usize) -> Vec<(usize, usize)> {
     let mut parts = Vec::new();
     let mut first = 0;
@@ -146,7 +145,7 @@ fn parts(breaks: impl Iterator<Item = usize>, count: usize) -> Vec<(usize, usize
     parts
 }
 
-/// The line `b_0 + b_1 c` through offsets under Huber's loss; none where they say nothing.
+/// The line `b_0 + b_1 c` through offsets under Huber's loss; none if they carry no information.
 fn line(offsets: &[(f64, f64)]) -> (f64, f64) {
     if let [(_, offset)] = offsets {
         return (*offset, 0.0);
@@ -304,7 +303,7 @@ mod tests {
                 "{lost}"
             );
         }
-        // Half a second that arrives at once, stamped on arrival, is no loss.
+        // Half a second that arrives at once, stamped on arrival, is not a loss.
         let mut times: Vec<f64> = (0..1200)
             .map(|k| {
                 if (500..550).contains(&k) {

@@ -8,7 +8,7 @@ use crate::wording::told;
 /// A stream of more channels is damage.
 const MOST_CHANNELS: usize = 1 << 12;
 
-/// What is known of a stream before its samples.
+/// Prior knowledge of a stream before its samples.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Header {
     pub(super) name: String,
@@ -71,7 +71,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header, String> {
     })
 }
 
-/// What a recorder says of a stream when it closes the file.
+/// Report of a recorder on a stream when it closes the file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Footer {
     pub(super) samples: Option<u64>,

@@ -1,6 +1,6 @@
 //! XDF, the recordings of the Lab Streaming Layer: streams with clocks of their own.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `chunks` | the samples and clock offsets of each stream |
 //! | `header` | name, channels and rate of a stream, from its XML |

@@ -10,7 +10,7 @@ use crate::formats::arrays::{Array, Contents, Entry, Indexing, Numbers, Value};
 use crate::formats::budget::Budget;
 use crate::wording::shown;
 
-/// What an entry takes, bytes, about.
+/// Approximate memory of an entry, bytes.
 const ENTRY: u64 = 512;
 
 /// The streams in the bytes of a file.
@@ -21,7 +21,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
             file: file.to_owned(),
             format: "XDF",
             found: format!("it starts with \"{}\"", start.escape_debug()),
-            expected: "XDF: at its beginning",
+            expected: "XDF: at its start",
         });
     }
     let mut budget = Budget::of(bytes.len());
@@ -32,7 +32,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
     let mut notes = Vec::new();
     notes.extend(cut.map(|at| {
         format!(
-            "the file is cut at byte {at} of {}: the samples before it are read, and the {} bytes behind it are not; copy the \
+            "the file is cut at byte {at} of {}: the samples before it are read, and the {} bytes after it are not; copy the \
              file again where its original is whole",
             bytes.len(),
             bytes.len() - at
@@ -53,7 +53,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
             let (first, last) = (stream.stamps[0], stream.stamps[stream.stamps.len() - 1]);
             notes.push(format!(
                 "stream {} has no footer: the file was cut short, or its recorder never closed it; {} samples over {:.3} s \
-                 are there, and what came behind them is lost",
+                 are there, and what came after them is lost",
                 shown(&stream.header.name),
                 stream.stamps.len(),
                 last - first
@@ -69,7 +69,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
     let start = first.min_by(f64::total_cmp).unwrap_or(0.0);
     if start != 0.0 {
         notes.push(format!(
-            "t counts from the first sample, which stands at {start:.6} s on the clock of the recorder"
+            "t counts from the first sample, which is at {start:.6} s on the clock of the recorder"
         ));
     }
     let mut names = Names::default();
@@ -226,8 +226,8 @@ mod tests {
                 footer(50.0, 59.99, 1001),
                 "its footer counts 1001 samples and 1000 are there",
             ),
-            (footer(49.0, 59.99, 1000), "the first sample stands at 49 s"),
-            (footer(50.0, 61.0, 1000), "the last sample stands at 61 s"),
+            (footer(49.0, 59.99, 1000), "the first sample is at 49 s"),
+            (footer(50.0, 61.0, 1000), "the last sample is at 61 s"),
         ] {
             let message = read(&file_of(&times, Some(&bad)), "a.xdf").unwrap_err().to_string();
             assert!(
@@ -240,7 +240,7 @@ mod tests {
         let contents = read(&file_of(&times, Some(cut)), "a.xdf").unwrap();
         let said = |n: &String| n.contains("its footer") && n.contains("1000 samples are read");
         assert!(contents.notes.iter().any(said), "{:?}", contents.notes);
-        // The end of the file is lost between two chunks: nothing contradicts itself, but it is told.
+        // The end of the file is lost between two chunks: nothing contradicts itself, but it is reported.
         let notes = read(&file_of(&times, None), "a.xdf").unwrap().notes;
         assert!(
             notes

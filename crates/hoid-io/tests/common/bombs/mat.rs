@@ -13,7 +13,7 @@ pub const DOUBLE: u32 = 6;
 pub fn bomb(draw: &mut Draw) -> Vec<u8> {
     let megabytes = 1 << (3 + draw.below(8));
     let bytes = megabytes * MEGABYTE;
-    // Numbers as they may stand in a file: 8 bytes, 4, 1.
+    // Numbers as they may be in a file: 8 bytes, 4, 1.
     let (stored, size) = *draw.one_of(&[(9, 8), (7, 4), (2, 1), (1, 1)]);
     let class = *draw.one_of(&[DOUBLE, DOUBLE, CHARACTERS, 9, 5]);
     match draw.below(6) {

@@ -1,9 +1,9 @@
-//! Files of a few bytes to two megabytes that unpack, or say that they unpack, to any size, and what all readers have to
-//! make of them: values or an error in words, in bounded memory.
+//! Files of a few bytes to two megabytes that unpack, or report that they unpack, to any size, and what all readers
+//! have to make of them: values or an error as text, in bounded memory.
 //!
 //! Bomb `k` of a format is the same bytes on every machine.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `zeros` | zeros that are packed, of any length, in no time |
 //! | `parquet`, `npz`, `mat`, `hdf5`, `xdf`, `texts` | the bombs of a format |
@@ -60,12 +60,12 @@ pub fn burst(path: &Path, maker: Maker, number: u64) -> (Answers, Duration) {
     (answers, start.elapsed())
 }
 
-/// What was before a bomb is not of it, on systems that can tell.
+/// What was before a bomb is not of it, on systems that can determine.
 fn forget_peak() {
     let _ = fs::write("/proc/self/clear_refs", "5");
 }
 
-/// Most memory of the process, kB, on systems that tell.
+/// Most memory of the process, kB, on systems that report it.
 pub fn peak_kb() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM"))?;

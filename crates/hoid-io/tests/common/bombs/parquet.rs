@@ -22,7 +22,7 @@ pub const GROUP: usize = 1 << 18;
 const PLAIN: u64 = 0;
 const RUN_LENGTHS: u64 = 3;
 
-/// A page of which anything can be said.
+/// A page of which anything can be reported.
 pub struct Page<'a> {
     pub compression: Compression,
     pub optional: bool,
@@ -37,7 +37,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
     let megabytes = 1 << (4 + draw.below(8));
     let values = 1 << (20 + draw.below(12));
     match draw.below(9) {
-        // It unpacks to more than it says.
+        // It unpacks to more than it reports.
         0 => page(&Page {
             compression: gzip(),
             optional: false,
@@ -45,7 +45,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
             unpacked: 800,
             packed: &zeros::gzip(megabytes),
         }),
-        // It says more than it holds.
+        // It states more than it holds.
         1 => page(&Page {
             compression: *draw.one_of(&[
                 gzip(),
@@ -58,7 +58,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
             unpacked: (8 * values).min(i32::MAX as u64),
             packed: &[0; 20],
         }),
-        // It holds what it says.
+        // Its content matches its header.
         2 => page(&Page {
             compression: gzip(),
             optional: false,
@@ -96,7 +96,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
     }
 }
 
-/// So many groups of the same values, which the format writes once.
+/// A given number of groups of the same values, which the format writes once.
 pub fn groups(schema: &str, groups: usize, rows: usize) -> Vec<u8> {
     let mut writer = writer(schema, Compression::UNCOMPRESSED, true);
     for _ in 0..groups {
@@ -119,7 +119,7 @@ pub fn groups(schema: &str, groups: usize, rows: usize) -> Vec<u8> {
     writer.into_inner().unwrap()
 }
 
-/// So many columns without a row.
+/// A given number of columns without a row.
 pub fn columns(count: usize) -> Vec<u8> {
     let each: String = (0..count).map(|k| format!("required double c{k}; ")).collect();
     groups(&format!("message m {{ {each} }}"), 0, 0)

@@ -5,10 +5,10 @@ use flate2::{Compress, Compression, Crc, FlushCompress};
 
 /// A megabyte.
 pub const MEGABYTE: usize = 1 << 20;
-/// What is read takes no more: behind it nobody comes to the sum.
+/// What is read takes no more: after it no one comes to the sum.
 const SUMMED: usize = 100;
 
-/// Deflated: so many megabytes of zeros behind a beginning.
+/// Deflated: so many megabytes of zeros after a start.
 pub fn deflated(beginning: &[u8], megabytes: usize) -> Vec<u8> {
     let mut packer = Compress::new(Compression::default(), false);
     let mut packed = |bytes: &[u8]| {
@@ -28,7 +28,7 @@ pub fn gzip(megabytes: usize) -> Vec<u8> {
     [&head[..], &deflated(&[], megabytes), &tail].concat()
 }
 
-/// In zlib, behind a beginning.
+/// In zlib, after a start.
 pub fn zlib(beginning: &[u8], megabytes: usize) -> Vec<u8> {
     // Adler-32 (RFC 1950, section 9): of zeros the second sum alone grows.
     let (mut a, mut b) = (1_u64, 0_u64);

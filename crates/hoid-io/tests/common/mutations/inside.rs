@@ -19,7 +19,7 @@ const MATLAB_HEADER: usize = 128;
 const COMPRESSED: u32 = 15;
 
 impl Inside {
-    /// What is in the bytes of a good file; none where nothing is packed.
+    /// Contents of the bytes of a good file; none if nothing is packed.
     pub fn of(extension: &str, bytes: &[u8]) -> Option<Self> {
         match extension {
             "npz" => zip(bytes),

@@ -1,11 +1,11 @@
 //! Files that were damaged on purpose, and what each reader has to make of them: values, or an error
-//! in words, within a second and 300 MB, and never a panic.
+//! as text, within a second and 300 MB, and never a panic.
 //!
 //! Case `k` of a seed is the same bytes on every machine: a good file is drawn, then some mutations
 //! of it. Formats that keep checksums over what is compressed are taken apart first and packed
-//! again, for damage behind a wrong checksum would only try the checksum.
+//! again, for damage after a wrong checksum would only try the checksum.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `draw` | numbers that look like chance, from a seed |
 //! | `originals` | the good files |

@@ -75,7 +75,7 @@ pub fn mutated(original: &Original, other: &Original, draw: &mut Draw) -> Vec<u8
 
 /// One mutation.
 fn mutate(bytes: &mut Vec<u8>, other: &[u8], original: &Original, draw: &mut Draw) {
-    // Behind a byte too many or too few a file of numbers is refused at once.
+    // After a byte too many or too few a file of numbers is refused at once.
     let keeps_length = !original.is_text() && draw.below(3) > 0;
     let kind = if keeps_length {
         *draw.one_of(&[0, 1, 2, 7, 8, 9, 11])
@@ -150,7 +150,7 @@ fn mutate(bytes: &mut Vec<u8>, other: &[u8], original: &Original, draw: &mut Dra
     }
 }
 
-/// A place in so many bytes: anywhere, or near the head or the end, which say most.
+/// A place in a given number of bytes: anywhere, or near the head or the end, which report most.
 fn place(length: usize, draw: &mut Draw) -> usize {
     match draw.below(4) {
         0 => draw.below(length.min(256)),
@@ -159,7 +159,7 @@ fn place(length: usize, draw: &mut Draw) -> usize {
     }
 }
 
-/// A part of so many bytes, short mostly.
+/// A part of a given number of bytes, short mostly.
 fn part(length: usize, draw: &mut Draw) -> (usize, usize) {
     let at = place(length, draw).min(length);
     let most = if draw.below(4) == 0 { length } else { 64 };

@@ -1,5 +1,5 @@
-//! The good files: what hoid writes, what other programs wrote (`fixtures/`), and texts with all that
-//! a CSV may hold.
+//! The good files: those that hoid writes, those of other programs (`fixtures/`), and texts with all that a CSV may
+//! hold.
 
 use std::{fs, path::Path};
 

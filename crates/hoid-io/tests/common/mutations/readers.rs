@@ -26,7 +26,7 @@ pub struct Answers {
 /// Gives a file to all readers.
 ///
 /// # Panics
-/// Where what must hold does not.
+/// If a condition of the function is violated.
 pub fn all(path: &Path, bytes: usize, choice: u64) -> Answers {
     let mut answers = Answers::default();
     let mut draw = Draw::new(choice, 0);

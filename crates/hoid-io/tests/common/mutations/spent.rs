@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// A time on the processor where the system tells it, else of the clock.
+/// Processor time if the system reports it, else wall time.
 pub struct Spent {
     on_processor: Option<Duration>,
     by_clock: Instant,

@@ -18,7 +18,7 @@ pub(super) fn coefficients(text: &str) -> Result<Ratio, String> {
                 let finite = |v: &f64| v.is_finite();
                 c.trim().parse::<f64>().ok().filter(finite).ok_or_else(|| {
                     let found = if c.trim().is_empty() { "nothing" } else { c.trim() };
-                    format!("at character {here} stands {found}, expected a coefficient (a number); {EXAMPLES}")
+                    format!("at character {here} there is {found}, expected a coefficient (a number); {EXAMPLES}")
                 })
             })
             .collect()

@@ -1,4 +1,4 @@
-//! Quotients of polynomials behind a delay, while a text is read.
+//! Quotients of polynomials after a delay, while a text is read.
 
 use crate::polynomial;
 
@@ -39,7 +39,7 @@ impl Ratio {
         }
     }
 
-    /// `self + sign other`; none where their delays differ.
+    /// `self + sign other`; none if their delays differ.
     pub fn plus(&self, other: &Self, sign: f64) -> Option<Self> {
         if self.delay_s != other.delay_s {
             return None;

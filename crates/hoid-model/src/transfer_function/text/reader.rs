@@ -30,7 +30,7 @@ impl Reader {
         }
     }
 
-    /// The next sign that is no blank, which is not taken.
+    /// The next sign that is not a blank, which is not taken.
     fn next(&mut self) -> Option<char> {
         while self.signs.get(self.at).is_some_and(|sign| sign.is_whitespace()) {
             self.at += 1;
@@ -50,7 +50,7 @@ impl Reader {
             None => "the end".to_owned(),
         };
         Err(format!(
-            "at character {} stands {found}, expected {expected}; {EXAMPLES}",
+            "at character {} there is {found}, expected {expected}; {EXAMPLES}",
             self.at + 1
         ))
     }
@@ -190,7 +190,7 @@ impl Reader {
         self.depth += 1;
         if self.depth > DEEPEST {
             return Err(format!(
-                "more than {DEEPEST} parentheses stand inside of each other at character {opened}; {EXAMPLES}"
+                "more than {DEEPEST} parentheses are nested at character {opened}; {EXAMPLES}"
             ));
         }
         let inside = self.sum()?;
@@ -253,7 +253,7 @@ impl Reader {
         }
     }
 
-    /// What a step gives must stay a number, and of a degree that someone means.
+    /// The result of a step must be finite and of a reasonable degree.
     fn checked(&mut self, ratio: Ratio, at: usize) -> Result<Ratio, String> {
         if ratio.num.len().max(ratio.den.len()) > HIGHEST_DEGREE + 1 {
             self.at = at;

@@ -102,7 +102,7 @@ fn what_is_wrong_is_named_with_its_place() {
         ("1,0,0/1", "higher degree"),
         (
             "s2/(s+1)^3",
-            "at character 2 stands '2', expected a sign before a number",
+            "at character 2 there is '2', expected a sign before a number",
         ),
         ("1/0", "divides by zero at character 3"),
         ("1/(s-s)", "divides by zero at character 3"),
@@ -110,38 +110,38 @@ fn what_is_wrong_is_named_with_its_place() {
         ("0^-1", "divides by zero"),
         (
             "90/(s(s+6)",
-            "at character 11 stands the end, expected ')' for the '(' at character 4",
+            "at character 11 there is the end, expected ')' for the '(' at character 4",
         ),
-        ("90/(s(s+6)))", "at character 12 stands ')'"),
-        ("90/s(s+6)", "at character 5 stands '('"),
-        ("1/2s", "at character 4 stands 's'"),
-        ("90/(z+1)", "at character 5 stands 'z'"),
-        ("90/s^0.5", "at character 6 stands '0', expected a whole number"),
-        ("90/s^", "at character 6 stands the end"),
+        ("90/(s(s+6)))", "at character 12 there is ')'"),
+        ("90/s(s+6)", "at character 5 there is '('"),
+        ("1/2s", "at character 4 there is 's'"),
+        ("90/(z+1)", "at character 5 there is 'z'"),
+        ("90/s^0.5", "at character 6 there is '0', expected a whole number"),
+        ("90/s^", "at character 6 there is the end"),
         ("90/s^99", "a whole number up to 50"),
-        ("90*/s", "at character 4 stands '/'"),
-        ("90/", "at character 4 stands the end"),
-        ("1.2.3/s", "at character 4 stands '.'"),
+        ("90*/s", "at character 4 there is '/'"),
+        ("90/", "at character 4 there is the end"),
+        ("1.2.3/s", "at character 4 there is '.'"),
         ("1e999/s", "a finite number"),
         ("1e200*1e200/s", "range of floating point"),
-        ("NaN", "at character 1 stands 'N'"),
-        ("NaN/1,0", "at character 1 stands NaN"),
-        ("1/1,x,0", "at character 5 stands x"),
-        ("1/1,,0", "at character 5 stands nothing"),
+        ("NaN", "at character 1 there is 'N'"),
+        ("NaN/1,0", "at character 1 there is NaN"),
+        ("1/1,x,0", "at character 5 there is x"),
+        ("1/1,,0", "at character 5 there is nothing"),
         ("1,2", "no '/'"),
-        ("1/2/3,4", "at character 3 stands 2/3"),
+        ("1/2/3,4", "at character 3 there is 2/3"),
         ("exp(-0.1)/s", "exp(-0.1s)"),
         ("exp(0.1s)/s", "delay is -0.1 s"),
         ("1/exp(-0.1s)", "delay is -0.1 s"),
         ("1/s+exp(-s)/s", "one delay"),
         ("e/s", "exp(-0.1s)"),
         ("(s^50)^50", "a degree of at most 50"),
-        ("90 % s", "at character 4 stands '%'"),
+        ("90 % s", "at character 4 there is '%'"),
     ] {
         let message = reason(text);
         assert!(message.contains(expected), "{text}: {message}");
     }
     assert!(reason("90/(s").contains("90/(s(s+6))"));
     assert!(reason(&"(".repeat(100_000)).contains("more than 50 parentheses"));
-    assert!(reason(&"-".repeat(100_000)).contains("stands the end"));
+    assert!(reason(&"-".repeat(100_000)).contains("there is the end"));
 }

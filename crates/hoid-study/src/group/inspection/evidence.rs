@@ -1,13 +1,13 @@
-//! What was found in the files of a group, for the line of the manifest that it belongs to.
+//! Findings in the files of a group, for the line of the manifest that it belongs to.
 
-/// What was found, for the line of the manifest that begins with `key`: below the table `table`.
+/// The findings, for the line of the manifest that starts with `key`: below the table `table`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
     /// Table of the manifest, as `[read]`; empty for its head.
     pub table: String,
     /// Key in that table; empty for the table itself.
     pub key: &'static str,
-    /// What was found, and how.
+    /// The findings, and how.
     pub words: String,
 }
 

@@ -14,7 +14,7 @@ const ORDERS: std::ops::RangeInclusive<usize> = 1..=6;
 /// Orders above the one that was chosen which the analysis may take for other runs.
 const ROOM: usize = 2;
 
-/// What the first run says.
+/// Results of the first run.
 pub struct FirstFit {
     pub nd: Option<(usize, usize)>,
     pub evidence: Vec<Evidence>,

@@ -1,8 +1,7 @@
-//! A look at the files of a group before they are analysed ([`Look`]): what is found in them stands in the
-//! manifest with the evidence beside it, to be looked through by a person; what was asked for is not looked
-//! for.
+//! A look at the files of a group before they are analysed ([`Look`]): what is found in them is in the manifest with
+//! the evidence next to it, to be looked through by a person; the request is not searched for.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `evidence` | what was found |
 //! | `first_fit` | form and order of the noise model of the first run |
@@ -12,19 +11,19 @@ mod first_fit;
 
 use std::path::Path;
 
-use hoid_analysis::{Known, Look, Seen};
+use hoid_analysis::{Look, LookOptions, RecordSummary};
 
 pub use evidence::Evidence;
 
 use super::{condition_settings::ConditionSettings, manifest::Manifest};
 use crate::StudyError;
 
-/// Completes a manifest by what its files say: the first run of each condition is looked at.
+/// Completes a manifest by what its files state: the first run of each condition is examined.
 ///
 /// # Errors
-/// [`StudyError::Io`] where the first file cannot be read at all; what cannot be found is said in
-/// the evidence.
-pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &Known) -> Result<Vec<Evidence>, StudyError> {
+/// [`StudyError::Io`] where the first file cannot be read at all; what cannot be found is reported
+/// in the evidence.
+pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -> Result<Vec<Evidence>, StudyError> {
     let mut evidence = Vec::new();
     let first = Look::at(&directory.join(&manifest.runs[0].file), known)?;
     let shown = manifest.runs[0].file.display().to_string();
@@ -43,7 +42,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &Known) -> Resu
         "[read]",
         "",
         if units.is_empty() {
-            "the files say no units: gains are in units of output by input".to_owned()
+            "the files state no units: gains are in units of output by input".to_owned()
         } else {
             format!("units in the file: {}", units.join(", "))
         },
@@ -52,7 +51,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &Known) -> Resu
     evidence.push(Evidence::new("[read]", "input", input.why));
     evidence.push(Evidence::new("[read]", "output", output.why));
     // All files are read by the columns of the first.
-    let of_all = Known {
+    let of_all = LookOptions {
         input: Some(input.column.clone()),
         output: Some(output.column.clone()),
         ..known.clone()
@@ -83,7 +82,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &Known) -> Resu
         let seen = match look.and_then(|look| look.seen) {
             Ok(seen) => seen,
             Err(reason) => {
-                evidence.push(Evidence::new("", "", format!("not looked at: {reason}")));
+                evidence.push(Evidence::new("", "", format!("not examined: {reason}")));
                 continue;
             }
         };
@@ -94,7 +93,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &Known) -> Resu
             manifest.conditions.insert(condition.clone(), settings);
         }
     }
-    // One span for all: what is whole in each condition.
+    // One span for all, complete in each condition.
     if let (None, None, Some(first)) = (known.from_s, known.to_s, spans.first())
         && spans.iter().all(|span| span == first)
     {
@@ -124,12 +123,12 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &Known) -> Resu
     Ok(evidence)
 }
 
-/// What the first run of a condition says of it.
+/// Statement of the first run of a condition about it.
 fn look_at(
-    seen: &Seen,
+    seen: &RecordSummary,
     condition: &str,
     table: &str,
-    known: &Known,
+    known: &LookOptions,
     evidence: &mut Vec<Evidence>,
     spans: &mut Vec<(f64, f64)>,
 ) -> ConditionSettings {

@@ -1,13 +1,13 @@
-//! The hypotheses with their probabilities, for output and signals behind the whitening filter.
+//! The hypotheses with their probabilities, for output and signals after the whitening filter.
 //!
 //! At each sample the probability of a hypothesis is multiplied by the density that it gave to the
 //! innovation, and all are normalised. At every birth the likeliest is the parent of new ones:
 //!
 //! - **a change of the gains**, and at every few births one of omega_nm and zeta_nm too, with the
 //!   prior probability of such a change since the last birth;
-//! - **a neighbouring delay**, as what may have held all the time: as old as its parent, each
-//!   parameter opened by the error that the difference of the delays makes in it; the first of them
-//!   when the bank begins;
+//! - **a neighbouring delay**, as an alternative that may have been true throughout: as old as its
+//!   parent, each parameter opened by the error that the difference of the delays makes in it; the
+//!   first of them when the bank starts;
 //! - **a change of the delay**: delays spread over all candidates, with gains that are opened as in
 //!   any change, and probabilities in proportion to the normal density of the step. The proposed
 //!   delays move on by one each time, so that each candidate has its turn, and the number of
@@ -64,7 +64,8 @@ pub struct Mixture {
     pub variance: f64,
 }
 
-/// Delays on either side of the likeliest that are proposed as what may have held all the time.
+/// Delays on either side of the likeliest that are proposed as an alternative that may have been
+/// true throughout.
 const NEIGHBOURS: usize = 3;
 /// Least probability of a hypothesis, relative to the likeliest: none is lost for ever.
 const LEAST_PROBABILITY: f64 = 1e-12;
@@ -106,8 +107,8 @@ impl<const M: usize> Bank<M> {
         Some(bank)
     }
 
-    /// The update by a sample: output and signals behind the whitening filter, `None` where they
-    /// are not known. Returns the innovation.
+    /// The update by a sample: output and signals after the whitening filter, `None` if they are
+    /// not known. Returns the innovation.
     pub fn update(&mut self, sample: Option<(f64, DelayedSignals<'_>)>, point: [f64; 2]) -> f64 {
         let innovation = self.update_hypotheses(sample, point);
         if self.detector.update(&self.hypotheses, self.samples, &self.prior) {
@@ -287,7 +288,7 @@ impl<const M: usize> Bank<M> {
         likeliest
     }
 
-    /// A child that says that the operator changes now.
+    /// A child that reports that the operator changes now.
     fn with_change(&self, parent: &Hypothesis, neuromuscular: bool) -> Hypothesis {
         let mut child = parent.with_change(self.samples, neuromuscular, &self.prior);
         child.before.delay = self.delay();

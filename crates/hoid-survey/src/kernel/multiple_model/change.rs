@@ -1,19 +1,17 @@
 //! When the operator changed, and in what.
 //!
-//! `Lambda = ln(sum of P(h) over those born within the last T)/(sum of P(h) over those that are older))`:
-//! the logarithm of the posterior odds of a change. It is the likelihood ratio of Willsky and Jones
-//! (A. S. Willsky and H. L. Jones, *IEEE Transactions on Automatic Control* 21 (1976) 108-112),
-//! with the size of the change and its time averaged out instead of maximised, so that its
-//! expectation does not grow with the number of times that are tried. A change is declared when
-//! Lambda is over the threshold and the likeliest of the recent hypotheses is old enough to say
-//! what changed. The next is declared only after Lambda has been below zero, when the new values
-//! have become the established ones, or when more turns out to have changed: the neuromuscular
-//! system, by the same odds of such hypotheses against all others, or the delay, by three standard
-//! errors.
+//! `Lambda = ln(sum of P(h) over those born within the last T)/(sum of P(h) over those that are older))`: the logarithm
+//! of the posterior odds of a change. It is the likelihood ratio of Willsky and Jones (A. S. Willsky and H. L. Jones,
+//! *IEEE Transactions on Automatic Control* 21 (1976) 108-112), with the size of the change and its time averaged out
+//! instead of maximised, so that its expectation does not grow with the number of times that are tried. A change is
+//! declared when Lambda is over the threshold and the likeliest of the recent hypotheses is old enough to report what
+//! changed. The next is declared only after Lambda has been below zero, when the new values have become the established
+//! ones, or when more proves to have changed: the neuromuscular system, by the same odds of such hypotheses against all
+//! others, or the delay, by three standard errors.
 //!
-//! The likeliest of the recent hypotheses says since when, and what held before: the change of each
-//! quantity over its standard error tells in what the operator changed. For the innovation variance
-//! that is `ln(s2/s1)/sqrt(2/n)` with the n samples since.
+//! The likeliest of the recent hypotheses assumes since when, and what held before: the change of each quantity over
+//! its standard error reports in what the operator changed. For the innovation variance that is `ln(s2/s1)/sqrt(2/n)`
+//! with the n samples since.
 
 use super::{
     hypothesis::{Hypothesis, Snapshot},
@@ -28,16 +26,16 @@ pub struct Change {
     pub samples_ago: u64,
     /// Lambda.
     pub log_odds: f64,
-    /// What held before.
+    /// The operator before.
     pub before: Snapshot,
-    /// What holds now.
+    /// The current operator.
     pub after: Snapshot,
     /// Change of K_e, K_e_dot, omega_nm, zeta_nm, of the innovation variance and of the delay, each
     /// over its standard error.
     pub z: [f64; OPERATOR + 2],
 }
 
-/// Lambda, and what has been declared since it rose above zero.
+/// Lambda, and the declarations since it rose above zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChangeDetector {
     log_odds: f64,
@@ -88,8 +86,8 @@ const DELAY_THRESHOLD: f64 = 3.0;
 const REGULARISATION: f64 = 1e-12;
 
 impl ChangeDetector {
-    /// The update by the hypotheses after a sample. True where Lambda rises above zero: a change
-    /// begins.
+    /// The update by the hypotheses after a sample. True if Lambda rises above zero: a change
+    /// starts.
     pub fn update(&mut self, hypotheses: &[Option<Hypothesis>], now: u64, prior: &ChangePrior) -> bool {
         let sums = Sums::over(hypotheses, now, prior);
         let before = self.log_odds;
@@ -103,7 +101,7 @@ impl ChangeDetector {
         self.log_odds > 0.0 && before <= 0.0
     }
 
-    /// Declares the change that the likeliest of the recent hypotheses stands for, once it has
+    /// Declares the change that the likeliest of the recent hypotheses represents, once it has
     /// settled and if there is something new in it.
     fn declare(&mut self, sums: &Sums<'_>, hypotheses: &[Option<Hypothesis>], now: u64, prior: &ChangePrior) {
         let Some(h) = sums.likeliest.filter(|h| now - h.born >= prior.settling_time) else {
@@ -114,7 +112,7 @@ impl ChangeDetector {
             h.neuromuscular_changed && log_odds(sums.neuromuscular, others.max(0.0)) > prior.log_odds_threshold;
         let new_neuromuscular = neuromuscular_changed && !self.declared_neuromuscular;
         let delay_may_be_new = prior.delay.count > 1 && !self.declared_delay;
-        // Most samples behind a change have nothing more to declare and end here.
+        // Most samples after a change have nothing more to declare and end here.
         if self.declared && !new_neuromuscular && !delay_may_be_new {
             return;
         }
@@ -145,7 +143,7 @@ impl ChangeDetector {
 struct Sums<'a> {
     recent: f64,
     older: f64,
-    /// Of the recent ones in which omega_nm and zeta_nm changed too.
+    /// For the recent ones in which omega_nm and zeta_nm changed too.
     neuromuscular: f64,
     likeliest: Option<&'a Hypothesis>,
 }
@@ -177,8 +175,8 @@ fn log_odds(probability: f64, of_others: f64) -> f64 {
     libm::log((probability + REGULARISATION) / (of_others + REGULARISATION))
 }
 
-/// True for a hypothesis within the change window. The first, born at sample 0, stands for no
-/// change.
+/// True for a hypothesis within the change window. The first, born at sample 0, does not correspond
+/// to any change.
 fn is_recent(h: &Hypothesis, now: u64, prior: &ChangePrior) -> bool {
     h.born > 0 && now - h.born < prior.change_window
 }
@@ -197,7 +195,7 @@ pub(super) fn delay_of<'a>(hypotheses: impl Iterator<Item = &'a Hypothesis>) -> 
     [mean, (second / sum - mean * mean).max(0.0) + 1.0 / 12.0]
 }
 
-/// The change that a hypothesis stands for, with the delay after it.
+/// The change that a hypothesis represents, with the delay after it.
 fn change_of(h: &Hypothesis, delay: [f64; 2], now: u64, log_odds: f64) -> Change {
     let (before, after) = (h.before, Snapshot { delay, ..h.snapshot() });
     let samples_ago = now - h.born;

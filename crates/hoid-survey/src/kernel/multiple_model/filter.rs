@@ -1,4 +1,4 @@
-//! The recursion: the filters of the signals, and behind them the bank of hypotheses.
+//! The recursion: the filters of the signals, and after them the bank of hypotheses.
 //!
 //! A sample passes the [`Response`] to the held error, the whitening filter D and the ring of
 //! delayed signals to the [`Bank`]. Now and then the linearisation point of the response follows
@@ -25,7 +25,7 @@ pub struct MultipleModelFilter<const M: usize, const D: usize, B = [Signals; 1]>
     bank: Bank<M>,
     response: Response,
     ring: SignalRing<B>,
-    /// Coefficients of D behind the 1, and their number.
+    /// Coefficients of D after the 1, and their number.
     d: [f64; D],
     order: usize,
     /// The past of u and of the signals, newest first.
@@ -170,7 +170,7 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
         &self.bank
     }
 
-    /// Coefficients of D behind the 1.
+    /// Coefficients of D after the 1.
     pub fn d(&self) -> &[f64] {
         &self.d[..self.order]
     }

@@ -15,7 +15,7 @@
 //!
 //! An innovation beyond the limit counts as one at the limit, in the density and in sigma^2, and as
 //! a measurement of so large a variance that it lies there (P. J. Huber, *Robust Statistics*, 1981,
-//! section 7.3): an outlier says nothing about which hypothesis predicts better.
+//! section 7.3): an outlier carries no information about which hypothesis predicts better.
 
 use super::{
     elementary::{exp, log1p},
@@ -195,7 +195,7 @@ impl Hypothesis {
     /// where they are known no better than after a change.
     pub fn drift(&mut self, now: u64, prior: &ChangePrior) {
         let scales = self.gain_scales(prior);
-        // The first, born at sample 0, stands for no change.
+        // The first, born at sample 0, does not correspond to any change.
         let transient = match self.born {
             0 => 0.0,
             born => exp(-((now - born) as f64) / prior.transient_time_constant),

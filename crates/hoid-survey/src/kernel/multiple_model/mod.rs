@@ -1,9 +1,9 @@
 //! An operator who may change at any time: a bank of hypotheses about when they changed, weighted
 //! by how well each predicts the output.
 //!
-//! The operator's gains stand in its output, `w = K_e x1 + K_e_dot x2`, where x1 and x2 are the
-//! responses of the neuromuscular system to the delayed error and to its rate ([`response`]).
-//! Behind the whitening filter `D(q^-1)` of the noise the model is
+//! The operator's gains are in its output, `w = K_e x1 + K_e_dot x2`, where x1 and x2 are the
+//! responses of the neuromuscular system to the delayed error and to its rate ([`response`]). After
+//! the whitening filter `D(q^-1)` of the noise the model is
 //!
 //! `D u = K_e D x1 + K_e_dot D x2 + eps`,
 //!
@@ -11,7 +11,7 @@
 //! enter through the derivatives of x1 and x2 at a linearisation point that all hypotheses share
 //! and that follows the estimate. D is that of the start fit and stays.
 //!
-//! **A hypothesis** ([`hypothesis`]) says that the operator last changed at its birth. It is a
+//! **A hypothesis** ([`hypothesis`]) states that the operator last changed at its birth. It is a
 //! Kalman filter of `eta = [K_e, K_e_dot, omega_nm, zeta_nm]` with an innovation variance of its
 //! own. Apart from a slow drift of the gains, faster in its first seconds, nothing changes any
 //! more, so that its memory grows for as long as it lives. At regular intervals one is born

@@ -1,5 +1,4 @@
-//! What is expected of an operator before the data: how often they change, by how much, and in
-//! what.
+//! Expectations about an operator before the data: how often they change, by how much, and in what.
 //!
 //! Times are in samples. Changes of the gains are given relative to
 //! `g = sqrt(K_e^2 + omega_c^2 K_e_dot^2)`, the gain of the operator's lead term at the crossover
@@ -47,7 +46,7 @@ pub struct ChangePrior {
     pub pruning_age: u64,
     /// Samples within which a birth counts as a recent change.
     pub change_window: u64,
-    /// Samples that the estimates take to settle after a change; before, a hypothesis cannot say
+    /// Samples that the estimates take to settle after a change; before, a hypothesis cannot report
     /// what changed.
     pub settling_time: u64,
     /// Logarithm of the posterior odds from which a change is declared.
@@ -82,7 +81,7 @@ pub struct DelayPrior {
     pub change_odds: f64,
     /// Standard deviation of a change of the delay, samples.
     pub jump: f64,
-    /// Prior probability of a delay one sample beside the likeliest.
+    /// Prior probability of a delay one sample next to the likeliest.
     pub neighbour_probability: f64,
     /// Errors of the parameters that an error of one sample in the delay brings about (standard
     /// deviations): K_e and K_e_dot relative to g, omega_nm and zeta_nm relative to their values.

@@ -2,7 +2,7 @@
 //!
 //! The response to an error that arrives k samples later is the response k samples ago. So one
 //! filter gives the signals for all delays between the shortest and the longest, and a ring buffer
-//! keeps those of the last samples, behind the whitening filter.
+//! keeps those of the last samples, after the whitening filter.
 
 use super::response::Signals;
 
@@ -14,7 +14,7 @@ pub struct DelayedSignals<'a> {
 }
 
 impl<'a> DelayedSignals<'a> {
-    /// Of a delay that is known.
+    /// For a delay that is known.
     pub fn known(signals: &'a Signals) -> Self {
         Self {
             ring: std::slice::from_ref(signals),

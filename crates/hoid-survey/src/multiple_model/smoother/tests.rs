@@ -29,7 +29,7 @@ fn a_product_is_that_of_the_information_form() {
         side([1.0, 2.0, 3.0, 4.0], 0.5, 0.4),
         side([1.5, 1.0, 3.5, 4.2], 2.0, 0.6),
     );
-    let (_, pair) = Pair::of(&f, &b).unwrap();
+    let (_, pair) = ForwardBackward::of(&f, &b).unwrap();
     let joined = pair.product();
     let square = |m: &[[f64; OPERATOR]; OPERATOR]| nalgebra::Matrix4::from_fn(|i, j| m[i][j]);
     let inverse = |s: &Side| square(&s.covariance).try_inverse().unwrap();
@@ -55,7 +55,7 @@ fn a_past_and_a_future_that_contradict_each_other_are_not_joined() {
     for i in 0..OPERATOR {
         assert!((joined.eta[i] - mirrored.eta[i]).abs() < 1e-12);
     }
-    // Covariances that are no numbers leave the past alone.
+    // Covariances that are not numbers leave the past alone.
     let broken = Side {
         covariance: [[f64::NAN; OPERATOR]; OPERATOR],
         ..old
@@ -68,8 +68,8 @@ fn options() -> TrackOptions {
         start: StartAt::Span(Some((0.0, 30.72))),
         ..TrackOptions::new(
             multiple_model().with("smooth", "true").unwrap(),
-            multiple_model().usual_structure(),
-            multiple_model().usual_orders(29),
+            multiple_model().default_structure(),
+            multiple_model().default_orders(29),
         )
     }
 }
@@ -94,7 +94,7 @@ fn without_a_change_all_rows_say_nearly_the_same() {
     for row in &rows {
         for ((_, _, a), (_, _, b)) in row.rows()[..5].iter().zip(last.rows()) {
             let se = b.standard_error.unwrap();
-            // What drifts within half a run is less than what is known of it.
+            // What drifts within half a run is less than the prior knowledge of it.
             assert!((a.value - b.value).abs() < 2.0 * se, "{a:?} {b:?}");
         }
     }

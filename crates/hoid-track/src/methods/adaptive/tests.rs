@@ -16,7 +16,7 @@ fn record(condition: Condition) -> Record {
 }
 
 fn options() -> TrackOptions {
-    TrackOptions::usual(Method::adaptive(), 29)
+    TrackOptions::default_for(Method::adaptive(), 29)
 }
 
 #[test]
@@ -41,7 +41,7 @@ fn a_change_of_the_person_is_followed() {
     assert!((last.k_e_dot.value - 0.084).abs() < 0.02, "{last:?}");
 }
 
-/// T_L after a change over the truth, rows from 9 s behind it on, the mean of four runs. With the covariance of all
+/// T_L after a change over the truth, rows from 9 s after it on, the mean of four runs. With the covariance of all
 /// hypotheses in one quotient it was .76.
 #[test]
 fn the_lead_after_a_change_is_not_too_short() {
@@ -118,15 +118,15 @@ fn a_trace_tells_gain_and_phase_with_bands() {
     let record = record(Condition::C1);
     let at_rad_s = vec![1.0, 2.5];
     for method in [Method::adaptive(), Method::rls()] {
-        let usual = TrackOptions {
+        let default = TrackOptions {
             at_rad_s: at_rad_s.clone(),
-            ..TrackOptions::usual(method, 29)
+            ..TrackOptions::default_for(method, 29)
         };
-        let trace = track(&record, &usual, 512).unwrap();
-        let span = usual
+        let trace = track(&record, &default, 512).unwrap();
+        let span = default
             .start_span(&record)
             .and_then(|(from, to)| record.span(from, to).ok());
-        let mut tracker = Tracker::new(&usual, span.as_ref(), record.sample_time()).unwrap();
+        let mut tracker = Tracker::new(&default, span.as_ref(), record.sample_time()).unwrap();
         for k in 0..record.len() {
             let sample = Sample {
                 e: record.input()[k],
@@ -153,7 +153,7 @@ fn a_trace_tells_gain_and_phase_with_bands() {
         let averaged = trace.clone().moving_average(2);
         let (a, b) = (trace.response(9, 0).unwrap(), trace.response(10, 0).unwrap());
         let mean = averaged.response(10, 0).unwrap();
-        if usual.method == Method::adaptive() {
+        if default.method == Method::adaptive() {
             assert!((mean.value[0] - 0.5 * (a.value[0] + b.value[0])).abs() < 1e-12);
         }
         assert!(mean.covariance[0][0] > 0.0);

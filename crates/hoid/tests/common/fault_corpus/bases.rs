@@ -1,9 +1,8 @@
 //! The runs without faults, and their truth.
 //!
-//! Each case has a run of condition C1 and one of C2 of the reference text, and a virtual person of
-//! one to three runs: their form, remnant, plant, rate and whether their disturbance was recorded
-//! follow from the number of the case. Who changes (C3 to C6) is left out: their truth is not one
-//! number.
+//! Each case has a run of condition C1 and one of C2 of the thesis, and a virtual person of one to
+//! three runs: their form, remnant, plant, rate and whether their disturbance was recorded follow
+//! from the number of the case. Who changes (C3 to C6) is left out: their truth is not one number.
 
 use hoid::{
     model::{FamilyOperator, Form},
@@ -62,7 +61,7 @@ impl Base {
 /// The runs of a case.
 ///
 /// # Errors
-/// Those of the simulation.
+/// The errors of the simulation.
 pub fn base(who: Who, seed: u64, case: u64) -> Result<Base, SimError> {
     match who {
         Who::C1 | Who::C2 => of_text(who, seed, case),
@@ -109,7 +108,7 @@ fn of_text(who: Who, seed: u64, case: u64) -> Result<Base, SimError> {
 }
 
 fn of_person(seed: u64, case: u64) -> Result<Base, SimError> {
-    // A part of the corpus, every tenth case say, must have all kinds of people too.
+    // A part of the corpus, every tenth case report, must have all kinds of people too.
     let i = (case + case / 10) as usize;
     let task = Task {
         sample_time: SampleTime::new([1.0 / 60.0, 0.01][i / 2 % 2])?,
@@ -146,7 +145,7 @@ fn of_person(seed: u64, case: u64) -> Result<Base, SimError> {
 
 fn named(operator: &FamilyOperator) -> Truth {
     let all = operator.named().into_iter();
-    // An infinite T_I is no number to be off from.
+    // An infinite T_I is not a number to be off from.
     all.filter(|p| p.value.is_finite())
         .map(|p| (p.name.to_owned(), p.value))
         .collect()

@@ -3,7 +3,7 @@
 use hoid::prelude::RunSeed;
 
 use super::{
-    kinds::{Fault, On, Place, WHOLE, What},
+    kinds::{Fault, FaultPosition, On, WHOLE, What},
     table::{Table, spread},
 };
 
@@ -11,11 +11,10 @@ use super::{
 #[derive(Debug, Clone)]
 pub struct Injected {
     pub table: Table,
-    /// Where the fault shows, s from the first sample; of what stays, the moment it begins.
+    /// Where the fault shows, s from the first sample; of what stays, the moment it starts.
     pub from_s: f64,
     pub to_s: f64,
-    /// The first row that is another and the first behind the last such, by the rows of the recording
-    /// without the fault.
+    /// The first row that is another and the first after the last such, by the rows of the recording without the fault.
     pub rows: (usize, usize),
 }
 
@@ -39,16 +38,16 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
     let sign = |i: u64| if draw(i) < 0.5 { -1.0 } else { 1.0 };
     let near = |share: f64| ((share + 0.02 * (draw(0) - 0.5)) * n as f64) as usize;
     let at = match fault.place {
-        Place::Start => near(0.06),
-        Place::Middle => near(0.5),
-        Place::End => near(0.9),
-        Place::Whole => 0,
+        FaultPosition::Start => near(0.06),
+        FaultPosition::Middle => near(0.5),
+        FaultPosition::End => near(0.9),
+        FaultPosition::Whole => 0,
     };
     let samples = |seconds: f64| ((seconds / clean.h).round() as usize).max(1);
     let until = |length: usize| at.saturating_add(length).min(n);
     let (on, size) = (fault.kind.on, fault.size);
     let seconds = if size == WHOLE { n } else { samples(size) };
-    // Rows that differ; what shows is the same but for what stays.
+    // Rows that differ; the visible text is the same except for what stays.
     let mut rows = (at, n);
     let mut stays = false;
     match fault.kind.what {
@@ -90,11 +89,11 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
             each(&mut table, on, rows, |_, _, is_e| if is_e { e } else { u });
         }
         What::Idle | What::IdleNoisy => {
-            // Before the run, inside it, behind it.
+            // Before the run, inside it, after it.
             let at = match fault.place {
-                Place::Start => 0,
-                Place::End => n,
-                Place::Middle | Place::Whole => at,
+                FaultPosition::Start => 0,
+                FaultPosition::End => n,
+                FaultPosition::Middle | FaultPosition::Whole => at,
             };
             let small = if fault.kind.what == What::Idle { 0.0 } else { 1e-3 };
             let length = samples(size);

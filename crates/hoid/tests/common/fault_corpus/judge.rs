@@ -1,13 +1,12 @@
-//! What a result is worth, against the truth.
+//! Reliability of a result, against the truth.
 //!
 //! The error of a parameter is its distance from the truth in its own standard errors; a delay that
 //! is found on the grid of samples alone has one sample for an error. A parameter that is reported as
 //! not determined, or has no error at all, claims nothing.
 //!
-//! A trace is wrong where it is at its last row or [`LATER_S`] behind the fault. Its recovery is the
-//! time from the end of the fault to the last row at which a parameter is off by more than
-//! [`NEAR_ERRORS`] of its errors and by more than [`NEAR_SHARE`] of its truth. Its lasting error is
-//! the largest that it had for [`LASTING_S`] on end.
+//! A trace is wrong where it is at its last row or [`LATER_S`] after the fault. Its recovery is the time from the end
+//! of the fault to the last row at which a parameter is off by more than [`NEAR_ERRORS`] of its errors and by more than
+//! [`NEAR_SHARE`] of its truth. Its lasting error is the largest that it had for [`LASTING_S`] on end.
 
 use serde_json::Value;
 
@@ -17,19 +16,19 @@ use super::bases::Truth;
 pub const WRONG: f64 = 4.0;
 /// How near a report must be to its fault, s.
 pub const NEAR_S: f64 = 1.0;
-/// When a trace is looked at once more, s behind the fault.
+/// When a trace is examined once more, s after the fault.
 pub const LATER_S: f64 = 20.0;
 const NEAR_ERRORS: f64 = 2.5;
 const NEAR_SHARE: f64 = 0.1;
 const LASTING_S: f64 = 5.0;
-/// Findings that tell of faults of the recording, and of nothing else.
+/// Findings that report faults of the recording, and of nothing else.
 const OF_FAULTS: [&str; 4] = ["faults", "held-back", "hostile-span", "restarted"];
 
-/// What is known of a case.
+/// Known properties of a case.
 #[derive(Debug, Clone)]
-pub struct Known {
+pub struct CaseTruth {
     pub truth: Truth,
-    /// The truth behind the fault, where that is another person.
+    /// The truth after the fault, where that is another person.
     pub then: Option<Truth>,
     /// Where the fault shows, s; `None` in a clean run.
     pub span_s: Option<(f64, f64)>,
@@ -40,15 +39,15 @@ pub struct Known {
 
 /// The judgement of one result.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Judged {
+pub struct CaseOutcome {
     /// The parameter that is off most, and by how many standard errors.
     pub worst: Option<(String, f64)>,
     pub wrong: bool,
     /// The verdict in a word; "refused" where there is no result.
     pub level: String,
-    /// What speaks against the result, by kinds.
+    /// Findings against the result, by kinds.
     pub kinds: Vec<String>,
-    /// Whether a finding that is more than a note tells of faults.
+    /// Whether a finding that is more than a note reports faults.
     pub of_faults: bool,
     /// Faults that are reported, and whether one is at the right place.
     pub told: usize,
@@ -59,7 +58,7 @@ pub struct Judged {
     pub lasting: Option<f64>,
 }
 
-impl Judged {
+impl CaseOutcome {
     /// A record that the program refuses.
     pub fn refused() -> Self {
         Self {
@@ -68,7 +67,7 @@ impl Judged {
         }
     }
 
-    /// Whether the user is told that something is amiss.
+    /// Whether the user is reported that something is amiss.
     pub fn flagged(&self) -> bool {
         self.level != "trustworthy" || self.placed
     }
@@ -89,11 +88,11 @@ pub struct Row {
     pub claims: Vec<Claim>,
 }
 
-/// Judges a fit by what the program printed.
-pub fn of_fit(json: &Value, known: &Known) -> Judged {
+/// Judges a fit by the output of the program.
+pub fn of_fit(json: &Value, known: &CaseTruth) -> CaseOutcome {
     let claims = claims_of(json, known);
     let worst = worst_of(&claims, &known.truth);
-    Judged {
+    CaseOutcome {
         wrong: worst.as_ref().is_some_and(|(_, z)| *z > WRONG),
         worst,
         ..reported(json, known)
@@ -101,7 +100,7 @@ pub fn of_fit(json: &Value, known: &Known) -> Judged {
 }
 
 /// Judges a trace.
-pub fn of_trace(json: &Value, rows: &[Row], known: &Known) -> Judged {
+pub fn of_trace(json: &Value, rows: &[Row], known: &CaseTruth) -> CaseOutcome {
     let truth_at = |t: f64| match (&known.then, known.span_s) {
         (Some(then), Some((from, _))) if t >= from => then,
         _ => &known.truth,
@@ -123,14 +122,14 @@ pub fn of_trace(json: &Value, rows: &[Row], known: &Known) -> Judged {
         let after: Vec<&Row> = rows.iter().filter(|row| row.t >= behind).collect();
         let far = |row: &&&Row| !is_near(&row.claims, truth_at(row.t));
         let last = after.last()?.t;
-        // A trace that ends with the fault, or so soon after that nothing can be said.
+        // A trace that ends with the fault, or so soon after that nothing can be reported.
         (last - behind > 1.0).then(|| match after.iter().rfind(far) {
             Some(row) if row.t >= last => f64::INFINITY,
             Some(row) => row.t - behind,
             None => 0.0,
         })
     });
-    Judged {
+    CaseOutcome {
         wrong: worst.as_ref().is_some_and(|(_, z)| *z > WRONG),
         worst,
         recovery_s,
@@ -140,7 +139,7 @@ pub fn of_trace(json: &Value, rows: &[Row], known: &Known) -> Judged {
 }
 
 /// Verdict and reported faults of any result.
-fn reported(json: &Value, known: &Known) -> Judged {
+fn reported(json: &Value, known: &CaseTruth) -> CaseOutcome {
     let verdict = &json["verdict"];
     let findings = verdict["findings"].as_array().map_or(&[][..], Vec::as_slice);
     let graver = findings.iter().filter(|f| f["severity"] != "note");
@@ -157,17 +156,17 @@ fn reported(json: &Value, known: &Known) -> Judged {
         let ends = fault["to"].as_f64().unwrap_or(f64::INFINITY);
         begins <= to + NEAR_S && ends >= from - NEAR_S
     };
-    Judged {
+    CaseOutcome {
         level: verdict["level"].as_str().unwrap_or("none").to_owned(),
         of_faults: kinds.iter().any(|kind| OF_FAULTS.contains(&kind.as_str())),
         kinds,
         told: faults.len(),
         placed: faults.iter().filter(of_file).any(meets),
-        ..Judged::default()
+        ..CaseOutcome::default()
     }
 }
 
-fn claims_of(json: &Value, known: &Known) -> Vec<Claim> {
+fn claims_of(json: &Value, known: &CaseTruth) -> Vec<Claim> {
     let named = |name: &str| {
         let listed = json["parameters"]
             .as_array()

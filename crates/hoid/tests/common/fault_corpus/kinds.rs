@@ -39,7 +39,7 @@ pub enum What {
     Drift,
     /// A value that is held for some seconds.
     Frozen,
-    /// Some seconds of zeros put in before, inside or behind the run.
+    /// Some seconds of zeros put in before, inside or after the run.
     Idle,
     /// The same with a trace of noise: 0.001 standard deviations.
     IdleNoisy,
@@ -61,11 +61,11 @@ pub enum What {
     Quantised,
     /// Rows that are gone for some seconds, the time counted as if nothing were.
     Lost,
-    /// Rows that are there twice for some seconds, the time counted on.
+    /// Rows that are duplicated for some seconds, the time counted on.
     Duplicated,
     /// u later by some samples from here on.
     Late,
-    /// A record of so many samples.
+    /// A record of a given number of samples.
     Short,
     /// Another person from two thirds of the record on.
     SecondOperator,
@@ -80,14 +80,14 @@ pub struct Kind {
 
 /// Where in the record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
+pub enum FaultPosition {
     /// At 6 % of its length.
     Start,
     /// At a half.
     Middle,
     /// At 90 %.
     End,
-    /// All of it, or where the kind says.
+    /// All of it, or where the kind reports.
     Whole,
 }
 
@@ -96,15 +96,15 @@ pub enum Place {
 pub struct Fault {
     pub kind: Kind,
     pub size: f64,
-    pub place: Place,
+    pub place: FaultPosition,
 }
 
 const CHANNELS: &[On] = &[On::E, On::U, On::Both];
 const EACH: &[On] = &[On::E, On::U];
 const TOGETHER: &[On] = &[On::Both];
 const ONE: &[On] = &[On::U];
-const PLACES: &[Place] = &[Place::Start, Place::Middle, Place::End];
-const ALL: &[Place] = &[Place::Whole];
+const PLACES: &[FaultPosition] = &[FaultPosition::Start, FaultPosition::Middle, FaultPosition::End];
+const ALL: &[FaultPosition] = &[FaultPosition::Whole];
 /// The whole record.
 pub const WHOLE: f64 = f64::INFINITY;
 
@@ -115,7 +115,7 @@ type Line = (
     &'static str,
     &'static [On],
     &'static [f64],
-    &'static [Place],
+    &'static [FaultPosition],
 );
 
 const LINES: [Line; 23] = [
@@ -158,7 +158,7 @@ const LINES: [Line; 23] = [
         "times",
         TOGETHER,
         &[10.0, 1e6],
-        &[Place::Start, Place::Middle],
+        &[FaultPosition::Start, FaultPosition::Middle],
     ),
     (What::Milliseconds, "t in ms", "", TOGETHER, &[1000.0], ALL),
     (What::Swapped, "swapped", "s", TOGETHER, &[10.0, 30.0, WHOLE], PLACES),
@@ -196,7 +196,7 @@ impl Fault {
     pub const NONE: Self = Self {
         kind: Kind::NOTHING,
         size: 0.0,
-        place: Place::Whole,
+        place: FaultPosition::Whole,
     };
 
     /// Size with its unit: `30 sigma`.
@@ -220,7 +220,7 @@ pub fn faults() -> Vec<Fault> {
     for (what, _, _, channels, sizes, places) in LINES {
         for &on in channels {
             for &size in sizes {
-                // What has the whole record has no place in it; a wrap begins somewhere.
+                // What has the whole record has no place in it; a wrap starts somewhere.
                 let places = if size == WHOLE && what != What::Wrap {
                     ALL
                 } else {

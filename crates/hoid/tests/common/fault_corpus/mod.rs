@@ -1,6 +1,6 @@
-//! What does a fault of a recording do to a result, and does the result say so? Virtual runs whose
-//! operator is known get one fault each, are given to the program `hoid` as files, and what comes
-//! back is judged.
+//! What does a fault of a recording do to a result, and does the result report it? Virtual runs
+//! whose operator is known get one fault each, are given to the program `hoid` as files, and what
+//! comes back is judged.
 //!
 //! A result is *wrong* where a parameter that is reported as determined lies more than
 //! [`judge::WRONG`] of its standard errors from the truth. It is *flagged* where the verdict is not
@@ -11,7 +11,7 @@
 //! Methods that estimate wrongly on clean runs too, as `rls` with its own noise model, do so here:
 //! the clean runs are a row of the same table.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `table` | a recording as the columns of a file |
 //! | `kinds` | the faults: kinds, sizes, places, and the cases in their order |

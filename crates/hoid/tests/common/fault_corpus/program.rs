@@ -12,13 +12,13 @@ use serde_json::Value;
 use super::{
     bases::{Base, Who, base},
     inject::inject,
-    judge::{self, Judged, Known, Row},
+    judge::{self, CaseOutcome, CaseTruth, Row},
     kinds::{Fault, What},
 };
 
 /// A run of the program that takes longer is ended, s.
 const LONGEST_S: u64 = 120;
-/// Every so many samples a row of a trace.
+/// Every n samples a row of a trace.
 const EVERY: &str = "10";
 
 /// How a record is evaluated, with default options.
@@ -83,15 +83,15 @@ pub struct Outcome {
     pub label: String,
     pub way: Way,
     pub seconds: f64,
-    pub judged: Judged,
-    /// What the program said when it gave no result.
+    pub judged: CaseOutcome,
+    /// What the program reported when it gave no result.
     pub refusal: Option<String>,
 }
 
-/// Evaluates a fault in the runs of `who` in each of the ways that are asked for and fit.
+/// Evaluates a fault in the runs of `who` in each of the ways that are requested and fit.
 ///
 /// # Errors
-/// What the simulation or the file system says.
+/// Report of the simulation or the file system.
 pub fn outcomes(
     program: &Path,
     seed: u64,
@@ -109,7 +109,7 @@ pub fn outcomes(
         let found = run(program, *way, &base, &files, &known, &folder)?;
         let (judged, refusal) = match found {
             Ok(judged) => (judged, None),
-            Err(said) => (Judged::refused(), Some(said)),
+            Err(said) => (CaseOutcome::refused(), Some(said)),
         };
         Ok(Outcome {
             case,
@@ -128,8 +128,8 @@ pub fn outcomes(
     all
 }
 
-/// The files of a case, the one with the fault last, and what is known of it.
-fn write(base: &Base, fault: &Fault, folder: &Path, seed: u64, case: u64) -> Result<(Vec<PathBuf>, Known), String> {
+/// The files of a case, the one with the fault last, and the prior knowledge of it.
+fn write(base: &Base, fault: &Fault, folder: &Path, seed: u64, case: u64) -> Result<(Vec<PathBuf>, CaseTruth), String> {
     let injected = inject(fault, &base.runs[base.faulty()], &base.second, seed, case);
     let mut files = Vec::new();
     for (i, run) in base.runs.iter().enumerate() {
@@ -141,7 +141,7 @@ fn write(base: &Base, fault: &Fault, folder: &Path, seed: u64, case: u64) -> Res
     for (file, text) in &files {
         fs::write(file, text).map_err(|e| format!("{}: {e}", file.display()))?;
     }
-    let known = Known {
+    let known = CaseTruth {
         truth: base.truth.clone(),
         then: (fault.kind.what == What::SecondOperator).then(|| base.second_truth.clone()),
         span_s: (fault.kind.what != What::Nothing).then_some((injected.from_s, injected.to_s)),
@@ -151,15 +151,15 @@ fn write(base: &Base, fault: &Fault, folder: &Path, seed: u64, case: u64) -> Res
     Ok((files.into_iter().map(|(file, _)| file).collect(), known))
 }
 
-/// The judgement, or what the program said instead of a result.
+/// The judgement, or the message of the program instead of a result.
 fn run(
     program: &Path,
     way: Way,
     base: &Base,
     files: &[PathBuf],
-    known: &Known,
+    known: &CaseTruth,
     folder: &Path,
-) -> Result<Result<Judged, String>, String> {
+) -> Result<Result<CaseOutcome, String>, String> {
     let trace = folder.join(format!("trace-{}.csv", way.name()));
     let mut command = Command::new(program);
     command.env("RAYON_NUM_THREADS", "1");

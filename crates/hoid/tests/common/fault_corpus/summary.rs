@@ -177,7 +177,7 @@ pub fn clean(all: &[Outcome]) -> String {
     text
 }
 
-/// What there is, in the order of the cases.
+/// The available items, in the order of the cases.
 fn kinds_and_sizes(all: &[Outcome]) -> Vec<(Kind, f64)> {
     let mut found = Vec::new();
     for o in all {

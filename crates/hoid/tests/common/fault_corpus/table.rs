@@ -9,7 +9,7 @@ use hoid::model::Record;
 pub struct Table {
     /// Time between two samples, s.
     pub h: f64,
-    /// Time as the file has it, s but for a fault of its unit.
+    /// Time as the file has it, s except for a fault of its unit.
     pub t: Vec<f64>,
     pub e: Vec<f64>,
     pub u: Vec<f64>,
@@ -17,7 +17,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// e and u of a record, with the disturbance where it is asked for and there.
+    /// e and u of a record, with the disturbance where it is requested and there.
     pub fn of(record: &Record, with_disturbance: bool) -> Self {
         let h = record.sample_time().s();
         Self {
@@ -35,7 +35,7 @@ impl Table {
         self.t.len()
     }
 
-    /// Seconds from the first sample to behind the last.
+    /// Seconds from the first sample to after the last.
     pub fn seconds(&self) -> f64 {
         self.len() as f64 * self.h
     }
@@ -45,13 +45,14 @@ impl Table {
         [&mut self.e, &mut self.u].into_iter().chain(self.d.as_mut())
     }
 
-    /// Counts the time anew, as a recorder does that knows nothing of rows that are gone or twice.
+    /// Counts the time again, as a recorder does that has no information about rows that are
+    /// missing or duplicated.
     pub fn renumber(&mut self) {
         let (n, h) = (self.e.len(), self.h);
         self.t = (0..n).map(|k| k as f64 * h).collect();
     }
 
-    /// As CSV; what is not there is an empty cell.
+    /// As CSV; missing items are an empty cell.
     pub fn to_csv(&self) -> String {
         let mut text = String::from(if self.d.is_some() { "t,e,u,d\n" } else { "t,e,u\n" });
         let cell = |x: f64| if x.is_nan() { String::new() } else { x.to_string() };

@@ -45,7 +45,7 @@ impl Variant {
     }
 }
 
-/// A quantity beside its truth.
+/// A quantity next to its truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantity {
     pub name: String,
@@ -58,15 +58,15 @@ pub struct Quantity {
 }
 
 impl Quantity {
-    /// Whether the interval holds the truth; `None` where there is no interval.
+    /// Whether the interval holds the truth; `None` if there is no interval.
     pub fn holds(&self) -> Option<bool> {
         self.interval.map(|(low, high)| low <= self.truth && self.truth <= high)
     }
 }
 
-/// What a fit found.
+/// Result of a fit.
 #[derive(Debug, Clone)]
-pub struct Found {
+pub struct FitOutcome {
     pub form: Form,
     pub level: VerdictLevel,
     /// Kinds of the findings.
@@ -86,13 +86,13 @@ pub struct Outcome {
     pub variant: Variant,
     pub true_form: Form,
     pub seconds: f64,
-    pub found: Result<Found, String>,
+    pub found: Result<FitOutcome, String>,
 }
 
 /// The fits of one person.
 ///
 /// # Errors
-/// Those of the simulation.
+/// The errors of the simulation.
 pub fn outcomes(seed: u64, number: u64, variants: &[Variant]) -> Result<Vec<Outcome>, SimError> {
     let (cell, person, records) = recorded(seed, number)?;
     let true_form = person.state.operator.form();
@@ -118,7 +118,7 @@ pub fn outcomes(seed: u64, number: u64, variants: &[Variant]) -> Result<Vec<Outc
     Ok(variants.iter().map(of).collect())
 }
 
-fn found(fit: &FamilyFit, person: &Person, cell: Cell) -> Found {
+fn found(fit: &FamilyFit, person: &Person, cell: Cell) -> FitOutcome {
     let truth = &person.state.operator;
     let of = fit.operator(0);
     let named = truth.named();
@@ -172,7 +172,7 @@ fn found(fit: &FamilyFit, person: &Person, cell: Cell) -> Found {
             own.phase_margin_interval,
         );
     }
-    Found {
+    FitOutcome {
         form: fit.form,
         level: fit.verdict.level,
         kinds: fit.verdict.findings().iter().map(|f| f.kind.to_string()).collect(),

@@ -11,7 +11,7 @@
 //! A share k/n has the standard error `sqrt(p (1 - p)/n)`; p is taken as `(k + 2)/(n + 4)`, so that
 //! n of n has one too (A. Agresti and B. A. Coull, *American Statistician* 52 (1998) 119-126).
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `people` | who is drawn, and their runs |
 //! | `fits` | the fits of a person, and what each found of each quantity |

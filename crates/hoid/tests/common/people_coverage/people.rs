@@ -1,4 +1,4 @@
-//! Who is drawn, and their runs.
+//! The person drawn, and their runs.
 
 use hoid::{
     model::{FamilyOperator, FamilyState},

@@ -27,7 +27,7 @@ pub struct Share {
 }
 
 impl Share {
-    /// Of these answers.
+    /// For these answers.
     pub fn over(answers: impl IntoIterator<Item = bool>) -> Self {
         answers.into_iter().fold(Self::default(), |share, yes| Self {
             of: share.of + usize::from(yes),
@@ -72,7 +72,7 @@ pub fn of_quantity<'a>(outcomes: &[&'a Outcome], name: &str) -> Vec<&'a Quantity
         .collect()
 }
 
-/// How often intervals of what is reported as determined hold the truth.
+/// How often intervals of the report as determined hold the truth.
 pub fn coverage(quantities: &[&Quantity]) -> Share {
     let determined = quantities.iter().filter(|q| q.determined);
     Share::over(determined.map(|q| q.holds().unwrap_or(false)))

@@ -35,7 +35,7 @@ pub enum Fault {
     Frozen { signal: Signal, seconds: f64 },
     /// Both.
     FrozenBoth { seconds: f64 },
-    /// Cut at so many standard deviations.
+    /// Cut at a given number of standard deviations.
     Saturated { signal: Signal, at: f64, seconds: f64 },
     /// NaN.
     Missing { signal: Signal, seconds: f64 },

@@ -1,4 +1,4 @@
-//! A tracker over a run with a fault, beside the same over the run without.
+//! A tracker over a run with a fault, next to the same over the run without.
 
 use hoid::{
     model::{remnant_gain::NoiseDefinition, scenario::RemnantStrength},
@@ -82,23 +82,23 @@ pub struct Reference {
     innovation: f64,
     pub held: u64,
     pub restarts: u64,
-    /// What the guard told of the run without a fault.
+    /// The report of the guard of the run without a fault.
     pub events: Vec<GuardEvent>,
 }
 
-/// What a fault did.
+/// Action of a fault.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effect {
     /// Largest distance from the estimate without the fault that lasts for more than a second, from
     /// one second after it on, in the standard errors of that.
     pub shift: f64,
     /// Time after the fault from which on the distance is at most twice the larger standard error;
-    /// none where that is never so.
+    /// none if that is never so.
     pub recovery_s: Option<f64>,
     pub held: u64,
     pub skipped: u64,
     pub restarts: u64,
-    /// True where the guard told of something within the fault or the time after it.
+    /// True if the guard told of something within the fault or the time after it.
     pub told: bool,
 }
 

@@ -1,0 +1,159 @@
+//! Scores `g_c = sum psi eps` and information `G_c = sum psi psi'` of blocks of records.
+//!
+//! Blocks are of [`BLOCK_S`], or longer where all records together would have more than [`MOST`]. A
+//! long record is passed in pieces of whole blocks, each with initial states of its own, so that the
+//! columns of psi need no memory in proportion to it.
+
+use std::ops::Range;
+
+use crate::{
+    criterion::{Data, Workspace},
+    grey_box::{objective::PhysicalCriterion, parametrisation::Parametrisation},
+    linalg::least_squares::{add_scaled, dot},
+};
+
+/// Length of a block, s: longer than the memory of residuals.
+pub(super) const BLOCK_S: f64 = 2.0;
+/// Blocks of all records.
+const MOST: usize = 96;
+/// Residuals of a piece.
+const PIECE: usize = 1 << 15;
+
+/// A block of a record.
+#[derive(Debug, Clone)]
+pub(crate) struct ScoreBlock {
+    pub record: usize,
+    /// Its first sample in the record; 0 for the first block.
+    pub from: usize,
+    pub g: Vec<f64>,
+    /// By rows.
+    pub big: Vec<f64>,
+}
+
+/// Residuals of a piece of a record, and the columns of psi with their places.
+pub(crate) type Scores = (Vec<f64>, Vec<(usize, Vec<f64>)>);
+
+/// The blocks of records whose residuals start at sample `first`, with p places; `None` if there
+/// are no scores.
+pub(crate) fn score_blocks(
+    data: &[Data<'_>],
+    first: usize,
+    p: usize,
+    sample_time_s: f64,
+    scores: &mut dyn FnMut(usize, Data<'_>) -> Option<Scores>,
+) -> Option<Vec<ScoreBlock>> {
+    let count = |d: &Data<'_>| d.u.len().saturating_sub(first);
+    let total: usize = data.iter().map(count).sum();
+    let length = ((BLOCK_S / sample_time_s).ceil() as usize)
+        .max(total.div_ceil(MOST))
+        .max(1);
+    let mut blocks = Vec::new();
+    for (record, whole) in data.iter().enumerate() {
+        let n = count(whole);
+        let number = (n / length).max(1);
+        let span = |k: usize| k * n / number..(k + 1) * n / number;
+        for several in pieces(number, n) {
+            let (from, to) = (span(several.start).start, span(several.end - 1).end);
+            let piece = Data {
+                e: &whole.e[from..first + to],
+                u: &whole.u[from..first + to],
+                ..*whole
+            };
+            let (eps, columns) = scores(record, piece)?;
+            for k in several {
+                let Range { start, end } = span(k);
+                let part = start - from..end - from;
+                if eps.len() < part.end || columns.iter().any(|(_, column)| column.len() < part.end) {
+                    return None;
+                }
+                let mut block = ScoreBlock {
+                    record,
+                    from: if k == 0 { 0 } else { first + start },
+                    g: vec![0.0; p],
+                    big: vec![0.0; p * p],
+                };
+                for (i, (place, column)) in columns.iter().enumerate() {
+                    let column = &column[part.clone()];
+                    block.g[*place] += dot(column, &eps[part.clone()]);
+                    for (other, against) in &columns[..=i] {
+                        let product = dot(column, &against[part.clone()]);
+                        block.big[place * p + other] = product;
+                        block.big[other * p + place] = product;
+                    }
+                }
+                blocks.push(block);
+            }
+        }
+    }
+    let finite = |block: &ScoreBlock| block.g.iter().chain(&block.big).all(|x| x.is_finite());
+    blocks.iter().all(finite).then_some(blocks)
+}
+
+/// Blocks of a record that are passed together.
+fn pieces(number: usize, residuals: usize) -> Vec<Range<usize>> {
+    let together = (PIECE * number / residuals.max(1)).max(1);
+    let starts = (0..number).step_by(together);
+    starts.map(|from| from..(from + together).min(number)).collect()
+}
+
+/// The blocks of a fit in physical parameters, over the elements of eta that are free.
+pub(crate) fn physical_blocks<P: Parametrisation>(
+    criterion: &PhysicalCriterion<'_, P>,
+    eta: &[f64],
+    free: &[usize],
+    workspace: &mut Workspace,
+) -> Option<Vec<ScoreBlock>> {
+    let ts = criterion.layout.sample_time().s();
+    let mut scores = |record: usize, data: Data<'_>| -> Option<Scores> {
+        // A piece of a long record does not say which piece of the other inputs is its own.
+        if !criterion.further.is_empty() && data.u.len() != criterion.data[record].u.len() {
+            return None;
+        }
+        let mapped = criterion.model_of(eta, record).ok()?;
+        let of_theta = criterion.with_data((mapped.orders, &mapped.further), record, data);
+        let eps = of_theta.residuals_of(&mapped.theta, 0, workspace);
+        let psi = of_theta.jacobian(&mapped.theta, 0, workspace);
+        let places = criterion.layout.positions(record).iter();
+        let columns = places
+            .zip(&mapped.columns)
+            .filter(|(place, _)| free.contains(place))
+            .map(|(place, slopes)| {
+                let mut column = vec![0.0; eps.len()];
+                for (slope, psi) in slopes.iter().zip(&psi).filter(|(slope, _)| **slope != 0.0) {
+                    add_scaled(&mut column, *slope, psi);
+                }
+                (*place, column)
+            })
+            .collect();
+        Some((eps, columns))
+    };
+    score_blocks(&criterion.data, criterion.first, eta.len(), ts, &mut scores)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_add_up_whatever_the_pieces() {
+        // One column, psi = 1: g is the sum of the residuals, G their number.
+        for n in [1000_usize, 100_000] {
+            let u: Vec<f64> = (0..n).map(|t| (0.1 * t as f64).sin()).collect();
+            let data = [Data::new(&u, &u)];
+            let mut scores = |_: usize, piece: Data<'_>| {
+                let eps = piece.u[30..].to_vec();
+                let ones = vec![1.0; eps.len()];
+                Some((eps, vec![(0, ones)]))
+            };
+            let blocks = score_blocks(&data, 30, 1, 0.01, &mut scores).unwrap();
+            let count: f64 = blocks.iter().map(|b| b.big[0]).sum();
+            let sum: f64 = blocks.iter().map(|b| b.g[0]).sum();
+            assert_eq!(count, (n - 30) as f64);
+            assert!((sum - u[30..].iter().sum::<f64>()).abs() < 1e-9);
+            assert!(blocks.len() <= MOST && blocks.len() >= 4, "{}", blocks.len());
+        }
+        let nothing = &mut |_: usize, _: Data<'_>| None;
+        let u = [0.0; 50];
+        assert!(score_blocks(&[Data::new(&u, &u)], 10, 1, 0.01, nothing).is_none());
+    }
+}

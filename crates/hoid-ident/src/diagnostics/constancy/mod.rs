@@ -1,0 +1,124 @@
+//! Whether the parameters of a fit are the same throughout: the scores over time.
+//!
+//! At the minimum the scores `s(t) = psi(t) eps(t)` sum to zero. Where a parameter changes within a record, or from one
+//! run to the next, they have one sign before and the other one behind (J. Nyblom, *JASA* 84 (1989) 223-230; B. E.
+//! Hansen, *J. Policy Modeling* 14 (1992) 517-533). For a direction v in the space of the parameters and a set A of
+//! samples (those of a record after an instant, or a whole run among others) the regressor of a change is `z = psi'v`
+//! in A and 0 elsewhere. Definition of the constant parameters do not explain of it
+//!
+//! `r(t) = psi(t)' w(t)`, `w = v - a` in A and `-a` elsewhere, `a = G^-1 G_A v`
+//!
+//! and the statistic of the Lagrange multiplier (D. W. K. Andrews, *Econometrica* 61 (1993) 821-856) is
+//! `T = U / sqrt V`, `U = sum r eps`, whose sup over all A is judged. With blocks c and their `g_c = sum psi eps`,
+//! `G_c = sum psi psi'` everything follows from `h_c = w_c' g_c` and `R_c = w_c' G_c w_c`: `U = sum h_c`,
+//! `R = sum R_c`, and the change itself is `delta = U/R`. Exact information in A, and not a share of time, since no one
+//! is excited evenly.
+//!
+//! **V is the largest** of three. By the model, `sigma^2 R`. By the scatter of blocks of 2 s about
+//! the change that is tested, `sum (h_c - delta R_c)^2 n/(n-2)`, which holds whatever the residuals
+//! are within a block: the misfit of a person's remnant is correlated over some tenths of a second
+//! (K.-Y. Liang and S. L. Zeger, *Biometrika* 73 (1986) 13-22; about the change, since a change must
+//! not hide itself). And by the median of this scatter over all A, since that of a few blocks is
+//! small by chance at times. Between runs people vary: `share^2 size^2 sum_runs (r'psi'v)^2` is added.
+//!
+//! **Level.** T is held against Student's distribution with n - 2 degrees of freedom. The p-value of
+//! the sup is the smaller of Bonferroni's and of that of continuous time ([`critical`]); directions
+//! and records are counted. The delay and the other parameters are judged apart, each on the level
+//! [`LEVEL`]. Where the operator is known the directions are its parameters, else coefficients.
+//!
+//! | file | contents |
+//! |---|---|
+//! | `blocks` | scores and information of blocks of records |
+//! | `critical` | p-values of a supremum |
+//! | `polynomials` | the scores of a fit of polynomials, with that of the delay |
+//! | `search` | all changes, and the one that is prominent |
+//! | `steadiness` | the same of columns that are known: jumps, drifts and sways |
+//! | `stretch` | the block that carries the fit |
+
+mod blocks;
+mod critical;
+mod polynomials;
+mod search;
+mod steadiness;
+mod stretch;
+#[cfg(test)]
+mod tests;
+
+use hoid_model::Finding;
+
+pub(crate) use blocks::{physical_blocks, score_blocks};
+pub use search::Course;
+use search::{Change, strongest};
+pub(crate) use search::{Constancy, Direction};
+pub use steadiness::{Unsteady, unsteady};
+use stretch::carrying;
+
+/// p-value below which a parameter counts as changed, for the delay and for all others.
+const LEVEL: f64 = 5e-4;
+/// Variation of people's parameters from run to run, where the estimator has no option for it.
+pub(crate) const DEFAULT_RUN_TO_RUN: f64 = 0.06;
+
+impl Constancy<'_> {
+    /// Doubts: a change, and a stretch that carries the fit (where the error bars are those of the model, and not of
+    /// the scatter of stretches).
+    pub fn findings(&self) -> Vec<Finding> {
+        self.change().into_iter().chain(self.stretch()).collect()
+    }
+
+    fn stretch(&self) -> Option<Finding> {
+        let found = carrying(self)?;
+        let time = |sample: usize| sample as f64 * self.sample_time_s;
+        let to = found.to.map_or("the end".to_owned(), |to| format!("{:.0} s", time(to)));
+        let records = self.blocks.last().map_or(0, |block| block.record + 1);
+        let record = if records > 1 {
+            format!(" of record {}", found.record + 1)
+        } else {
+            String::new()
+        };
+        let moves: Vec<String> = found
+            .moves
+            .iter()
+            .map(|(name, by)| format!("{name} by {by:.1}"))
+            .collect();
+        Some(Finding::doubt(
+            "stretch",
+            format!(
+                "the stretch from {:.0} s to {to}{record} carries the fit: without it {} standard errors elsewhere; look at \
+                 the recording there",
+                time(found.from),
+                moves.join(", ")
+            ),
+        ))
+    }
+
+    /// A doubt that reports what changes and about when.
+    pub fn change(&self) -> Option<Finding> {
+        let records = self.blocks.last().map_or(0, |block| block.record + 1);
+        let of = |delay: bool| strongest(self, delay).filter(|change| change.p_value < LEVEL);
+        let mut found: Vec<Change> = [of(true), of(false)].into_iter().flatten().collect();
+        found.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
+        let words: Vec<String> = found.iter().map(|change| self.words(change, records)).collect();
+        (!words.is_empty()).then(|| {
+            Finding::doubt(
+                "not-constant",
+                format!(
+                    "the person is not constant: {}; fit the parts apart, or take --change sigmoid or a tracker",
+                    words.join(", and ")
+                ),
+            )
+        })
+    }
+
+    fn words(&self, change: &Change, records: usize) -> String {
+        let at_s = change.at as f64 * self.sample_time_s;
+        let place = match (records, change.at) {
+            (0 | 1, _) => format!("about {at_s:.0} s after the start"),
+            (_, 0) => format!("in record {} next to the others", change.record + 1),
+            _ => format!("about {at_s:.0} s after the start of record {}", change.record + 1),
+        };
+        format!(
+            "{} changes by about {:+.2} ± {:.2}{} {place} (p = {:.0e})",
+            change.name, change.by, change.error, change.unit, change.p_value
+        )
+    }
+}

@@ -1,0 +1,136 @@
+//! The scores of a fit of polynomials, with that of the delay.
+//!
+//! nk is a whole number, but the residual has a slope along the delay too
+//! ([`searched_delay`](crate::searched_delay)). Its score need not sum to zero, as nk has no minimum
+//! between two samples; the step to the minimum is taken out with the others.
+
+use hoid_model::{
+    Finding, Record,
+    delayed_operator::{delayed_operator_jacobian_within, delayed_parameters},
+};
+
+use super::{
+    Constancy, DEFAULT_RUN_TO_RUN, Direction,
+    blocks::{ScoreBlock, Scores, score_blocks},
+};
+use crate::{
+    Fit,
+    criterion::{Criterion, Data, Workspace, first_residual},
+};
+
+/// Residuals of a robust fit are held to a given number of its scales, as its loss holds their
+/// slope.
+const CLIPPED: f64 = 1.345;
+/// Deviations of a sum of scores beyond which the fit is not a minimum of the squares: one for
+/// simulation, or with a prior that weighs more than the data.
+const MOST_OFF: f64 = 3.0;
+
+impl Fit {
+    /// Doubts where the operator is not the same throughout the records, or a stretch carries it. Nothing is reported
+    /// about models without an input or without noise, and of fits whose scores are not those of the squares.
+    pub(in crate::diagnostics) fn constancy_findings(&self, records: &[Record]) -> Vec<Finding> {
+        self.constancy(records).unwrap_or_default()
+    }
+
+    fn constancy(&self, records: &[Record]) -> Option<Vec<Finding>> {
+        let apart = self.instrumented || self.physical.is_some();
+        if apart || self.covariance.is_none() || !self.model.structure().has_input() {
+            return None;
+        }
+        let (orders, theta, ts) = (self.orders(), self.model.theta(), self.model.sample_time());
+        let p = theta.len();
+        let first = first_residual(&orders, self.initial_state);
+        let mut workspace = Workspace::of_thread();
+        let bound = if self.robust {
+            CLIPPED * self.innovation_variance.sqrt()
+        } else {
+            f64::INFINITY
+        };
+        let mut scores = |_: usize, data: Data<'_>| -> Option<Scores> {
+            let criterion = Criterion::of_record(orders, data, self.initial_state, first);
+            let mut eps = criterion.residuals_of(theta, 0, &mut workspace);
+            eps.iter_mut().for_each(|x| *x = x.clamp(-bound, bound));
+            let psi = self.jacobian_with_delay(&criterion, &mut workspace);
+            let free = psi.into_iter().enumerate().filter(|(i, _)| *i == p || !self.held[*i]);
+            Some((eps, free.collect()))
+        };
+        let data = Data::of(records);
+        let blocks = score_blocks(&data, first, p + 1, ts.s(), &mut scores)?;
+        let over_all = |of: &dyn Fn(&ScoreBlock) -> f64| blocks.iter().map(of).sum::<f64>();
+        let off = |i: usize| {
+            let information = over_all(&|block| block.big[i * (p + 1) + i]);
+            over_all(&|block| block.g[i]).powi(2) > MOST_OFF * MOST_OFF * self.innovation_variance * information
+        };
+        if (0..p).any(|i| !self.held[i] && off(i)) {
+            return None;
+        }
+        let constancy = Constancy {
+            blocks: &blocks,
+            directions: &self.directions(),
+            variance: self.innovation_variance,
+            run_to_run: DEFAULT_RUN_TO_RUN,
+            sample_time_s: ts.s(),
+        };
+        Some(constancy.findings())
+    }
+
+    /// The delay, and the operator's parameters or, where there is no operator, the coefficients.
+    fn directions(&self) -> Vec<Direction> {
+        let (orders, p) = (self.orders(), self.model.theta().len());
+        let unit_vector = |place: usize| {
+            let mut v = vec![0.0; p + 1];
+            v[place] = 1.0;
+            v
+        };
+        let mut all = vec![Direction {
+            name: "tau_e".to_owned(),
+            unit: " s",
+            vector: unit_vector(p),
+            delay: true,
+            size: orders.nk as f64 * self.model.sample_time().s(),
+        }];
+        match self.operator_directions() {
+            Some(found) => all.extend(found),
+            None => {
+                let names = orders.parameter_names().into_iter().enumerate();
+                let of_system = names.filter(|(i, name)| name.starts_with(['a', 'b', 'f']) && !self.held[*i]);
+                all.extend(of_system.map(|(i, name)| Direction {
+                    name,
+                    unit: "",
+                    vector: unit_vector(i),
+                    delay: false,
+                    size: self.model.theta()[i].abs(),
+                }));
+            }
+        }
+        all
+    }
+
+    fn operator_directions(&self) -> Option<Vec<Direction>> {
+        let ts = self.model.sample_time();
+        let whole = self.orders().nk.checked_sub(1)?;
+        if self.held.contains(&true) {
+            return None;
+        }
+        let mut parameters = delayed_parameters(&self.operator().ok()?.parameters());
+        parameters[4] = whole as f64 * ts.s();
+        // Rows b0, b1, b2, f1, f2.
+        let slopes = delayed_operator_jacobian_within(whole, parameters, ts).ok()?;
+        let places = self.model.operator_positions();
+        let named = [("K_e", ""), ("K_e_dot", " s"), ("omega_nm", " rad/s"), ("zeta_nm", "")];
+        let of = |(k, (name, unit)): (usize, (&str, &'static str))| {
+            let mut vector = vec![0.0; self.model.theta().len() + 1];
+            for (place, row) in places.into_iter().zip([0, 1, 3, 4]) {
+                vector[place] += slopes[row][k];
+            }
+            Direction {
+                name: name.to_owned(),
+                unit,
+                vector,
+                delay: false,
+                size: parameters[k].abs(),
+            }
+        };
+        Some(named.into_iter().enumerate().map(of).collect())
+    }
+}

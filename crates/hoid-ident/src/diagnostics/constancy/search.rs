@@ -1,0 +1,294 @@
+//! The change that is prominent among all directions, records and instants.
+
+use std::f64::consts::{FRAC_PI_4, TAU};
+
+use hoid_numerics::statistics::upper_median;
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+use super::{
+    blocks::ScoreBlock,
+    critical::{of_student, of_supremum},
+};
+
+/// Blocks on each side of a change.
+const FEWEST: usize = 2;
+/// Shortest period of a sway, in blocks.
+const SHORTEST: f64 = 5.0;
+/// Share of the information of a change that the constant parameters must leave.
+const LEFT: f64 = 1e-3;
+/// Eigenvalue of the information, scaled to a unit diagonal, below which a combination of parameters
+/// is not determined.
+const SINGULAR: f64 = 1e-9;
+
+/// The data inspected.
+pub(crate) struct Constancy<'a> {
+    pub blocks: &'a [ScoreBlock],
+    pub directions: &'a [Direction],
+    /// Innovation variance sigma^2.
+    pub variance: f64,
+    /// Variation of parameters between runs, as a part of them.
+    pub run_to_run: f64,
+    pub sample_time_s: f64,
+}
+
+/// A direction in the space of the parameters.
+#[derive(Debug, Clone)]
+pub(crate) struct Direction {
+    pub name: String,
+    /// Unit of the change, with a space in front where there is one.
+    pub unit: &'static str,
+    pub vector: Vec<f64>,
+    pub delay: bool,
+    /// The parameter's value, of which people vary by a part between runs; 1 for a logarithm, 0 for
+    /// what each run has for itself.
+    pub size: f64,
+}
+
+/// How a parameter goes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Course {
+    /// It jumps.
+    Step,
+    /// It drifts from one end to the other.
+    Drift,
+    /// It sways, with this period in s.
+    Sway(f64),
+}
+
+/// A change of a parameter.
+#[derive(Debug, Clone)]
+pub(super) struct Change {
+    pub course: Course,
+    pub name: String,
+    pub unit: &'static str,
+    pub record: usize,
+    /// First sample after it; 0 where a whole record differs from the others.
+    pub at: usize,
+    pub by: f64,
+    pub error: f64,
+    pub p_value: f64,
+}
+
+/// A change over the blocks: record, first sample, how it goes, and what share of it each block has.
+pub(super) struct Set {
+    record: usize,
+    at: usize,
+    course: Course,
+    weights: Vec<f64>,
+}
+
+impl Set {
+    /// All blocks of a range have it, others do not.
+    fn of_blocks(record: usize, at: usize, blocks: std::ops::Range<usize>, all: usize) -> Self {
+        let weights = (0..all).map(|c| f64::from(u8::from(blocks.contains(&c)))).collect();
+        Self {
+            record,
+            at,
+            course: Course::Step,
+            weights,
+        }
+    }
+}
+
+/// A change that is tested.
+struct Tested {
+    set: usize,
+    share: f64,
+    u: f64,
+    r: f64,
+    by_model: f64,
+    by_blocks: f64,
+    between_runs: f64,
+}
+
+/// The change with the smallest p-value among the delays, or among the others.
+pub(super) fn strongest(of: &Constancy<'_>, delay: bool) -> Option<Change> {
+    let directions: Vec<_> = of.directions.iter().filter(|d| d.delay == delay).collect();
+    strongest_among(of, &directions, &sets(of.blocks))
+}
+
+/// The same among these directions and courses.
+pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], sets: &[Set]) -> Option<Change> {
+    let (blocks, n) = (of.blocks, of.blocks.len());
+    let p = blocks.first()?.g.len();
+    if n < 2 * FEWEST || of.variance <= 0.0 || sets.is_empty() {
+        return None;
+    }
+    let matrices: Vec<DMatrix<f64>> = blocks.iter().map(|b| DMatrix::from_row_slice(p, p, &b.big)).collect();
+    let whole = matrices.iter().fold(DMatrix::zeros(p, p), |sum, m| sum + m);
+    let inverse = pseudo_inverse(&whole)?;
+    // A prior or a bound leaves a sum of scores: one step to the minimum without it.
+    let sum = blocks
+        .iter()
+        .fold(DVector::zeros(p), |sum, b| sum + DVector::from_column_slice(&b.g));
+    let step = &inverse * sum;
+    let scores: Vec<DVector<f64>> = blocks
+        .iter()
+        .zip(&matrices)
+        .map(|(b, m)| DVector::from_column_slice(&b.g) - m * &step)
+        .collect();
+    let mut best: Option<Change> = None;
+    for direction in directions {
+        let v = DVector::from_column_slice(&direction.vector);
+        let all: Vec<Tested> = (0..sets.len())
+            .filter_map(|k| tested(of, (&matrices, &scores), &inverse, (&v, direction.size), &sets[k], k))
+            .collect();
+        let mut ratios: Vec<f64> = all.iter().map(|t| t.by_blocks / t.by_model).collect();
+        let typical = upper_median(&mut ratios).unwrap_or(1.0);
+        let smallest = all.iter().map(|t| t.share.min(1.0 - t.share)).fold(0.5, f64::min);
+        for t in &all {
+            // All blocks have a share in a drift and a sway, and the typical scatter is that of them all.
+            let (scatter, freedom) = match sets[t.set].course {
+                Course::Step => (t.by_blocks, n - 2),
+                _ => (0.0, 4 * (n - 2)),
+            };
+            let variance = scatter.max(t.by_model * typical.max(1.0)) + t.between_runs;
+            let p_one = of_student(t.u / variance.sqrt(), freedom as f64);
+            let of_all = match sets[t.set].course {
+                Course::Step => of_supremum(p_one, all.len(), smallest.max(1e-3)),
+                _ => p_one * all.len() as f64,
+            };
+            let p_value = (of_all * directions.len() as f64).min(1.0);
+            if best.as_ref().is_none_or(|known| p_value < known.p_value) {
+                best = Some(Change {
+                    course: sets[t.set].course,
+                    name: direction.name.clone(),
+                    unit: direction.unit,
+                    record: sets[t.set].record,
+                    at: sets[t.set].at,
+                    by: t.u / t.r,
+                    error: variance.sqrt() / t.r,
+                    p_value,
+                });
+            }
+        }
+    }
+    best
+}
+
+/// Whole records among others, and the part of a record after each boundary of blocks.
+pub(super) fn sets(blocks: &[ScoreBlock]) -> Vec<Set> {
+    let records = blocks.last().map_or(0, |b| b.record + 1);
+    let mut all = Vec::new();
+    for record in 0..records {
+        let from = blocks.partition_point(|b| b.record < record);
+        let to = blocks.partition_point(|b| b.record <= record);
+        if records > 1 && to - from >= FEWEST {
+            all.push(Set::of_blocks(record, 0, from..to, blocks.len()));
+        }
+        for k in from + FEWEST..(to + 1).saturating_sub(FEWEST) {
+            all.push(Set::of_blocks(record, blocks[k].from, k..to, blocks.len()));
+        }
+    }
+    all
+}
+
+/// A drift over the blocks of one record.
+pub(super) fn drifts(blocks: &[ScoreBlock]) -> Vec<Set> {
+    let n = blocks.len();
+    let weight = |c: usize| (c as f64 + 0.5) / n.max(1) as f64 - 0.5;
+    let weights = (0..n).map(weight).collect();
+    let course = Course::Drift;
+    vec![Set {
+        record: 0,
+        at: 0,
+        course,
+        weights,
+    }]
+}
+
+/// Sines over the blocks of one record, of a given number of s each: periods from [`SHORTEST`] blocks to two thirds of
+/// all, half of what distinguishes two frequencies from one to the next, each in four phases.
+pub(super) fn sways(blocks: &[ScoreBlock], block_s: f64) -> Vec<Set> {
+    let n = blocks.len();
+    let frequencies = (3..)
+        .map(|k| f64::from(k) / (2.0 * n as f64))
+        .take_while(|f| *f <= 1.0 / SHORTEST);
+    let of = |frequency: f64, phase: u32| Set {
+        record: 0,
+        at: 0,
+        course: Course::Sway(block_s / frequency),
+        weights: (0..n)
+            .map(|c| (TAU * (c as f64 + 0.5) * frequency + FRAC_PI_4 * f64::from(phase)).sin())
+            .collect(),
+    };
+    frequencies
+        .flat_map(|frequency| (0..4).map(move |phase| of(frequency, phase)))
+        .collect()
+}
+
+fn tested(
+    of: &Constancy<'_>,
+    (matrices, scores): (&[DMatrix<f64>], &[DVector<f64>]),
+    inverse: &DMatrix<f64>,
+    (v, size): (&DVector<f64>, f64),
+    set: &Set,
+    index: usize,
+) -> Option<Tested> {
+    let p = v.len();
+    let along: Vec<DVector<f64>> = matrices.iter().map(|m| m * v).collect();
+    let mut inside = DVector::zeros(p);
+    let (mut information, mut of_set) = (0.0, 0.0);
+    for (moved, weight) in along.iter().zip(&set.weights) {
+        inside += moved * *weight;
+        information += v.dot(moved);
+        of_set += weight * weight * v.dot(moved);
+    }
+    let a = inverse * inside;
+    let mut parts = Vec::with_capacity(matrices.len());
+    let mut of_runs = vec![0.0; of.blocks.last()?.record + 1];
+    for (c, (matrix, score)) in matrices.iter().zip(scores).enumerate() {
+        let w = v * set.weights[c] - &a;
+        let moved = matrix * &w;
+        parts.push((w.dot(score), w.dot(&moved)));
+        of_runs[of.blocks[c].record] += v.dot(&moved);
+    }
+    let (u, r) = parts.iter().fold((0.0, 0.0), |(u, r), (h, rc)| (u + h, r + rc));
+    if r <= LEFT * of_set || of_set <= 0.0 {
+        return None;
+    }
+    let (delta, n) = (u / r, parts.len() as f64);
+    let scatter: f64 = parts.iter().map(|(h, rc)| (h - delta * rc).powi(2)).sum();
+    let runs: f64 = if of_runs.len() > 1 {
+        of_runs.iter().map(|x| x * x).sum()
+    } else {
+        0.0
+    };
+    Some(Tested {
+        set: index,
+        share: of_set / information,
+        u,
+        r,
+        by_model: of.variance * r,
+        by_blocks: scatter * n / (n - 2.0),
+        between_runs: (of.run_to_run * size).powi(2) * runs,
+    })
+}
+
+/// The inverse over the determined parameters, in units of a unit diagonal.
+pub(super) fn pseudo_inverse(whole: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let p = whole.nrows();
+    let scale = DVector::from_fn(p, |i, _| {
+        if whole[(i, i)] > 0.0 {
+            whole[(i, i)].sqrt().recip()
+        } else {
+            0.0
+        }
+    });
+    let scaled = DMatrix::from_fn(p, p, |i, j| whole[(i, j)] * scale[i] * scale[j]);
+    if scaled.iter().any(|x| !x.is_finite()) {
+        return None;
+    }
+    let eigen = SymmetricEigen::new(scaled);
+    let mut inverse = DMatrix::zeros(p, p);
+    for (k, value) in eigen
+        .eigenvalues
+        .iter()
+        .enumerate()
+        .filter(|(_, value)| **value > SINGULAR)
+    {
+        let column = eigen.eigenvectors.column(k).component_mul(&scale);
+        inverse += &column * column.transpose() / *value;
+    }
+    Some(inverse)
+}

@@ -1,0 +1,157 @@
+//! A stretch of the records that carries the fit.
+//!
+//! A channel that is turned over for a second, or a pause, is not a change that stays. Without block c the parameters
+//! would be elsewhere by
+//!
+//! `delta_c = -(A - A_c)^-1 h_c`, `A = J' G J`, `h = J' g`
+//!
+//! with the columns of J the directions that are examined (the jackknife of a group, to first order: B. Efron, *The
+//! Jackknife, the Bootstrap and Other Resampling Plans*, 1982, chapter 3). By chance a block of n moves a parameter by
+//! about `1/sqrt n` of its standard error. One that moves it by [`MOVED`] of them, and by as much of what all the
+//! others do together, `sqrt(sum delta^2)`, is named: the sum of squares over all blocks is the variance of the
+//! estimate, which that block alone makes several times the stated one.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::search::{Constancy, pseudo_inverse};
+
+/// Standard errors by which a block moves a parameter.
+const MOVED: f64 = 2.0;
+/// The same relative to random blocks, where there are few of them.
+const BY_CHANCE: f64 = 4.5;
+/// Least number of blocks.
+const FEWEST: usize = 5;
+
+/// A block, and what is elsewhere without it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Stretch {
+    pub record: usize,
+    /// First sample; `None` for the end after the last block of a record.
+    pub from: usize,
+    pub to: Option<usize>,
+    /// Name of each parameter that moves, and by how many of its standard errors.
+    pub moves: Vec<(String, f64)>,
+}
+
+/// The block that carries most, where one carries too much.
+pub(super) fn carrying(of: &Constancy<'_>) -> Option<Stretch> {
+    let (n, m) = (of.blocks.len(), of.directions.len());
+    if n < FEWEST || m == 0 || of.variance <= 0.0 {
+        return None;
+    }
+    let p = of.blocks[0].g.len();
+    let j = DMatrix::from_fn(p, m, |row, column| of.directions[column].vector[row]);
+    let mut parts: Vec<(DVector<f64>, DMatrix<f64>)> = of
+        .blocks
+        .iter()
+        .map(|block| {
+            let (g, big) = (
+                DVector::from_column_slice(&block.g),
+                DMatrix::from_row_slice(p, p, &block.big),
+            );
+            (j.transpose() * g, j.transpose() * big * &j)
+        })
+        .collect();
+    let whole = parts.iter().fold(DMatrix::zeros(m, m), |sum, (_, a)| sum + a);
+    let inverse = pseudo_inverse(&whole)?;
+    // A prior, a bound or a delay on the grid leaves a sum of scores.
+    let step = &inverse * parts.iter().fold(DVector::zeros(m), |sum, (h, _)| sum + h);
+    parts.iter_mut().for_each(|(h, a)| *h -= &*a * &step);
+    let moved: Option<Vec<DVector<f64>>> = parts
+        .iter()
+        .map(|(h, a)| Some(-(pseudo_inverse(&(&whole - a))? * h)))
+        .collect();
+    let moved = moved?;
+    let ratio = |c: usize, k: usize| {
+        let others: f64 = moved.iter().map(|d| d[k] * d[k]).sum::<f64>() - moved[c][k] * moved[c][k];
+        let variance = (of.variance * inverse[(k, k)]).max(others);
+        if variance > 0.0 {
+            moved[c][k].abs() / variance.sqrt()
+        } else {
+            0.0
+        }
+    };
+    let largest = |c: usize| (0..m).map(|k| ratio(c, k)).fold(0.0, f64::max);
+    let (c, most) = (0..n).map(|c| (c, largest(c))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let threshold = MOVED.max(BY_CHANCE / ((n - 1) as f64).sqrt());
+    (most > threshold).then(|| Stretch {
+        record: of.blocks[c].record,
+        from: of.blocks[c].from,
+        to: of
+            .blocks
+            .get(c + 1)
+            .filter(|b| b.record == of.blocks[c].record)
+            .map(|b| b.from),
+        moves: (0..m)
+            .filter(|k| ratio(c, *k) > threshold)
+            .map(|k| {
+                (
+                    of.directions[k].name.clone(),
+                    moved[c][k].abs() / (of.variance * inverse[(k, k)]).sqrt(),
+                )
+            })
+            .collect(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        super::{Direction, blocks::ScoreBlock},
+        *,
+    };
+
+    /// A regression on one column of ones: block c has ten residuals of this mean.
+    fn constancy(means: &[f64], variance: f64) -> Option<Stretch> {
+        let blocks: Vec<ScoreBlock> = means
+            .iter()
+            .enumerate()
+            .map(|(c, mean)| ScoreBlock {
+                record: 0,
+                from: 10 * c,
+                g: vec![10.0 * mean],
+                big: vec![10.0],
+            })
+            .collect();
+        let direction = Direction {
+            name: "mean".to_owned(),
+            unit: "",
+            vector: vec![1.0],
+            delay: false,
+            size: 1.0,
+        };
+        carrying(&Constancy {
+            blocks: &blocks,
+            directions: &[direction],
+            variance,
+            run_to_run: 0.0,
+            sample_time_s: 0.01,
+        })
+    }
+
+    #[test]
+    fn the_move_is_that_of_the_fit_without_the_block() {
+        let mut means = vec![0.1, -0.1, 0.05, -0.05, 0.1, -0.1, 0.0, 0.0];
+        assert_eq!(constancy(&means, 1.0), None);
+        means[3] = 8.0;
+        let found = constancy(&means, 1.0).unwrap();
+        assert_eq!((found.from, found.to), (30, Some(40)));
+        // The mean of all is 1.00625, of the others .007 and the standard error 1/sqrt 80.
+        let (all, others) = (8.05 / 8.0, 0.05 / 7.0);
+        assert!(
+            (found.moves[0].1 - (all - others) * 80.0_f64.sqrt()).abs() < 1e-9,
+            "{found:?}"
+        );
+        means[7] = 8.0;
+        means[3] = 0.0;
+        assert_eq!(constancy(&means, 1.0).unwrap().to, None);
+    }
+
+    #[test]
+    fn blocks_that_all_scatter_are_no_stretch() {
+        let means = [3.0, -2.0, 2.5, -3.0, 3.0, -2.5, 2.0, -3.0];
+        assert_eq!(constancy(&means, 1.0), None);
+        assert_eq!(constancy(&[5.0, 0.0, 0.0], 1.0), None);
+        assert_eq!(constancy(&[0.0; 8], 0.0), None);
+    }
+}

@@ -1,0 +1,219 @@
+//! Against full searches of models with a change, and over runs without one.
+
+use hoid_model::{
+    Channel, Finding, Record, Structure,
+    scenario::{Condition, Scenario},
+};
+use hoid_sim::{RunSeed, Simulator};
+
+use super::{
+    Constancy, Direction,
+    blocks::score_blocks,
+    search::{Change, strongest},
+};
+use crate::{
+    Estimator, Fit, GreyBox,
+    criterion::Data,
+    linalg::least_squares::{dot, solve_symmetric},
+};
+
+fn simulated(condition: Condition, replication: u64) -> Record {
+    let streams = RunSeed {
+        seed: 90_210,
+        replication,
+        ..RunSeed::default()
+    };
+    let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
+    simulator.run(streams, false).unwrap()
+}
+
+fn box_jenkins(records: &[Record]) -> Fit {
+    let orders = Structure::BoxJenkins.operator_orders(29);
+    Estimator::new(Structure::BoxJenkins, orders).fit(records).unwrap()
+}
+
+/// u comes later by a given number of samples from `at` on.
+fn late(record: &Record, at: usize, by: usize) -> Record {
+    let u: Vec<f64> = (0..record.len())
+        .map(|t| record.output()[if t >= at { t - by } else { t }])
+        .collect();
+    let input = Channel::new("e", "", record.input().to_vec());
+    Record::new(record.sample_time(), input, Channel::new("u", "", u)).unwrap()
+}
+
+fn not_constant(fit: &Fit, records: &[Record]) -> Option<Finding> {
+    let verdict = fit.verdict(records, None).unwrap();
+    verdict.findings().iter().find(|f| f.kind == "not-constant").cloned()
+}
+
+#[test]
+fn people_who_change_are_told_from_those_who_do_not() {
+    for (condition, changes) in [
+        (Condition::C1, false),
+        (Condition::C2, false),
+        (Condition::C3, true),
+        (Condition::C4, true),
+        (Condition::C5, true),
+        (Condition::C6, true),
+    ] {
+        let record = simulated(condition, 1);
+        let found = not_constant(
+            &box_jenkins(std::slice::from_ref(&record)),
+            std::slice::from_ref(&record),
+        );
+        assert_eq!(found.is_some(), changes, "{condition:?}: {found:?}");
+    }
+}
+
+#[test]
+fn a_delay_that_jumps_is_named_with_its_place() {
+    let record = late(&simulated(Condition::C1, 2), 4100, 8);
+    let records = std::slice::from_ref(&record);
+    let verdicts = [
+        box_jenkins(records).verdict(records, None).unwrap(),
+        GreyBox::new(1..=1).fit(records).unwrap().verdict(records).unwrap(),
+    ];
+    for verdict in verdicts {
+        let found = verdict.findings().iter().find(|f| f.kind == "not-constant");
+        let words = &found.expect("a finding").message;
+        assert!(words.contains("tau_e changes by about +0.0"), "{words}");
+        let at: f64 = words
+            .split("about ")
+            .find_map(|part| part.split(" s after").next()?.parse().ok())
+            .unwrap();
+        assert!((at - 41.0).abs() <= 4.0, "{words}");
+    }
+}
+
+#[test]
+fn a_run_unlike_the_others_is_named_and_equal_runs_are_not() {
+    let mut records = vec![simulated(Condition::C1, 3), simulated(Condition::C1, 4)];
+    assert_eq!(not_constant(&box_jenkins(&records), &records), None);
+    records.push(simulated(Condition::C2, 5));
+    let words = not_constant(&box_jenkins(&records), &records).unwrap().message;
+    assert!(words.contains("in record 3 next to the others"), "{words}");
+}
+
+/// Numbers between -1/2 and 1/2.
+fn uniform(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    }
+}
+
+/// A regression with two columns, the first coefficient larger by `jump` from the middle on; signals
+/// and noise with this memory.
+struct Regression {
+    x: [Vec<f64>; 2],
+    y: Vec<f64>,
+}
+
+impl Regression {
+    fn new(seed: u64, n: usize, memory: f64, jump: f64) -> Self {
+        let mut draw = uniform(seed);
+        let mut signal = || {
+            let mut x = 0.0;
+            (0..n)
+                .map(|_| {
+                    x = memory * x + draw();
+                    x
+                })
+                .collect::<Vec<f64>>()
+        };
+        let (x, noise) = ([signal(), signal()], signal());
+        let y = (0..n)
+            .map(|t| (1.0 + if t >= n / 2 { jump } else { 0.0 }) * x[0][t] - 0.5 * x[1][t] + noise[t])
+            .collect();
+        Self { x, y }
+    }
+
+    /// Coefficients of these columns by least squares.
+    fn solved(&self, columns: &[&[f64]]) -> Vec<f64> {
+        let gram: Vec<f64> = columns.iter().flat_map(|a| columns.iter().map(|b| dot(a, b))).collect();
+        let right: Vec<f64> = columns.iter().map(|a| dot(a, &self.y)).collect();
+        solve_symmetric(&gram, &right).unwrap()
+    }
+
+    fn strongest(&self) -> Change {
+        let columns: Vec<&[f64]> = self.x.iter().map(Vec::as_slice).collect();
+        let theta = self.solved(&columns);
+        let eps: Vec<f64> = (0..self.y.len())
+            .map(|t| self.y[t] - theta[0] * self.x[0][t] - theta[1] * self.x[1][t])
+            .collect();
+        let variance = dot(&eps, &eps) / eps.len() as f64;
+        let data = [Data::new(&self.x[0], &self.y)];
+        let mut scores = |_: usize, _: Data<'_>| Some((eps.clone(), self.x.iter().cloned().enumerate().collect()));
+        let blocks = score_blocks(&data, 0, 2, 0.01, &mut scores).unwrap();
+        let direction = Direction {
+            name: "x".to_owned(),
+            unit: "",
+            vector: vec![1.0, 0.0],
+            delay: false,
+            size: 1.0,
+        };
+        let constancy = Constancy {
+            blocks: &blocks,
+            directions: &[direction],
+            variance,
+            run_to_run: 0.06,
+            sample_time_s: 0.01,
+        };
+        strongest(&constancy, false).unwrap()
+    }
+}
+
+#[test]
+fn the_change_is_the_coefficient_of_its_regressor() {
+    let regression = Regression::new(5, 4000, 0.9, 0.8);
+    let found = regression.strongest();
+    assert!(found.at.abs_diff(2000) <= 200 && found.p_value < 1e-4, "{found:?}");
+    // Twin: least squares with the regressor of the change next to the others.
+    let behind: Vec<f64> = (0..4000)
+        .map(|t| if t >= found.at { regression.x[0][t] } else { 0.0 })
+        .collect();
+    let theta = regression.solved(&[&regression.x[0], &regression.x[1], &behind]);
+    assert!((found.by - theta[2]).abs() < 1e-9, "{} and {}", found.by, theta[2]);
+}
+
+#[test]
+fn constant_regressions_are_alarmed_no_more_often_than_the_level() {
+    // Correlated noise and regressors: scores have a memory of some ten samples.
+    for memory in [0.0, 0.9] {
+        let runs = 400_u32;
+        let alarms = (0..runs)
+            .filter(|k| {
+                Regression::new(1000 + u64::from(*k), 4000, memory, 0.0)
+                    .strongest()
+                    .p_value
+                    < 0.05
+            })
+            .count();
+        let share = alarms as f64 / f64::from(runs);
+        // 5 % within three standard errors of 1.1 %.
+        assert!(share < 0.05 + 3.0 * 0.011, "memory {memory}: {share}");
+    }
+}
+
+#[test]
+fn nothing_is_said_of_what_is_too_short_or_has_no_noise() {
+    let record = simulated(Condition::C1, 7);
+    let short = [record.span(0.0, 5.0).unwrap()];
+    let found = not_constant(&box_jenkins(&short), &short);
+    assert_eq!(found, None);
+    let quiet: Vec<f64> = (0..3000)
+        .map(|t| if t >= 29 { 0.3 * record.input()[t - 29] } else { 0.0 })
+        .collect();
+    let input = Channel::new("e", "", record.input()[..3000].to_vec());
+    let exact = [Record::new(record.sample_time(), input, Channel::new("u", "", quiet)).unwrap()];
+    let orders = hoid_model::Orders {
+        nb: 1,
+        nk: 29,
+        ..hoid_model::Orders::default()
+    };
+    let fit = Estimator::new(Structure::Fir, orders).fit(&exact).unwrap();
+    assert_eq!(not_constant(&fit, &exact), None);
+}

@@ -1,0 +1,351 @@
+//! The verdict of a fit of polynomials.
+//!
+//! Where the coefficients do not correspond to any operator, the response to e counts as known when
+//! b as a whole differs from zero: `b' P_b^-1 b`, with P_b the covariance of b, beyond the 95 %
+//! point of chi-square with nb degrees of freedom (A. Wald, *Trans. AMS* 54 (1943) 426-482).
+
+use hoid_model::{Finding, NotConvertible, Orders, Record, Verdict};
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::{
+    operator::{delay_finding, gain_findings, pole_findings, search_finding},
+    residuals::ResidualMeasures,
+};
+use crate::{Choice, Fit, IdentError};
+
+/// Share of the power of u below which residuals are the rounding of the data.
+const ROUNDING: f64 = 1e-22;
+/// Residuals for each unknown below which the numbers of a fit mean nothing.
+const FEWEST_RESIDUALS: usize = 5;
+/// Level at which b differs from zero.
+const LEVEL: f64 = 0.05;
+
+impl Fit {
+    /// Verdict on the fit, on the records that it was fitted to and with the search that chose its
+    /// orders, where there was one. The kinds of findings are those of the [module](super).
+    ///
+    /// # Errors
+    /// As [`Fit::residuals`].
+    pub fn verdict(&self, records: &[Record], choice: Option<&Choice>) -> Result<Verdict, IdentError> {
+        let mut all: Vec<Finding> = search_finding(self.termination).into_iter().collect();
+        all.extend(choice.and_then(delay_at_end));
+        all.extend(self.too_few());
+        all.extend(self.system_findings());
+        // Residuals that are rounding carry no information.
+        if let Some(share) = self.rounding() {
+            all.push(Finding::note(
+                "no-noise",
+                format!(
+                    "there is no noise: the model explains u to {:.0e} of its size; error bars are those of the digits of the data",
+                    share.sqrt()
+                ),
+            ));
+        } else if self.covariance.is_some() {
+            all.extend(self.residual_findings(&self.residual_measures(records)?));
+            all.extend(self.constancy_findings(records));
+        }
+        Ok(Verdict::of(all))
+    }
+
+    /// Residuals as a share of the power of u, if they are the rounding of the data.
+    pub fn rounding(&self) -> Option<f64> {
+        let share = self.loss / self.output_variance;
+        (share < ROUNDING).then_some(share)
+    }
+
+    /// Fewer residuals than the unknowns need.
+    fn too_few(&self) -> Option<Finding> {
+        let unknowns = self.model.theta().len() + self.states;
+        (self.covariance.is_some() && self.residuals < FEWEST_RESIDUALS * unknowns).then(|| {
+            Finding::undetermined(
+                "too-few",
+                format!(
+                    "{} residuals for {unknowns} unknowns: the record is too short for these orders and nk = {}",
+                    self.residuals,
+                    self.orders().nk
+                ),
+            )
+        })
+    }
+
+    /// Results of the system from e to u, without a record.
+    fn system_findings(&self) -> Vec<Finding> {
+        let mut all = Vec::new();
+        if !self.model.is_stable() {
+            all.push(Finding::doubt(
+                "unstable",
+                "the model is unstable: a person's response to a short error dies out; lower the orders, or ask for a stable \
+                 model",
+            ));
+        }
+        if !self.model.structure().has_input() {
+            return all;
+        }
+        match self.operator() {
+            Ok(operator) => {
+                all.extend(gain_findings(&[("", operator)]));
+                all.extend(pole_findings(&operator, self.model.sample_time()));
+                return all;
+            }
+            // Models that are not meant to be an operator.
+            Err(
+                NotConvertible::OtherOrders { .. }
+                | NotConvertible::PolesInBoth { .. }
+                | NotConvertible::OtherForm { .. },
+            ) => {}
+            Err(reason) => all.push(Finding::doubt(
+                "not-convertible",
+                format!("the coefficients do not correspond to any operator: {reason}"),
+            )),
+        }
+        if self.responds() == Some(false) {
+            all.push(Finding::undetermined(
+                "gain",
+                "B does not differ from zero (5 %): there is too little response to e",
+            ));
+        }
+        all
+    }
+
+    /// Whether b differs from zero; `None` where its covariance is not known or singular.
+    fn responds(&self) -> Option<bool> {
+        let covariance = self.covariance.as_ref()?;
+        let names = self.orders().parameter_names();
+        let p = names.len();
+        let of_b: Vec<usize> = (0..p)
+            .filter(|i| names[*i].starts_with('b') && !self.held[*i])
+            .collect();
+        if of_b.is_empty() || covariance.len() != p * p || self.physical.is_some() {
+            return None;
+        }
+        let block = DMatrix::from_fn(of_b.len(), of_b.len(), |i, j| covariance[of_b[i] * p + of_b[j]]);
+        let b = DVector::from_fn(of_b.len(), |i, _| self.model.theta()[of_b[i]]);
+        let statistic = b.dot(&block.cholesky()?.solve(&b));
+        let distribution = ChiSquared::new(of_b.len() as f64).ok()?;
+        statistic.is_finite().then(|| distribution.sf(statistic) < LEVEL)
+    }
+
+    fn residual_measures(&self, records: &[Record]) -> Result<ResidualMeasures, IdentError> {
+        let found = records
+            .iter()
+            .map(|record| self.residuals(record))
+            .collect::<Result<Vec<_>, _>>()?;
+        let with_input = self.model.structure().has_input();
+        let pairs: Vec<(&[f64], &[f64])> = found
+            .iter()
+            .zip(records)
+            .map(|(eps, record)| {
+                let e = if with_input { &record.input()[eps.first..] } else { &[] };
+                (eps.values.as_slice(), e)
+            })
+            .collect();
+        Ok(ResidualMeasures::of(&pairs, self.model.sample_time().s()))
+    }
+
+    fn residual_findings(&self, measures: &ResidualMeasures) -> Vec<Finding> {
+        if self.instrumented {
+            // Instruments ask nothing of the noise, and residuals of a closed loop follow e.
+            let note = |finding: Finding| {
+                let words = format!("{}; the instruments do not need it white", finding.message);
+                Finding::note(finding.kind, words)
+            };
+            return measures
+                .coloured()
+                .map(note)
+                .into_iter()
+                .chain(measures.leverage())
+                .collect();
+        }
+        // A robust loss has taken the weight of single samples.
+        let leverage = measures.leverage().filter(|_| !self.robust);
+        let others = [measures.coloured(), measures.structure()];
+        others.into_iter().flatten().chain(leverage).collect()
+    }
+}
+
+/// A delay at the end of the range that was searched with the other orders of the chosen model.
+fn delay_at_end(choice: &Choice) -> Option<Finding> {
+    let chosen = choice.fit.orders();
+    let same = |o: &Orders| Orders { nk: chosen.nk, ..*o } == chosen;
+    let searched = || choice.candidates.iter().map(|c| c.orders).filter(same).map(|o| o.nk);
+    let (low, high) = (searched().min()?, searched().max()?);
+    let ts = choice.fit.model().sample_time().s();
+    // tau_e = (nk - 1) Ts.
+    let delay = |nk: usize| (nk as f64 - 1.0) * ts;
+    delay_finding(delay(chosen.nk), (delay(low), delay(high)), "")
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::{
+        Channel, SampleTime, Structure, VerdictLevel,
+        scenario::{Condition, Scenario},
+    };
+    use hoid_sim::{RunSeed, Simulator};
+
+    use super::*;
+    use crate::{Estimator, InstrumentalVariable, IvMethod, order_selection, order_selection::OrderRanges};
+
+    fn simulated(condition: Condition) -> Record {
+        let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
+        simulator.run(RunSeed::default(), false).unwrap()
+    }
+
+    fn kinds(verdict: &Verdict) -> Vec<&'static str> {
+        verdict.findings().iter().map(|f| f.kind).collect()
+    }
+
+    fn box_jenkins(nk: usize) -> Estimator {
+        Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(nk))
+    }
+
+    fn fitted(estimator: &Estimator, record: &Record) -> Verdict {
+        let records = std::slice::from_ref(record);
+        estimator.fit(records).unwrap().verdict(records, None).unwrap()
+    }
+
+    /// The record with another output.
+    fn with_output(record: &Record, output: Vec<f64>) -> Record {
+        let input = Channel::new("e", "", record.input().to_vec());
+        Record::new(record.sample_time(), input, Channel::new("u", "", output)).unwrap()
+    }
+
+    /// White noise, nearly normal.
+    fn noise(n: usize) -> Vec<f64> {
+        let mut state = 7_u64;
+        let mut draw = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        (0..n).map(|_| (0..12).map(|_| draw()).sum()).collect()
+    }
+
+    #[test]
+    fn clean_runs_of_the_reference_text_are_trustworthy() {
+        for condition in [Condition::C1, Condition::C2] {
+            let record = simulated(condition);
+            let verdict = fitted(&box_jenkins(29), &record);
+            assert_eq!(verdict.level, VerdictLevel::Trustworthy, "{condition:?}: {verdict}");
+            assert!(kinds(&verdict).is_empty(), "{verdict}");
+        }
+    }
+
+    #[test]
+    fn a_delay_at_the_end_of_its_range_and_a_wrong_one() {
+        let record = simulated(Condition::C1);
+        let records = std::slice::from_ref(&record);
+        let mut ranges = OrderRanges::from(Structure::BoxJenkins.operator_orders(29));
+        ranges.nk = 20..=24;
+        let criterion = order_selection::Criterion::Loss;
+        let choice = order_selection::choose_orders(&box_jenkins(20), &ranges, criterion, records).unwrap();
+        let verdict = choice.fit.verdict(records, Some(&choice)).unwrap();
+        assert_eq!(verdict.level, VerdictLevel::Doubtful);
+        assert!(kinds(&verdict).contains(&"delay-at-bound"), "{verdict}");
+        ranges.nk = 27..=31;
+        let choice = order_selection::choose_orders(&box_jenkins(29), &ranges, criterion, records).unwrap();
+        assert!(kinds(&choice.fit.verdict(records, Some(&choice)).unwrap()).is_empty());
+    }
+
+    #[test]
+    fn an_output_that_does_not_follow_the_input_is_not_determined() {
+        let record = simulated(Condition::C1);
+        let other = with_output(&record, noise(record.len()));
+        let records = std::slice::from_ref(&other);
+        let of = |structure: Structure, orders: Orders| {
+            let fit = Estimator::new(structure, orders).fit(records).unwrap();
+            fit.verdict(records, None).unwrap()
+        };
+        // As an operator, and as a model of other orders.
+        let arx = of(Structure::Arx, Structure::Arx.operator_orders(29));
+        assert_eq!(arx.level, VerdictLevel::NotDetermined, "{arx}");
+        let fir = of(
+            Structure::Fir,
+            Orders {
+                nb: 3,
+                nk: 29,
+                ..Orders::default()
+            },
+        );
+        assert_eq!(fir.level, VerdictLevel::NotDetermined, "{fir}");
+        assert_eq!(kinds(&fir), ["gain"], "{fir}");
+    }
+
+    #[test]
+    fn a_noise_model_that_is_too_poor_and_a_sample_that_carries_the_fit() {
+        let record = simulated(Condition::C1);
+        let oe = Estimator::new(Structure::OutputError, Structure::OutputError.operator_orders(29));
+        assert!(kinds(&fitted(&oe, &record)).contains(&"residuals-not-white"));
+        let mut output = record.output().to_vec();
+        output[4000] += 50.0 * output.iter().fold(0.0_f64, |m, u| m.max(u.abs()));
+        let verdict = fitted(&box_jenkins(29), &with_output(&record, output.clone()));
+        assert!(kinds(&verdict).contains(&"leverage"), "{verdict}");
+        let robust = Estimator {
+            loss: crate::Loss::Huber { threshold: 1.345 },
+            ..box_jenkins(29)
+        };
+        let verdict = fitted(&robust, &with_output(&record, output));
+        assert!(!kinds(&verdict).contains(&"leverage"), "{verdict}");
+    }
+
+    #[test]
+    fn instruments_do_not_ask_for_white_residuals() {
+        let record = simulated(Condition::C1);
+        let records = std::slice::from_ref(&record);
+        let orders = Structure::OutputError.operator_orders(29);
+        let estimator = InstrumentalVariable {
+            instruments: crate::Instruments::default_for(records),
+            ..InstrumentalVariable::new(IvMethod::Sriv, orders)
+        };
+        let verdict = estimator.fit(records).unwrap().verdict(records, None).unwrap();
+        assert_eq!(kinds(&verdict), ["residuals-not-white"], "{verdict}");
+        assert_eq!(verdict.level, VerdictLevel::Trustworthy, "{verdict}");
+    }
+
+    #[test]
+    fn coefficients_of_no_operator_and_unstable_ones() {
+        let of = |f1: f64, f2: f64| {
+            let mut fit = box_jenkins(29).fit(&[simulated(Condition::C1)]).unwrap();
+            let mut theta = fit.model.theta().to_vec();
+            let places = fit.model.operator_positions();
+            (theta[places[2]], theta[places[3]]) = (f1, f2);
+            fit.model =
+                hoid_model::PolynomialModel::new(Structure::BoxJenkins, fit.orders(), SampleTime::HUNDREDTH, theta)
+                    .unwrap();
+            fit.system_findings()
+        };
+        let found = of(-0.5, -0.2);
+        assert!(
+            found
+                .iter()
+                .any(|f| f.kind == "not-convertible" && f.message.contains("pole")),
+            "{found:?}"
+        );
+        let found = of(-1.95, 1.01);
+        assert!(found.iter().any(|f| f.kind == "unstable"), "{found:?}");
+        // Poles at 0.99 and 0.01: 1 and 460 rad/s, a damping of 10.
+        let found = of(-1.0, 0.0099);
+        assert!(found.iter().any(|f| f.kind == "neuromuscular-lag"), "{found:?}");
+    }
+
+    #[test]
+    fn a_model_without_an_input_is_judged_by_its_residuals() {
+        let record = simulated(Condition::C1);
+        let output = Channel::new("u", "", noise(3000));
+        let white = Record::of_output(record.sample_time(), output).unwrap();
+        let orders = Orders {
+            na: 1,
+            ..Orders::default()
+        };
+        let verdict = fitted(&Estimator::new(Structure::Ar, orders), &white);
+        assert!(kinds(&verdict).is_empty(), "{verdict}");
+        let shocks = noise(3001);
+        let moving_average = shocks.windows(2).map(|w| w[1] + 0.9 * w[0]).collect();
+        let output = Channel::new("u", "", moving_average);
+        let coloured = Record::of_output(record.sample_time(), output).unwrap();
+        let verdict = fitted(&Estimator::new(Structure::Ar, orders), &coloured);
+        assert_eq!(kinds(&verdict), ["residuals-not-white"], "{verdict}");
+    }
+}

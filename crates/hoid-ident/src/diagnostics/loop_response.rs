@@ -1,0 +1,105 @@
+//! Whether the error answers to the output, as it does in a loop.
+//!
+//! In a loop every change of u comes back in e. For the latest [`LATEST_S`] of u the question is whether they predict e
+//! better than the errors before and the outputs before those do (C. W. J. Granger, *Econometrica* 37 (1969) 424-438).
+//! What two runs have in common, a forcing function, is in both pasts; what is u's own is not.
+
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use super::whitened::{NOISE, orthogonal, thinning};
+
+/// Latest outputs that are asked, s.
+const LATEST_S: f64 = 0.25;
+
+/// How e answers to u.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LoopResponse {
+    /// Probability of so much where it does not.
+    pub p_value: f64,
+    /// Share of the part of e that the past leaves unexplained and that the latest outputs explain.
+    pub share: f64,
+}
+
+/// For samples `from..`. `None` if there is too little, or something is not a number or does not move.
+pub fn answer(e: &[f64], u: &[f64], from: usize, sample_time_s: f64) -> Option<LoopResponse> {
+    let thin = thinning(sample_time_s);
+    let latest = (LATEST_S / (thin as f64 * sample_time_s)).round().max(1.0) as usize;
+    let longest = latest + NOISE;
+    let rows: Vec<usize> = (from..u.len().min(e.len())).step_by(thin).collect();
+    let n = rows.len().checked_sub(longest)?;
+    let known = 2 * NOISE + 1;
+    if n < 10 * (known + latest) {
+        return None;
+    }
+    let past = |of: &[f64], t: usize, lag: usize| of[rows[t + longest - lag]];
+    let y = DVector::from_fn(n, |t, _| past(e, t, 0));
+    let before = DMatrix::from_fn(n, known, |t, j| match j {
+        0 => 1.0,
+        j if j <= NOISE => past(e, t, j),
+        j => past(u, t, latest + j - NOISE),
+    });
+    let asked = DMatrix::from_fn(n, latest, |t, j| past(u, t, j + 1));
+    if !before.iter().chain(&asked).chain(&y).all(|v| v.is_finite()) {
+        return None;
+    }
+    let q = orthogonal(&before)?;
+    let left = &y - &q * (q.transpose() * &y);
+    let asked = &asked - &q * (q.transpose() * &asked);
+    let of_asked = orthogonal(&asked)?;
+    let explained = (of_asked.transpose() * &left).norm_squared();
+    let (whole, rest) = (left.norm_squared(), left.norm_squared() - explained);
+    if whole <= 0.0 {
+        return None;
+    }
+    let freedom = (n - known - latest) as f64;
+    let ratio = explained / latest as f64 / (rest.max(f64::MIN_POSITIVE) / freedom);
+    let p_value = FisherSnedecor::new(latest as f64, freedom).ok()?.sf(ratio);
+    Some(LoopResponse {
+        p_value,
+        share: explained / whole,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnostics::whitened::stream;
+
+    /// A loop around an integrator: e, and u with a noise of its own.
+    fn loop_of(seed: u64) -> [Vec<f64>; 2] {
+        let mut seed = seed;
+        let n = 3000;
+        let (mut e, mut u, mut v) = (vec![0.0; n], vec![0.0; n], 0.0);
+        for t in 1..n {
+            let sine = |p: f64| (0.02 * 0.3 * p * t as f64 + p).sin();
+            let forcing: f64 = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0]
+                .map(sine)
+                .iter()
+                .sum();
+            e[t] = e[t - 1] + 0.02 * (forcing - u[t - 1]);
+            v = 0.8 * v + stream(&mut seed);
+            u[t] = 2.0 * if t >= 10 { e[t - 10] } else { 0.0 } + 0.3 * v;
+        }
+        // Without a noise of its own e and its past show all of u.
+        let e = e.iter().map(|e| e + 1e-3 * stream(&mut seed)).collect();
+        [e, u]
+    }
+
+    #[test]
+    fn e_answers_to_its_own_u_alone() {
+        for seed in 0..10 {
+            let ([e, u], [_, other]) = (loop_of(seed), loop_of(100 + seed));
+            let (own, other) = (answer(&e, &u, 0, 0.02).unwrap(), answer(&e, &other, 0, 0.02).unwrap());
+            assert!(own.share > 0.2 && own.p_value < 1e-6, "{own:?}");
+            assert!(other.share < 0.05, "{other:?}");
+        }
+    }
+
+    #[test]
+    fn too_little_says_nothing() {
+        let [e, u] = loop_of(1);
+        assert_eq!(answer(&e[..300], &u[..300], 0, 0.02), None);
+        assert_eq!(answer(&e, &vec![0.0; u.len()], 0, 0.02), None);
+    }
+}

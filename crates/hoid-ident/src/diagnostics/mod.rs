@@ -1,0 +1,53 @@
+//! Findings for and against a result.
+//!
+//! Each rule is one observation with its own kind ([`hoid_model::Finding`]), and the [`hoid_model::Verdict`] follows
+//! from them. The limits are where they are used.
+//!
+//! | kind | observation |
+//! |---|---|
+//! | `not-converged`, `border` | how the search ended |
+//! | `delay-at-bound`, `parameter-at-bound` | the delay lies at the end of its range, another at a bound |
+//! | `unstable` | the model from e to u is unstable |
+//! | `gain`, `undetermined-parameter` | standard errors as large as the values |
+//! | `not-convertible` | coefficients that do not correspond to any operator |
+//! | `neuromuscular-lag` | the two poles describe no neuromuscular system |
+//! | `not-constant` | parameters that change within the records, or from one to the next |
+//! | `residuals-not-white`, `structure`, `leverage` | sizes in the residuals |
+//! | `no-response` | nothing that could not be chance |
+//! | `other-input`, `inputs-together` | what is seen besides the error |
+//! | `exact-fit`, `no-change`, `change-point` | worth knowing; the result remains valid |
+//!
+//! | file | contents |
+//! |---|---|
+//! | `residuals` | how far residuals are from white; also for the family |
+//! | `constancy` | whether parameters change; also for the family |
+//! | `residual_response` | whether a response is left that a model does not have |
+//! | `loop_response` | whether e answers to u, as it does in a loop |
+//! | `no_response` | whether u responds to e at all |
+//! | `operator` | gains, poles and delay of an operator |
+//! | `operator_step` | what a stretch of data shows against an operator |
+//! | `second_opinion` | fits to records that no single sample can carry |
+//! | `other_inputs` | whether u responds to a recorded target besides e |
+//! | `whitened` | least squares after an autoregression, for those that need one |
+//! | `fit`, `grey_box`, `sigmoid` | the verdict of each kind of fit |
+
+pub(crate) mod constancy;
+mod fit;
+mod grey_box;
+mod loop_response;
+mod no_response;
+mod operator;
+mod operator_step;
+pub mod other_inputs;
+mod residual_response;
+pub(crate) mod residuals;
+pub mod second_opinion;
+mod sigmoid;
+mod whitened;
+
+pub use constancy::{Course, Unsteady, unsteady};
+pub use loop_response::{LoopResponse, answer};
+pub use no_response::{Response, response};
+pub use operator::{gain_findings, is_open, leads_backwards, neuromuscular_finding, pole_findings};
+pub use operator_step::{OperatorStep, operator_step};
+pub use residual_response::{ResidualResponse, residual_response};

@@ -1,0 +1,304 @@
+//! Whether u responds to e at all.
+//!
+//! A search over forms, delays and orders finds a response in any two records; what it found carries little information
+//! about whether there is one. The question is asked beforehand, of all forms at once. Both channels are whitened by an
+//! autoregression each, so that nothing slow counts for many samples. At the frequencies `omega_k` of the record up to
+//! [`HIGHEST_RAD_S`] the whitened output is regressed on a gain, a lead and a lag of e after a typical neuromuscular
+//! system and a delay,
+//!
+//! `U_k = (A_u/A_e) N e^{-j omega tau} (b_1 + b_2 j omega + b_3/(j omega + a)) E_k + R_k`,
+//!
+//! b real, and the share of the power of U that this explains, the largest over delays of [`DELAYS_S`], is T. Records
+//! of the same spectra without a relation have the phases of E drawn at random (J. Theiler et al., *Physica D* 58
+//! (1992) 77-94); T of [`SURROGATES`] of them is what a search of this kind finds in nothing. Where u does not depend
+//! on e, T is one more draw: the probability that it exceeds all is 1/([`SURROGATES`] + 1), whatever the spectra are.
+//! Only what e did before counts, so that an e that answers to u alone is not a response. Several records share b.
+
+use std::f64::consts::{PI, TAU};
+
+use hoid_model::{Complex64, Finding, Record, uncertainty::variance_along};
+use hoid_numerics::statistics::mean;
+use rand_chacha::{
+    ChaCha8Rng,
+    rand_core::{Rng, SeedableRng},
+};
+
+use super::whitened::{NOISE, thinning};
+use crate::{family::noise::NoiseProducts, frequency::spectrum, linalg::least_squares::solve_symmetric};
+
+/// Highest frequency that is asked, rad/s.
+const HIGHEST_RAD_S: f64 = 25.0;
+/// Delays that are tried, s.
+const DELAYS_S: [f64; 8] = [0.05, 0.1, 0.16, 0.23, 0.31, 0.4, 0.52, 0.7];
+/// Pole of the lag, 1/s.
+const LAG_RATE: f64 = 0.3;
+/// Typical neuromuscular system: rad/s, and damping.
+const NEUROMUSCULAR: (f64, f64) = (11.0, 0.4);
+/// Records without a relation that are drawn.
+const SURROGATES: usize = 1999;
+/// Least number of frequencies.
+const FEWEST: usize = 12;
+const SEED: u64 = 0x686f_6964;
+const COLUMNS: usize = 3;
+
+/// Whether u responds to e.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Response {
+    /// T: share of the power of the whitened output that a response explains.
+    pub share: f64,
+    /// Surrogates whose share is at least as large.
+    pub reached_by: usize,
+    /// Surrogates that were drawn.
+    pub surrogates: usize,
+}
+
+impl Response {
+    /// Probability of so much where there is no response.
+    pub fn p_value(&self) -> f64 {
+        (self.reached_by + 1) as f64 / (self.surrogates + 1) as f64
+    }
+
+    /// That there is none, where the records do not determine otherwise.
+    pub fn finding(&self) -> Option<Finding> {
+        (self.reached_by > 0).then(|| {
+            Finding::undetermined(
+                "no-response",
+                format!(
+                    "no response of u to e can be distinguished from chance: {} of {} pairs of records with the same spectra and \
+                     no relation show as much (p = {:.2}); check that both channels are of one run, and which is which",
+                    self.reached_by,
+                    self.surrogates,
+                    self.p_value()
+                ),
+            )
+        })
+    }
+}
+
+/// One record at its frequencies.
+struct Spectra {
+    /// `E_k` and `U_k`, whitened.
+    e: Vec<Complex64>,
+    u: Vec<Complex64>,
+    /// Columns without the delay and E: `(A_u/A_e) N G_j`.
+    columns: Vec<[Complex64; COLUMNS]>,
+    /// For each delay `e^{-j omega tau}`.
+    delays: Vec<Vec<Complex64>>,
+}
+
+/// For records of a person; `None` if there is too little, or something is not a number or does not move.
+pub fn response(records: &[Record]) -> Option<Response> {
+    let all: Option<Vec<Spectra>> = records.iter().map(Spectra::of).collect();
+    let all = all?;
+    if all.iter().map(|s| s.u.len()).sum::<usize>() < FEWEST {
+        return None;
+    }
+    let power: f64 = all.iter().flat_map(|s| &s.u).map(Complex64::norm_sqr).sum();
+    let inverse = inverse_gram(&all)?;
+    // For each frequency and delay the products of columns and output; a surrogate turns them.
+    let products: Vec<[[Complex64; COLUMNS]; DELAYS_S.len()]> = all.iter().flat_map(Spectra::products).collect();
+    let mut turns = vec![Complex64::ONE; products.len()];
+    let share = |turns: &[Complex64]| -> f64 {
+        let mut sums = [[0.0; COLUMNS]; DELAYS_S.len()];
+        for (product, turn) in products.iter().zip(turns) {
+            for (sum, column) in sums.iter_mut().zip(product) {
+                for (s, c) in sum.iter_mut().zip(column) {
+                    *s += c.re * turn.re - c.im * turn.im;
+                }
+            }
+        }
+        let explained = sums.iter().map(|right| variance_along(right, &inverse));
+        explained.fold(f64::NEG_INFINITY, f64::max) / power
+    };
+    let own = share(&turns);
+    if !own.is_finite() {
+        return None;
+    }
+    let mut generator = ChaCha8Rng::seed_from_u64(SEED);
+    let mut reached_by = 0;
+    for _ in 0..SURROGATES {
+        for turn in &mut turns {
+            // 32 bits of a phase are more than enough.
+            *turn = Complex64::from_polar(1.0, TAU * f64::from(generator.next_u32()) / 4_294_967_296.0);
+        }
+        reached_by += usize::from(share(&turns) >= own);
+    }
+    Some(Response {
+        share: own,
+        reached_by,
+        surrogates: SURROGATES,
+    })
+}
+
+/// Inverse by rows of `sum Re(x_i* x_j)`, which no delay and no phase of E changes; `None` where columns are not
+/// independent.
+fn inverse_gram(all: &[Spectra]) -> Option<Vec<f64>> {
+    let mut gram = [0.0; COLUMNS * COLUMNS];
+    for spectra in all {
+        for (columns, e) in spectra.columns.iter().zip(&spectra.e) {
+            for i in 0..COLUMNS {
+                for j in 0..COLUMNS {
+                    gram[i * COLUMNS + j] += (columns[i].conj() * columns[j]).re * e.norm_sqr();
+                }
+            }
+        }
+    }
+    let column = |i: usize| {
+        let unit: [f64; COLUMNS] = std::array::from_fn(|j| f64::from(i == j));
+        solve_symmetric(&gram, &unit)
+    };
+    let columns: Option<Vec<Vec<f64>>> = (0..COLUMNS).map(column).collect();
+    Some(columns?.concat())
+}
+
+impl Spectra {
+    fn of(record: &Record) -> Option<Self> {
+        let thin = thinning(record.sample_time().s());
+        let sample_time_s = thin as f64 * record.sample_time().s();
+        let (e, d_e) = whitened(record.input(), thin)?;
+        let (u, d_u) = whitened(record.output(), thin)?;
+        let n = e.len();
+        let highest = HIGHEST_RAD_S.min(0.8 * PI / sample_time_s);
+        let of_bin = TAU / (n as f64 * sample_time_s);
+        let bins = 1..=((highest / of_bin) as usize).min((n - 1) / 2);
+        let omegas: Vec<f64> = bins.clone().map(|k| k as f64 * of_bin).collect();
+        let (own, damping) = NEUROMUSCULAR;
+        let columns = |&omega: &f64| {
+            let s = Complex64::new(0.0, omega);
+            let muscles = own * own / (s * s + 2.0 * damping * own * s + own * own);
+            let whitening = filter(&d_u, omega * sample_time_s) / filter(&d_e, omega * sample_time_s);
+            [Complex64::ONE, s, 1.0 / (s + LAG_RATE)].map(|g| whitening * muscles * g)
+        };
+        let delays = |tau: f64| {
+            let turn = |omega: &f64| Complex64::from_polar(1.0, -omega * tau);
+            omegas.iter().map(turn).collect()
+        };
+        Some(Self {
+            e: coefficients(&e, bins.clone()),
+            u: coefficients(&u, bins),
+            columns: omegas.iter().map(columns).collect(),
+            delays: DELAYS_S.map(delays).into(),
+        })
+    }
+
+    fn products(&self) -> impl Iterator<Item = [[Complex64; COLUMNS]; DELAYS_S.len()]> {
+        (0..self.u.len()).map(|k| {
+            std::array::from_fn(|delay| {
+                self.columns[k].map(|column| (self.delays[delay][k] * column * self.e[k]).conj() * self.u[k])
+            })
+        })
+    }
+}
+
+/// The thinned channel after its own autoregression, and its coefficients.
+fn whitened(channel: &[f64], thin: usize) -> Option<(Vec<f64>, Vec<f64>)> {
+    // The mean of the removed part contains the faster components.
+    let mut thinned: Vec<f64> = (channel.chunks_exact(thin)).map(mean).collect();
+    let mean = mean(&thinned);
+    thinned.iter_mut().for_each(|v| *v -= mean);
+    if thinned.len() < 8 * NOISE || !thinned.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    let series = [thinned];
+    let d = NoiseProducts::new(&series, NOISE).fit(NOISE)?.d;
+    let [thinned] = series;
+    let white = (NOISE..thinned.len())
+        .map(|t| thinned[t] + (d.iter().enumerate()).map(|(k, d)| d * thinned[t - k - 1]).sum::<f64>())
+        .collect();
+    Some((white, d))
+}
+
+/// `1 + d_1 e^{-j w} + ..`.
+fn filter(d: &[f64], omega_ts: f64) -> Complex64 {
+    let terms = d.iter().enumerate();
+    terms.fold(Complex64::ONE, |sum, (k, d)| {
+        sum + d * Complex64::from_polar(1.0, -omega_ts * (k + 1) as f64)
+    })
+}
+
+/// `sum x_t e^{-j omega t}` in these bins.
+fn coefficients(values: &[f64], bins: std::ops::RangeInclusive<usize>) -> Vec<Complex64> {
+    // Amplitudes of sinusoids there: a record counts by its length here.
+    let scale = 0.5 * values.len() as f64;
+    spectrum::coefficients(values)[bins].iter().map(|x| x * scale).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::{
+        Channel, SampleTime,
+        scenario::{Condition, Scenario},
+    };
+    use hoid_sim::{RunSeed, Simulator};
+
+    use super::*;
+
+    fn record(e: Vec<f64>, u: Vec<f64>) -> Record {
+        Record::new(
+            SampleTime::HUNDREDTH,
+            Channel::new("e", "", e),
+            Channel::new("u", "", u),
+        )
+        .unwrap()
+    }
+
+    /// Noise of these poles.
+    fn noise(seed: u64, poles: [f64; 2], n: usize) -> Vec<f64> {
+        let seed = RunSeed {
+            seed,
+            ..RunSeed::default()
+        };
+        let (mut a, mut b) = (0.0, 0.0);
+        let filtered = seed.white_noise(n).into_iter().map(|w| {
+            a = poles[0] * a + w;
+            b = poles[1] * b + a;
+            b
+        });
+        filtered.collect()
+    }
+
+    /// Level of the test by Monte Carlo: of unrelated noise, slow and fast, 1 in 20 has p < .05, standard error .011
+    /// of 400; and e that answers to u.
+    #[test]
+    fn unrelated_channels_have_no_response() {
+        let mut small = 0;
+        for seed in 0..400 {
+            let slow = [0.99, [0.999, 0.9, 0.5, 0.98][seed as usize % 4]];
+            let (e, u) = (noise(2 * seed, slow, 4000), noise(2 * seed + 1, [0.95, slow[1]], 4000));
+            let found = response(&[record(e, u)]).unwrap();
+            small += usize::from(found.p_value() < 0.05);
+        }
+        assert!((4..40).contains(&small), "{small} of 400");
+        // The machine answers to a person who does not look at e.
+        let u = noise(7, [0.95, 0.9], 8000);
+        let e: Vec<f64> = u
+            .iter()
+            .scan(0.0, |y, u| {
+                *y = 0.995 * *y + 0.01 * u;
+                Some(-*y)
+            })
+            .collect();
+        assert!(response(&[record(e, u)]).unwrap().finding().is_some());
+    }
+
+    #[test]
+    fn a_person_responds() {
+        for condition in [Condition::C1, Condition::C2, Condition::C3] {
+            let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
+            let run = simulator.run(RunSeed::default(), false).unwrap();
+            let found = response(&[run]).unwrap();
+            assert_eq!(found.reached_by, 0, "{found:?}");
+            assert!(found.p_value() < 1e-3 && found.finding().is_none());
+        }
+    }
+
+    #[test]
+    fn too_little_says_nothing() {
+        assert_eq!(response(&[record(vec![0.0; 4000], noise(1, [0.9, 0.9], 4000))]), None);
+        assert_eq!(
+            response(&[record(noise(1, [0.9, 0.9], 60), noise(2, [0.9, 0.9], 60))]),
+            None
+        );
+        assert_eq!(response(&[]), None);
+    }
+}

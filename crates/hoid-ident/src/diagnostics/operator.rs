@@ -1,0 +1,277 @@
+//! Findings against an operator: gains that are not distinguished from zero, poles of no person, a
+//! delay at the end of its range.
+
+use std::f64::consts::PI;
+
+use hoid_model::{
+    Finding, SampleTime,
+    uncertainty::{Estimate, OperatorEstimate},
+};
+
+use crate::{Reason, Termination};
+
+/// Standard errors from zero below which a value counts as not determined.
+const LEAST_ERRORS: f64 = 2.0;
+/// Damping beyond which the faster of two real poles is 34 times the slower: a lag.
+const LARGEST_DAMPING: f64 = 3.0;
+
+/// True if a value is less than two of its standard errors from zero. A value without a standard
+/// error was given, not estimated.
+pub fn is_open(e: &Estimate) -> bool {
+    e.standard_error
+        .is_some_and(|error| e.value.abs() < LEAST_ERRORS * error)
+}
+
+/// True if K_e and K_e_dot have opposite signs by two standard errors each: a negative lead.
+pub fn leads_backwards(o: &OperatorEstimate) -> bool {
+    let sign = |e: &Estimate| if is_open(e) { 0.0 } else { e.value.signum() };
+    sign(&o.k_e) * sign(&o.k_e_dot) < 0.0
+}
+
+/// Gains and lead that are not determined, and leads that no one has. Each operator has a label, as ` of record 2`,
+/// empty for a single one; where K_e and K_e_dot of all of them are open, nothing is known about the response.
+pub fn gain_findings(operators: &[(&str, OperatorEstimate)]) -> Vec<Finding> {
+    let mut open = Vec::new();
+    let mut all_open = !operators.is_empty();
+    for (label, o) in operators {
+        let named = [("K_e", o.k_e), ("T_L", o.t_l_s), ("K_e_dot", o.k_e_dot)];
+        let of_label = named.iter().filter(|(_, e)| is_open(e));
+        open.extend(of_label.map(|(name, e)| format!("{name}{label} ({e})")));
+        all_open &= is_open(&o.k_e) && is_open(&o.k_e_dot);
+    }
+    if all_open {
+        return vec![Finding::undetermined(
+            "gain",
+            "no gain differs from zero by two standard errors: there is too little response to e",
+        )];
+    }
+    let backwards = operators.iter().filter(|(_, o)| leads_backwards(o));
+    let negative: Vec<String> = backwards
+        .map(|(label, o)| format!("T_L{label} ({})", o.t_l_s))
+        .collect();
+    not_determined(&open)
+        .into_iter()
+        .chain(negative_lead(&negative))
+        .collect()
+}
+
+/// A lead below zero: no one has one; a gain and a lead that represent a lag do.
+fn negative_lead(negative: &[String]) -> Option<Finding> {
+    (!negative.is_empty()).then(|| {
+        Finding::doubt(
+            "negative-lead",
+            format!(
+                "{} below zero, by two standard errors of K_e and of K_e_dot: a gain and a lead are not the form of this \
+                 person, who may have a lag; only the response is theirs (--structure operator finds the form)",
+                negative.join(", ")
+            ),
+        )
+    })
+}
+
+/// omega_nm and zeta_nm that are not determined, or no person's.
+pub fn pole_findings(operator: &OperatorEstimate, sample_time: SampleTime) -> Vec<Finding> {
+    let named = [("omega_nm", operator.omega_nm_rad_s), ("zeta_nm", operator.zeta_nm)];
+    let open: Vec<String> = named
+        .iter()
+        .filter(|(_, e)| is_open(e))
+        .map(|(name, e)| format!("{name} ({e})"))
+        .collect();
+    let lag = neuromuscular_finding(operator.omega_nm_rad_s.value, operator.zeta_nm.value, sample_time);
+    not_determined(&open).into_iter().chain(lag).collect()
+}
+
+/// Poles that describe a lag: omega_nm (rad/s) beyond what the sampling shows, or a damping that
+/// sets the two poles far apart.
+pub fn neuromuscular_finding(omega_nm_rad_s: f64, zeta_nm: f64, sample_time: SampleTime) -> Option<Finding> {
+    let nyquist = PI / sample_time.s();
+    let what = if omega_nm_rad_s > nyquist {
+        format!("omega_nm = {omega_nm_rad_s:.0} rad/s lies above the Nyquist frequency {nyquist:.0} rad/s")
+    } else if zeta_nm > LARGEST_DAMPING {
+        format!("zeta_nm = {zeta_nm:.1} is above {LARGEST_DAMPING}")
+    } else {
+        return None;
+    };
+    Some(Finding::doubt(
+        "neuromuscular-lag",
+        format!(
+            "{what}: the two poles have become a lag and carry no information about the neuromuscular system; take the grey box or the \
+             operator family, or a model of another order"
+        ),
+    ))
+}
+
+fn not_determined(open: &[String]) -> Option<Finding> {
+    let verb = if open.len() == 1 { "is" } else { "are" };
+    (!open.is_empty()).then(|| {
+        Finding::doubt(
+            "undetermined-parameter",
+            format!(
+                "{} {verb} not determined: less than two standard errors from zero",
+                open.join(", ")
+            ),
+        )
+    })
+}
+
+/// A delay in s at the end of the range in which it was searched for.
+pub(super) fn delay_finding(tau_s: f64, (low, high): (f64, f64), of: &str) -> Option<Finding> {
+    (high > low && (tau_s <= low || tau_s >= high)).then(|| {
+        Finding::doubt(
+            "delay-at-bound",
+            format!(
+                "the delay{of} {tau_s:.3} s lies at the end of the range {low:.3} to {high:.3} s in which it was searched for; \
+                 widen it"
+            ),
+        )
+    })
+}
+
+/// How the search ended, where that matters.
+pub(super) fn search_finding(termination: Termination) -> Option<Finding> {
+    match termination.reason {
+        Reason::Border => Some(Finding::doubt(
+            "border",
+            "a root of C or F lies on the unit circle, and standard errors mean little; lower the orders",
+        )),
+        Reason::ExactFit => Some(Finding::note(
+            "exact-fit",
+            "the residuals are zero up to rounding: there is no noise, and there are no error bars",
+        )),
+        _ => (!termination.converged())
+            .then(|| Finding::doubt("not-converged", format!("the search did not converge: {termination}"))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::OperatorParameters;
+
+    use super::*;
+
+    fn ts() -> SampleTime {
+        SampleTime::HUNDREDTH
+    }
+
+    fn operator() -> OperatorEstimate {
+        let e = |value: f64| Estimate::with_variance(value, (0.1 * value).powi(2));
+        let given = OperatorParameters {
+            k_e: 0.09,
+            t_l_s: 0.4,
+            omega_nm_rad_s: 11.25,
+            zeta_nm: 0.35,
+            tau_e_s: 0.28,
+        };
+        let o = OperatorEstimate::from(given);
+        OperatorEstimate {
+            k_e: e(0.09),
+            t_l_s: e(0.4),
+            k_e_dot: e(0.036),
+            omega_nm_rad_s: e(11.25),
+            zeta_nm: e(0.35),
+            ..o
+        }
+    }
+
+    fn wide(value: f64) -> Estimate {
+        Estimate::with_variance(value, value * value)
+    }
+
+    #[test]
+    fn a_determined_operator_gives_no_finding_and_a_fixed_value_is_not_open() {
+        let o = operator();
+        assert!(gain_findings(&[("", o)]).is_empty() && pole_findings(&o, ts()).is_empty());
+        assert!(!is_open(&Estimate::fixed(0.0)));
+        assert!(gain_findings(&[]).is_empty());
+    }
+
+    #[test]
+    fn a_lead_that_nobody_has_is_named() {
+        let e = |value: f64, error: f64| Estimate::with_variance(value, error * error);
+        let lag = OperatorEstimate {
+            t_l_s: e(-0.2, 0.05),
+            k_e_dot: e(-0.018, 0.004),
+            ..operator()
+        };
+        let found = gain_findings(&[(" of record 2", lag)]);
+        assert_eq!((found.len(), found[0].kind), (1, "negative-lead"));
+        assert!(
+            found[0].message.starts_with("T_L of record 2 (-0.20"),
+            "{}",
+            found[0].message
+        );
+        // Both channels the other way round: the lead is right.
+        let flipped = OperatorEstimate {
+            k_e: e(-0.09, 0.009),
+            k_e_dot: e(-0.036, 0.004),
+            ..operator()
+        };
+        assert!(!leads_backwards(&flipped));
+        let open = OperatorEstimate {
+            k_e_dot: e(-0.004, 0.004),
+            ..lag
+        };
+        assert!(!leads_backwards(&open));
+    }
+
+    #[test]
+    fn errors_as_large_as_values_are_named() {
+        let lead = OperatorEstimate {
+            k_e: wide(0.09),
+            t_l_s: wide(0.4),
+            ..operator()
+        };
+        let found = gain_findings(&[("", lead)]);
+        assert_eq!((found.len(), found[0].kind), (1, "undetermined-parameter"));
+        assert!(
+            found[0]
+                .message
+                .starts_with("K_e (0.090 ± 0.090), T_L (0.40 ± 0.40) are not"),
+            "{}",
+            found[0].message
+        );
+        let nothing = OperatorEstimate {
+            k_e_dot: wide(0.036),
+            ..lead
+        };
+        assert_eq!(gain_findings(&[("", nothing)])[0].kind, "gain");
+        // For two operators one is known.
+        let found = gain_findings(&[(" of record 1", nothing), (" of record 2", operator())]);
+        assert_eq!(found[0].kind, "undetermined-parameter");
+        assert!(found[0].message.contains("K_e_dot of record 1"), "{}", found[0].message);
+        let poles = OperatorEstimate {
+            zeta_nm: wide(0.35),
+            ..operator()
+        };
+        assert!(pole_findings(&poles, ts())[0].message.starts_with("zeta_nm (0.35"));
+    }
+
+    #[test]
+    fn poles_of_no_person_are_a_lag() {
+        for (omega, zeta, senseless) in [
+            (11.25, 0.35, false),
+            (11.25, 2.9, false),
+            (11.25, 3.1, true),
+            (313.0, 1.0, false),
+            (315.0, 1.0, true),
+        ] {
+            let found = neuromuscular_finding(omega, zeta, ts());
+            assert_eq!(found.is_some(), senseless, "{omega}, {zeta}");
+            assert!(found.is_none_or(|f| f.kind == "neuromuscular-lag"));
+        }
+    }
+
+    #[test]
+    fn ends_of_the_search_and_of_the_delay() {
+        let of = |reason| {
+            search_finding(Termination { reason, iterations: 3 }).map(|finding| (finding.kind, finding.severity.name()))
+        };
+        assert_eq!(of(Reason::SmallDecrease), None);
+        assert_eq!(of(Reason::Direct), None);
+        assert_eq!(of(Reason::Border), Some(("border", "doubt")));
+        assert_eq!(of(Reason::IterationLimit), Some(("not-converged", "doubt")));
+        assert_eq!(of(Reason::ExactFit), Some(("exact-fit", "note")));
+        assert!(delay_finding(0.05, (0.05, 0.6), "").is_some() && delay_finding(0.6, (0.05, 0.6), "").is_some());
+        assert!(delay_finding(0.28, (0.05, 0.6), "").is_none() && delay_finding(0.28, (0.28, 0.28), "").is_none());
+    }
+}

@@ -1,0 +1,233 @@
+//! Evidence of a stretch of data against an operator that was found otherwise: one step towards its own fit.
+//!
+//! The operator stays constant, a noise model `D v = eps` of order [`NOISE`] is fitted to what it leaves of u, and with
+//! `psi = -d eps/d eta` for `eta = [K_e, K_e_dot, omega_nm, zeta_nm, tau_e]`
+//!
+//! `delta = (psi' psi)^-1 psi' eps`
+//!
+//! is the step of Gauss and Newton to the fit of that stretch (L. Le Cam's one-step estimate, *Proc.
+//! Third Berkeley Symp.* 1 (1956) 129-156). Its covariance is that of the scores of blocks of 2 s about
+//! it, `(n/(n-5)) G^-1 sum_c s_c s_c' G^-1` with `s_c = g_c - G_c delta` (K.-Y. Liang and S. L. Zeger,
+//! *Biometrika* 73 (1986) 13-22), no less than that of the model.
+
+use std::collections::BTreeMap;
+
+use hoid_model::{
+    OperatorParameters, Orders, Record, Structure,
+    delayed_operator::{DELAYED_NAMES, delayed_operator_and_jacobian_within, delayed_parameters, whole_samples},
+    uncertainty::Estimate,
+};
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::constancy::score_blocks;
+use crate::{
+    Constraint, Estimator,
+    criterion::{Criterion, Data, Workspace, first_residual},
+    linalg::least_squares::add_scaled,
+};
+
+/// Order of the noise model.
+const NOISE: usize = 4;
+/// Parameters of the operator.
+const OPERATOR: usize = 5;
+
+/// The step in one parameter that fits a record better.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OperatorStep {
+    /// Name of the parameter.
+    pub name: &'static str,
+    /// The step with its standard error, in the unit of the parameter.
+    pub by: Estimate,
+    /// Blocks that the standard error rests on.
+    pub blocks: usize,
+}
+
+impl OperatorStep {
+    /// Probability of so large a step where there is none, by Student's distribution: the operator has this standard
+    /// error itself, and steps up to `grid` are none.
+    pub fn p_value(&self, error_of_operator: f64, grid: f64) -> f64 {
+        let Some(own) = self.by.standard_error else { return 1.0 };
+        let t = (self.by.value.abs() - grid).max(0.0) / own.hypot(error_of_operator);
+        let freedom = self.blocks.saturating_sub(1).max(1) as f64;
+        StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |d| 2.0 * d.sf(t))
+    }
+}
+
+/// The steps of K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm and tau_e (s). `None` if the record is too short or carries
+/// no information.
+pub fn operator_step(operator: &OperatorParameters, record: &Record) -> Option<[OperatorStep; OPERATOR]> {
+    let ts = record.sample_time();
+    let eta = delayed_parameters(operator);
+    let whole = whole_samples(eta[4], ts).ok()?;
+    let (held, slopes) = delayed_operator_and_jacobian_within(whole, eta, ts).ok()?;
+    let orders = Orders {
+        nb: 3,
+        nd: NOISE,
+        nf: 2,
+        nk: held.nk,
+        ..Orders::default()
+    };
+    let names = ["b0", "b1", "b2", "f1", "f2"].map(str::to_owned);
+    let values = held.b.into_iter().chain(held.f).map(Constraint::Fixed);
+    let estimator = Estimator {
+        constraints: names.into_iter().zip(values).collect::<BTreeMap<_, _>>(),
+        ..Estimator::new(Structure::BoxJenkins, orders)
+    };
+    let fit = estimator.fit(std::slice::from_ref(record)).ok()?;
+    let (theta, first) = (fit.model().theta(), first_residual(&orders, fit.initial_state()));
+    // Coefficients of B are first, those of F last.
+    let places = [0, 1, 2, theta.len() - 2, theta.len() - 1];
+    let mut workspace = Workspace::of_thread();
+    let mut scores = |_: usize, data: Data<'_>| {
+        let criterion = Criterion::of_record(orders, data, fit.initial_state(), first);
+        let eps = criterion.residuals_of(theta, 0, &mut workspace);
+        let psi = criterion.jacobian(theta, 0, &mut workspace);
+        let column = |k: usize| {
+            let mut column = vec![0.0; eps.len()];
+            for (place, row) in places.iter().zip(&slopes) {
+                add_scaled(&mut column, row[k], &psi[*place]);
+            }
+            (k, column)
+        };
+        let columns = (0..OPERATOR).map(column).collect();
+        Some((eps, columns))
+    };
+    let blocks = score_blocks(
+        &Data::of(std::slice::from_ref(record)),
+        first,
+        OPERATOR,
+        ts.s(),
+        &mut scores,
+    )?;
+    let n = blocks.len();
+    if n <= OPERATOR {
+        return None;
+    }
+    let each: Vec<(DVector<f64>, DMatrix<f64>)> = blocks
+        .iter()
+        .map(|b| {
+            (
+                DVector::from_column_slice(&b.g),
+                DMatrix::from_row_slice(OPERATOR, OPERATOR, &b.big),
+            )
+        })
+        .collect();
+    let whole = each
+        .iter()
+        .fold(DMatrix::zeros(OPERATOR, OPERATOR), |sum, (_, big)| sum + big);
+    // Units differ by orders of magnitude.
+    let scale = DVector::from_fn(OPERATOR, |i, _| whole[(i, i)].sqrt().recip());
+    let scaled = DMatrix::from_fn(OPERATOR, OPERATOR, |i, j| whole[(i, j)] * scale[i] * scale[j]);
+    let inverse = scaled.cholesky()?.inverse();
+    let inverse = DMatrix::from_fn(OPERATOR, OPERATOR, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
+    let delta = &inverse * each.iter().fold(DVector::zeros(OPERATOR), |sum, (g, _)| sum + g);
+    let mut scatter = DMatrix::zeros(OPERATOR, OPERATOR);
+    for (g, big) in &each {
+        let score = g - big * &delta;
+        scatter += &score * score.transpose();
+    }
+    let clustered = &inverse * scatter * &inverse * (n as f64 / (n - OPERATOR) as f64);
+    let step = |k: usize| {
+        let variance = clustered[(k, k)].max(fit.innovation_variance() * inverse[(k, k)]);
+        OperatorStep {
+            name: DELAYED_NAMES[k],
+            by: Estimate::with_variance(delta[k], variance),
+            blocks: n,
+        }
+    };
+    let steps: [OperatorStep; OPERATOR] = std::array::from_fn(step);
+    steps.iter().all(|step| step.by.value.is_finite()).then_some(steps)
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::{
+        Channel,
+        scenario::{Condition, Scenario},
+    };
+    use hoid_sim::{RunSeed, Simulator};
+
+    use super::*;
+    use crate::GreyBox;
+
+    fn run(replication: u64) -> Record {
+        let streams = RunSeed {
+            seed: 99,
+            replication,
+            ..RunSeed::default()
+        };
+        let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+        simulator.run(streams, false).unwrap().span(0.0, 40.0).unwrap()
+    }
+
+    fn truth() -> OperatorParameters {
+        Scenario::condition(Condition::C1).initial.operator
+    }
+
+    fn of(steps: &[OperatorStep], name: &str) -> Estimate {
+        steps.iter().find(|step| step.name == name).unwrap().by
+    }
+
+    #[test]
+    fn one_step_leads_to_the_fit() {
+        // Twin: the grey box of the same stretch, whose noise model has one order, not four.
+        let record = run(1);
+        let start = OperatorParameters {
+            k_e: 0.97 * truth().k_e,
+            ..truth()
+        };
+        let steps = operator_step(&start, &record).unwrap();
+        let fit = GreyBox::new(1..=1)
+            .fit(std::slice::from_ref(&record))
+            .unwrap()
+            .operator(0)
+            .unwrap();
+        for (name, to, from) in [
+            ("K_e", fit.k_e, start.k_e),
+            ("K_e_dot", fit.k_e_dot, start.k_e_dot()),
+            ("omega_nm", fit.omega_nm_rad_s, start.omega_nm_rad_s),
+            ("tau_e", fit.tau_e_s, start.tau_e_s),
+        ] {
+            let reached = from + of(&steps, name).value;
+            let error = to.standard_error.unwrap();
+            assert!((reached - to.value).abs() < error, "{name}: {reached} and {}", to.value);
+        }
+    }
+
+    #[test]
+    fn the_truth_needs_no_step_and_a_wrong_delay_one() {
+        let mut squares = 0.0;
+        for k in 10..22 {
+            let steps = operator_step(&truth(), &run(k)).unwrap();
+            assert!(steps[0].blocks > 15);
+            assert!(steps.iter().all(|step| step.p_value(0.0, 0.0) > 1e-4), "{steps:?}");
+            let tau = of(&steps, "tau_e");
+            squares += (tau.value / tau.standard_error.unwrap()).powi(2);
+        }
+        // chi-square of 12, errors no less than the model's: up to 28.3 at 0.5 %.
+        assert!(squares < 28.3, "{squares}");
+        let late = OperatorParameters {
+            tau_e_s: truth().tau_e_s + 0.05,
+            ..truth()
+        };
+        let steps = operator_step(&late, &run(30)).unwrap();
+        let tau = of(&steps, "tau_e");
+        assert!(tau.value < -6.0 * tau.standard_error.unwrap(), "{tau}");
+        assert!(steps[4].p_value(0.0, 0.015) < 1e-4 && steps[4].p_value(0.0, 1.0) == 1.0);
+    }
+
+    #[test]
+    fn a_record_that_says_nothing_gives_no_step() {
+        let record = run(31);
+        let n = record.len();
+        let still = Record::new(
+            record.sample_time(),
+            Channel::new("e", "", vec![0.0; n]),
+            Channel::new("u", "", record.output().to_vec()),
+        )
+        .unwrap();
+        assert!(operator_step(&truth(), &still).is_none());
+        assert!(operator_step(&truth(), &record.span(0.0, 3.0).unwrap()).is_none());
+    }
+}

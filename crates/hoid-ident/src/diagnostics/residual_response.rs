@@ -1,0 +1,181 @@
+//! Whether a response to the error is left that a model does not have.
+//!
+//! For a model that is linear in what it has to estimate, `u = X b + v`, the columns X are known: responses of a basis,
+//! their derivatives by the fixed dynamics, a level. With an autoregression `D v = eps` of order [`NOISE`] the question
+//! is whether further taps on e carry information about eps, Z in place of the impulse response that X cannot have:
+//! means of e over [`TAPS`] spans of [`TAP_S`] one after the other. By the statistic of the Lagrange multiplier (T. S.
+//! Breusch and A. R. Pagan, *Review of Economic Studies* 47 (1980) 239-253; L. Ljung, *System Identification*, 1999,
+//! section 16.6, for the residuals of a model)
+//!
+//! `s(t) = z(t) eps(t)`, z the remainder of D Z when D X and the lags of v are taken out,
+//!
+//! so that what the estimate of b and of D takes away is taken away here too: in a closed loop past e and
+//! past v are correlated. Two variances: that of the model, with
+//! `T = (sum s)' (sigma^2 sum z z')^-1 (sum s)`, chi-square with [`TAPS`] degrees of freedom, and the scatter of the
+//! sums over blocks of 2 s, with Hotelling's `T^2`, which holds whatever the size of the remnant does (H.
+//! Hotelling, *Annals of Mathematical Statistics* 2 (1931) 360-378). The larger p-value counts.
+//!
+//! Signals are thinned to [`RATE_HZ`] at most. Residuals count in full: the pulses of a person who moves a stick by
+//! pulses are their response to e, and what limits would take off them looks like a response that is missed.
+
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
+
+use super::whitened::{NOISE, Whitened, lags, orthogonal, thinning, whitened};
+
+/// Taps, and their length in s.
+pub(crate) const TAPS: usize = 6;
+pub(crate) const TAP_S: f64 = 0.15;
+/// Length of a block, s, and fewest of them.
+const BLOCK_S: f64 = 2.0;
+const FEWEST: usize = 10;
+
+/// Result of a test of a model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ResidualResponse {
+    /// Probability of so much where nothing is left.
+    pub p_value: f64,
+    /// The two that it is the larger of: by the model, by the scatter of blocks.
+    pub each: [f64; 2],
+    /// Share of the variance of eps that the taps explain.
+    pub share: f64,
+}
+
+/// Tests whether columns, all as long as e and u, are all that there is of a response of u to e in samples `from..`.
+/// The level need not be among them. `None` if there is too little, or something is not a number.
+pub fn residual_response(
+    columns: &[Vec<f64>],
+    e: &[f64],
+    u: &[f64],
+    from: usize,
+    sample_time_s: f64,
+) -> Option<ResidualResponse> {
+    let thin = thinning(sample_time_s);
+    let every_s = thin as f64 * sample_time_s;
+    let tap = (TAP_S / sample_time_s).round().max(1.0) as usize;
+    let first = from.max(TAPS * tap);
+    let rows: Vec<usize> = (first..u.len()).step_by(thin).collect();
+    let block = (BLOCK_S / every_s).round() as usize;
+    let blocks = rows.len().saturating_sub(NOISE) / block.max(1);
+    if blocks < FEWEST || columns.iter().any(|c| c.len() != u.len()) || e.len() != u.len() {
+        return None;
+    }
+    let n = rows.len();
+    let p = columns.len() + 1;
+    let z = DMatrix::from_fn(n, TAPS, |i, j| {
+        // The current error already holds what is new in u, where the controlled element answers at once.
+        let (next, newest) = (rows[i] + 1, if j == 0 { thin } else { j * tap });
+        e[next - (j + 1) * tap..next - newest.min((j + 1) * tap - 1)]
+            .iter()
+            .sum::<f64>()
+            / tap as f64
+    });
+    if !z.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    let Whitened { v, d, x: xd, eps, .. } = Whitened::of(columns, u, &rows, f64::INFINITY)?;
+    let lagged = lags(&v);
+    let known = DMatrix::from_fn(n - NOISE, p + NOISE, |i, j| match j {
+        j if j < p => xd[(i, j)],
+        j => lagged[(i, j - p)],
+    });
+    let q = orthogonal(&known)?;
+    let left = |m: DMatrix<f64>| -> DMatrix<f64> { &m - &q * (q.transpose() * &m) };
+    let z = left(whitened(&z, &d));
+    let eps = left(DMatrix::from_column_slice(eps.len(), 1, eps.as_slice()))
+        .column(0)
+        .into_owned();
+    of_scores(&z, &eps, block, p + NOISE)
+}
+
+fn of_scores(z: &DMatrix<f64>, eps: &DVector<f64>, block: usize, known: usize) -> Option<ResidualResponse> {
+    let gram = z.transpose() * z;
+    let sums = z.transpose() * eps;
+    let freedom = (eps.len() - known) as f64;
+    let variance = eps.norm_squared() / freedom;
+    // Units are those of u and e alone: taps are alike.
+    let inverse = gram.cholesky()?.inverse();
+    let explained = (sums.transpose() * &inverse * &sums)[(0, 0)];
+    let of_model = ChiSquared::new(TAPS as f64).ok()?.sf(explained / variance);
+    let count = eps.len() / block;
+    let scores = DMatrix::from_fn(count, TAPS, |c, j| {
+        (c * block..(c + 1) * block).map(|t| z[(t, j)] * eps[t]).sum::<f64>()
+    });
+    let mean = scores.row_mean();
+    let about = DMatrix::from_fn(count, TAPS, |c, j| scores[(c, j)] - mean[j]);
+    let (m, k) = (count as f64, TAPS as f64);
+    let scatter = (about.transpose() * &about) / (m - 1.0);
+    let t2 = m * (&mean * scatter.cholesky()?.inverse() * mean.transpose())[(0, 0)];
+    let of_blocks = FisherSnedecor::new(k, m - k).ok()?.sf(t2 * (m - k) / (k * (m - 1.0)));
+    let p_value = of_model.max(of_blocks);
+    p_value.is_finite().then_some(ResidualResponse {
+        p_value,
+        each: [of_model, of_blocks],
+        share: explained / eps.norm_squared(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::diagnostics::whitened::stream;
+
+    const TS: f64 = 0.02;
+
+    /// e, the column that is known and u: `e(t) = .98 e(t-1) + w - .3 v(t-1)`, `u = e(t-2) + echo e(t-20) + v`, v
+    /// autoregressive, louder where `loud` reports it.
+    fn loop_of(seed: u64, echo: f64, loud: impl Fn(usize) -> f64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+        let mut seed = seed;
+        let n = 3000;
+        let (mut e, mut u, mut v) = (vec![0.0_f64; n], vec![0.0; n], 0.0);
+        for t in 1..n {
+            e[t] = 0.98 * e[t - 1] + stream(&mut seed) - 0.3 * v;
+            v = 0.9 * v + loud(t) * stream(&mut seed);
+            let past = |lag: usize| if t >= lag { e[t - lag] } else { 0.0 };
+            u[t] = past(2) + echo * past(20) + v;
+        }
+        let known = (0..n).map(|t| if t >= 2 { e[t - 2] } else { 0.0 }).collect();
+        (e, known, u)
+    }
+
+    fn found(seed: u64, echo: f64, loud: impl Fn(usize) -> f64) -> ResidualResponse {
+        let (e, known, u) = loop_of(seed, echo, loud);
+        residual_response(&[known], &e, &u, 100, TS).unwrap()
+    }
+
+    #[test]
+    fn the_level_holds_also_where_the_remnant_is_not_steady() {
+        // Shares of p below .1 in 100 loops: .1 with a standard error of .03; the larger of two is less often there.
+        for loud in [
+            |_: usize| 1.0,
+            |t: usize| if (t / 250).is_multiple_of(2) { 0.2 } else { 2.0 },
+        ] {
+            let below = (0..100)
+                .filter(|seed| found(1000 + seed, 0.0, loud).p_value < 0.1)
+                .count();
+            assert!((1..=20).contains(&below), "{below} of 100");
+        }
+    }
+
+    #[test]
+    fn what_is_left_is_found() {
+        let missed = (0..20).filter(|seed| found(*seed, 0.2, |_| 1.0).p_value > 1e-3).count();
+        assert!(missed <= 1, "{missed} of 20");
+    }
+
+    #[test]
+    fn too_little_or_no_number_says_nothing() {
+        let (e, known, mut u) = loop_of(3, 0.0, |_| 1.0);
+        let short = |n: usize| residual_response(&[known[..n].to_vec()], &e[..n], &u[..n], 100, TS);
+        assert!(short(900).is_none() && short(1400).is_some());
+        // A column twice, and one of nothing.
+        for columns in [vec![known.clone(), known.clone()], vec![vec![0.0; e.len()]]] {
+            assert!(residual_response(&columns, &e, &u, 100, TS).is_none());
+        }
+        // An exact fit has nothing to test.
+        assert!(residual_response(std::slice::from_ref(&known), &e, &known, 100, TS).is_none());
+        u[2000] = f64::NAN;
+        assert!(residual_response(&[known], &e, &u, 100, TS).is_none());
+    }
+}

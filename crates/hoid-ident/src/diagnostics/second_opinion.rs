@@ -1,0 +1,333 @@
+//! Second fits to the records with something taken out, and their report on the first.
+//!
+//! | without | where the fit differs, this carries it | finding |
+//! |---|---|---|
+//! | what no neighbour of a sample bears out ([`crate::faults::held`]), in e as in u: what it brings into the filters of a fit is bounded | few samples | `leverage` |
+//! | what is slower than 20 s, of a slow system than ten periods of its slowest pole ([`crate::faults::without_slow`]) | a drift or a step of a sensor, which the person does not follow | `slow` |
+//!
+//! Two fits differ where a parameter, the crossover or the phase margin does by more than three standard
+//! errors: those of the first fit or, where the second knows less, of what it has lost, `sqrt(se'^2 -
+//! se^2)`. Where nothing is taken out the second fit would be the first, and is not made.
+
+use std::f64::consts::TAU;
+
+use hoid_model::{
+    ContinuousTransferFunction, Detrend, Finding, Record,
+    margins::MANUAL_CONTROL_RANGE_RAD_S,
+    uncertainty::{Estimate, OperatorEstimate},
+};
+
+use crate::{
+    Estimator, Fit, GreyBox, GreyBoxFit, SigmoidChange, SigmoidFit,
+    family::{FamilyEstimator, FamilyFit},
+    faults::{PERIOD_S, held, without_slow},
+};
+
+/// Periods of the slowest pole of a system that are slow compared with it.
+const SLOW_PERIODS: f64 = 10.0;
+/// Standard errors by which two fits differ.
+const DIFFERENT: f64 = 3.0;
+/// Standard errors by which a level may move a parameter.
+const LEVEL: f64 = 2.0;
+
+/// Name of a quantity, and its estimates by the first fit and by the other.
+type ComparedEstimate = (String, Estimate, Estimate);
+
+/// Trend removed from the records.
+#[derive(Debug, Clone, Copy)]
+enum Without {
+    SamplesThatStandOut,
+    /// Than this period, s.
+    WhatIsSlow(f64),
+}
+
+impl Without {
+    const ALL: [Self; 2] = [Self::SamplesThatStandOut, Self::WhatIsSlow(PERIOD_S)];
+
+    /// The records without it; `None` if they have none of it.
+    fn records(self, records: &[Record]) -> Option<Vec<Record>> {
+        match self {
+            Self::SamplesThatStandOut => held(records),
+            Self::WhatIsSlow(period_s) => without_slow(records, period_s),
+        }
+    }
+
+    /// A doubt where fits differ in any of these.
+    fn finding(self, pairs: impl IntoIterator<Item = ComparedEstimate>) -> Option<Finding> {
+        let differ: Vec<String> = pairs
+            .into_iter()
+            .filter_map(|(name, first, other)| {
+                let error = first.standard_error.filter(|e| *e > 0.0)?;
+                let lost = (other.standard_error.unwrap_or(0.0).powi(2) - error * error)
+                    .max(0.0)
+                    .sqrt();
+                let off = (first.value - other.value).abs() / error.max(lost);
+                (off > DIFFERENT && off.is_finite()).then(|| format!("{name} by {off:.1}"))
+            })
+            .collect();
+        let differ = (!differ.is_empty()).then(|| differ.join(", "))?;
+        Some(match self {
+            Self::SamplesThatStandOut => Finding::doubt(
+                "leverage",
+                format!(
+                    "few samples carry the fit: with each held to its neighbours it differs in {differ} standard errors; \
+                     look at the recording"
+                ),
+            ),
+            Self::WhatIsSlow(period_s) => Finding::doubt(
+                "slow",
+                format!(
+                    "a drift or a step that the person does not follow carries the fit: without what is slower than \
+                     {period_s:.0} s it differs in {differ} standard errors; look at the recording, or take a span without it"
+                ),
+            ),
+        })
+    }
+}
+
+/// The same fit to the records without each of `all`; `again` gives the quantities of both fits.
+fn opinions(
+    all: &[Without],
+    records: &[Record],
+    again: impl Fn(&[Record]) -> Option<Vec<ComparedEstimate>>,
+) -> Vec<Finding> {
+    let asked = |without: &Without| without.finding(again(&without.records(records)?)?);
+    all.iter().filter_map(asked).collect()
+}
+
+/// For a fit of polynomials, by the estimator that made it; with its loop where the controlled element is known.
+pub fn of_polynomials(
+    estimator: &Estimator,
+    fit: &Fit,
+    records: &[Record],
+    element: Option<&ContinuousTransferFunction>,
+) -> Vec<Finding> {
+    let all = [Without::SamplesThatStandOut, Without::WhatIsSlow(slow_period_s(fit))];
+    opinions(&all, records, |others| {
+        let other = again(estimator, fit, others)?;
+        let mut pairs = compared_parameters(fit, &other);
+        pairs.extend(compared_loops(fit, &other, element));
+        Some(pairs)
+    })
+}
+
+/// Period that is slow compared with a system: the periods of a person, or ten of its slowest pole.
+fn slow_period_s(fit: &Fit) -> f64 {
+    let poles = fit.roots();
+    let poles = poles.iter().filter(|root| matches!(root.polynomial, 'a' | 'f'));
+    // s Ts = ln z.
+    let slowest = poles.map(|root| root.value.ln().norm()).filter(|rate| *rate > 0.0);
+    let periods = slowest.map(|rate| SLOW_PERIODS * TAU * fit.model().sample_time().s() / rate);
+    periods.fold(PERIOD_S, f64::max)
+}
+
+/// For a grey box: the order of its remnant stays.
+pub fn of_grey_box(
+    estimator: &GreyBox,
+    fit: &GreyBoxFit,
+    records: &[Record],
+    element: Option<&ContinuousTransferFunction>,
+) -> Vec<Finding> {
+    let estimator = GreyBox {
+        order: fit.order()..=fit.order(),
+        ..estimator.clone()
+    };
+    opinions(&Without::ALL, records, |others| {
+        let other = estimator.fit(others).ok()?;
+        let mut pairs = compared(fit.parameters(), other.parameters());
+        pairs.extend(compared_loops(fit.polynomial_fit(0), other.polynomial_fit(0), element));
+        Some(pairs)
+    })
+}
+
+/// For an operator of the family: its form and the orders of its noise model stay. A fit at the lines of a recorded
+/// excitation is next to it already, and has no information about what is slow.
+pub fn of_family(
+    estimator: &FamilyEstimator,
+    fit: &FamilyFit,
+    records: &[Record],
+    element: Option<&ContinuousTransferFunction>,
+) -> Vec<Finding> {
+    // Error bars are those of digits then, which the ends of what is taken out are beyond.
+    if fit.noise_free.is_some() {
+        return Vec::new();
+    }
+    let (nc, nd) = fit.noise_orders;
+    let again = FamilyEstimator {
+        forms: vec![fit.form],
+        nc: nc..=nc,
+        nd: nd..=nd,
+        excitation: None,
+        intersample: fit.intersample,
+        channels: fit.channels_in_use(),
+        ..estimator.clone()
+    };
+    // What is slow would be taken out of e and u alone, and not out of what is seen besides.
+    let asked = match &fit.lines {
+        None if again.channels.is_empty() => &Without::ALL[..],
+        _ => &Without::ALL[..1],
+    };
+    let measures = |of: &FamilyFit| of.loop_measures_in_front(0, element?);
+    opinions(asked, records, |others| {
+        let other = again.fit_with_response(others, None).ok()?;
+        // For the best form by itself: the other fit has no other.
+        let (one, two) = (fit.weighed.first()?, other.weighed.first()?);
+        let parameters = one.operators.iter().zip(&two.operators).flat_map(|(one, two)| {
+            let both = one.parameters.iter().zip(&two.parameters);
+            both.filter(|(a, _)| a.determined)
+                .map(|(a, b)| (a.name.clone(), a.estimate(), b.estimate()))
+        });
+        let mut pairs: Vec<ComparedEstimate> = parameters.collect();
+        if let Some((a, b)) = measures(fit).zip(measures(&other)) {
+            pairs.push(("the crossover".to_owned(), a.crossover_rad_s, b.crossover_rad_s));
+            pairs.push(("the phase margin".to_owned(), a.phase_margin_deg, b.phase_margin_deg));
+        }
+        Some(pairs)
+    })
+}
+
+/// For an operator whose gains change once, without samples that are prominent. One fit that finds a change where the
+/// other finds none is a difference whatever its size.
+pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record]) -> Option<Finding> {
+    let without = Without::SamplesThatStandOut;
+    let other = SigmoidChange {
+        likelihood_intervals: false,
+        start: Some(fit.parameters().iter().map(|p| p.estimate.value).collect()),
+        ..estimator.clone()
+    };
+    let other = other.fit(&without.records(records)?).ok()?;
+    if fit.change_found() != other.change_found() {
+        return Some(Finding::doubt(
+            "leverage",
+            "few samples carry the fit: with each held to its neighbours the records show something else about a change; \
+             look at the recording",
+        ));
+    }
+    if fit.change_found() {
+        let named = |of: &SigmoidFit| of.parameters().into_iter().map(|p| (p.name, p.estimate)).collect();
+        return without.finding(compared(named(fit), named(&other)));
+    }
+    let constant = |of: &SigmoidFit| {
+        let found = &of.constant_operator().parameters;
+        found.iter().map(|p| (p.name.to_owned(), p.estimate)).collect()
+    };
+    without.finding(compared(constant(fit), constant(&other)))
+}
+
+/// Effect of a remaining level of e and u on a fit of polynomials, from a fit without their means: a doubt where a
+/// parameter moves by more than `LEVEL` standard errors.
+pub fn of_level(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Finding> {
+    let without: Vec<Record> = records.iter().map(|r| r.clone().detrended(Detrend::Mean)).collect();
+    let other = again(estimator, fit, &without)?;
+    let moved: Vec<String> = compared_parameters(fit, &other)
+        .into_iter()
+        .filter_map(|(name, first, other)| {
+            let off = (first.value - other.value).abs() / first.standard_error.filter(|e| *e > 0.0)?;
+            (off > LEVEL).then(|| format!("{name} by {off:.1}"))
+        })
+        .collect();
+    (!moved.is_empty()).then(|| {
+        Finding::doubt(
+            "level",
+            format!(
+                "an offset of e or u moves {} standard errors: take the means out with --detrend mean",
+                moved.join(", ")
+            ),
+        )
+    })
+}
+
+/// The same model fitted to other records, from where the fit is.
+fn again(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Fit> {
+    let other = Estimator {
+        start: Some(fit.model().theta().to_vec()),
+        ..estimator.with_orders(fit.orders())
+    };
+    other.fit(records).ok()
+}
+
+/// The parameters of two fits: the operator's where there is one in both.
+fn compared_parameters(fit: &Fit, other: &Fit) -> Vec<ComparedEstimate> {
+    match (fit.operator(), other.operator()) {
+        (Ok(one), Ok(two)) => {
+            let named = |of: OperatorEstimate| of.rows().map(|(name, _, estimate)| (name.to_owned(), estimate)).into();
+            compared(named(one), named(two))
+        }
+        _ => compared(fit.parameters(), other.parameters()),
+    }
+}
+
+fn compared(one: Vec<(String, Estimate)>, two: Vec<(String, Estimate)>) -> Vec<ComparedEstimate> {
+    let pairs = one.into_iter().zip(two);
+    pairs.map(|((name, first), (_, other))| (name, first, other)).collect()
+}
+
+/// Crossover and phase margin of two fits with the same controlled element.
+fn compared_loops(fit: &Fit, other: &Fit, element: Option<&ContinuousTransferFunction>) -> Vec<ComparedEstimate> {
+    let Some(element) = element else { return Vec::new() };
+    let margins = |of: &Fit| {
+        let (low, high) = MANUAL_CONTROL_RANGE_RAD_S;
+        let high = high.min(of.model().sample_time().nyquist_rad_s());
+        of.margins(|omega| element.response(omega), (low, high))
+    };
+    let (one, two) = (margins(fit), margins(other));
+    let both = [
+        ("the crossover", one.crossover_rad_s, two.crossover_rad_s),
+        ("the phase margin", one.phase_margin_deg, two.phase_margin_deg),
+    ];
+    let pairs = both.into_iter().filter_map(|(name, a, b)| Some((name, a?, b?)));
+    pairs.map(|(name, a, b)| (name.to_owned(), a, b)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::{
+        Channel, Structure,
+        scenario::{Condition, Scenario},
+    };
+    use hoid_sim::{RunSeed, Simulator};
+
+    use super::*;
+
+    fn simulated(condition: Condition) -> Record {
+        let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
+        simulator.run(RunSeed::default(), false).unwrap()
+    }
+
+    /// The record with one sample of e that is wrong.
+    fn spoilt(record: &Record) -> [Record; 1] {
+        let mut e = record.input().to_vec();
+        e[4000] = 30.0;
+        let u = Channel::new("u", "", record.output().to_vec());
+        [Record::new(record.sample_time(), Channel::new("e", "", e), u).unwrap()]
+    }
+
+    #[test]
+    fn a_sample_that_carries_a_fit_is_told_by_all_kinds_of_fits() {
+        let record = simulated(Condition::C1);
+        let (clean, bad) = ([record.clone()], spoilt(&record));
+        let element = ContinuousTransferFunction::new(&[1.0], &[1.0, 0.0]).unwrap();
+        let element = Some(&element);
+        let bj = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(29));
+        let of_bj = |records: &[Record]| of_polynomials(&bj, &bj.fit(records).unwrap(), records, element);
+        assert_eq!(of_bj(&clean), []);
+        let words = &of_bj(&bad)[0].message;
+        assert!(words.contains("T_L by"), "{words}");
+        let grey = GreyBox::new(1..=1);
+        let of_grey = |records: &[Record]| of_grey_box(&grey, &grey.fit(records).unwrap(), records, element);
+        assert_eq!(of_grey(&clean), []);
+        assert_eq!(of_grey(&bad)[0].kind, "leverage");
+    }
+
+    #[test]
+    fn a_change_that_one_sample_makes_is_told() {
+        let record = simulated(Condition::C4);
+        let estimator = SigmoidChange {
+            likelihood_intervals: false,
+            ..SigmoidChange::default()
+        };
+        let of = |records: &[Record]| of_sigmoid(&estimator, &estimator.fit(records).unwrap(), records);
+        assert_eq!(of(std::slice::from_ref(&record)), None);
+        assert!(of(&spoilt(&record)).is_some());
+    }
+}

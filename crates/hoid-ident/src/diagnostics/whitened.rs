@@ -1,0 +1,139 @@
+//! Least squares after an autoregression: what remains of u when some columns are taken out, white.
+//!
+//! Of `u = X b + level + v`, `D v = eps`, noise model of order [`NOISE`] and b in turn, residuals beyond a given number
+//! of standard deviations limited to it where a limit is requested.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Order of the noise model.
+pub(super) const NOISE: usize = 16;
+/// Rate to which signals are thinned, Hz.
+const RATE_HZ: f64 = 50.0;
+/// Standard deviations beyond which a residual is an outlier.
+pub(super) const LIMIT: f64 = 3.5;
+/// Share of the power of u below which v is rounding.
+const EXACT: f64 = 1e-18;
+/// Rounds of noise model and least squares.
+const ROUNDS: usize = 3;
+
+/// Every how many samples one is taken.
+pub(super) fn thinning(sample_time_s: f64) -> usize {
+    (1.0 / (sample_time_s * RATE_HZ) + 1e-6).floor().max(1.0) as usize
+}
+
+/// A fit of columns and a level.
+pub(super) struct Whitened {
+    /// For the columns, the level last.
+    pub b: DVector<f64>,
+    /// The part of u that the columns leave unexplained.
+    pub v: DVector<f64>,
+    /// `d_1 ..` of its noise model.
+    pub d: Vec<f64>,
+    /// Columns after the noise model, the level last; [`NOISE`] rows fewer.
+    pub x: DMatrix<f64>,
+    /// Residuals, limited.
+    pub eps: DVector<f64>,
+}
+
+impl Whitened {
+    /// For these samples of columns and u; `None` where something is not a number, or columns are not independent, or
+    /// nothing but rounding is left. Residuals are limited to `limit` standard deviations.
+    pub fn of(columns: &[Vec<f64>], u: &[f64], samples: &[usize], limit: f64) -> Option<Self> {
+        let (n, p) = (samples.len(), columns.len() + 1);
+        let x = DMatrix::from_fn(n, p, |i, j| columns.get(j).map_or(1.0, |c| c[samples[i]]));
+        let y = DVector::from_fn(n, |i, _| u[samples[i]]);
+        if n <= 2 * (NOISE + p) || !x.iter().chain(&y).all(|v| v.is_finite()) {
+            return None;
+        }
+        let mut d = vec![0.0; NOISE];
+        let mut v = y.clone();
+        let mut b = DVector::zeros(p);
+        for _ in 0..ROUNDS {
+            let (xd, yd) = (whitened(&x, &d), whitened_vector(&y, &d));
+            b = solution(&xd, &limited(&xd, &yd, limit)?)?;
+            v = &y - &x * &b;
+            let lags = lags(&v);
+            d = solution(&lags, &limited(&lags, &tail(&v), limit)?)?
+                .iter()
+                .map(|d| -d)
+                .collect();
+        }
+        if v.norm_squared() <= EXACT * y.norm_squared() {
+            return None;
+        }
+        let eps = clipped(&whitened_vector(&v, &d), limit);
+        let x = whitened(&x, &d);
+        Some(Self { b, v, d, x, eps })
+    }
+}
+
+/// After `1 + d_1 q^-1 + ..`, from the first sample on that has all lags.
+pub(super) fn whitened(m: &DMatrix<f64>, d: &[f64]) -> DMatrix<f64> {
+    DMatrix::from_fn(m.nrows() - NOISE, m.ncols(), |i, j| {
+        let own = m[(i + NOISE, j)];
+        d.iter()
+            .enumerate()
+            .fold(own, |sum, (k, d)| sum + d * m[(i + NOISE - 1 - k, j)])
+    })
+}
+
+fn whitened_vector(v: &DVector<f64>, d: &[f64]) -> DVector<f64> {
+    let m = DMatrix::from_column_slice(v.len(), 1, v.as_slice());
+    whitened(&m, d).column(0).into_owned()
+}
+
+fn tail(v: &DVector<f64>) -> DVector<f64> {
+    v.rows(NOISE, v.len() - NOISE).into_owned()
+}
+
+/// `v(t-1) .. v(t-p)` by rows.
+pub(super) fn lags(v: &DVector<f64>) -> DMatrix<f64> {
+    DMatrix::from_fn(v.len() - NOISE, NOISE, |i, j| v[i + NOISE - 1 - j])
+}
+
+/// y with what is far from its fit nearer to it.
+fn limited(x: &DMatrix<f64>, y: &DVector<f64>, limit: f64) -> Option<DVector<f64>> {
+    let fit = x * solution(x, y)?;
+    Some(&fit + clipped(&(y - &fit), limit))
+}
+
+fn clipped(eps: &DVector<f64>, limit: f64) -> DVector<f64> {
+    let most = limit * (eps.norm_squared() / eps.len() as f64).sqrt();
+    // No limit for residuals that are all zero is not a number; min and max leave it out.
+    eps.map(|v| v.max(-most).min(most))
+}
+
+/// Least squares by columns of unit length; `None` if they are not independent.
+pub(super) fn solution(x: &DMatrix<f64>, y: &DVector<f64>) -> Option<DVector<f64>> {
+    let (q, r, scales) = factored(x)?;
+    let mut b = r.solve_upper_triangular(&(q.transpose() * y))?;
+    b.iter_mut().zip(&scales).for_each(|(b, s)| *b /= s);
+    Some(b)
+}
+
+pub(super) fn orthogonal(x: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    factored(x).map(|(q, ..)| q)
+}
+
+fn factored(x: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>, Vec<f64>)> {
+    let scales: Vec<f64> = x.column_iter().map(|c| c.norm()).collect();
+    if scales.iter().any(|s| !(*s > 0.0 && s.is_finite())) {
+        return None;
+    }
+    let scaled = DMatrix::from_fn(x.nrows(), x.ncols(), |i, j| x[(i, j)] / scales[j]);
+    let (q, r) = scaled.qr().unpack();
+    let least = r.diagonal().iter().fold(f64::MAX, |least, d| least.min(d.abs()));
+    (least > DEPENDENT).then_some((q, r, scales))
+}
+
+/// Diagonal of R below which columns are not independent.
+const DEPENDENT: f64 = 1e-10;
+
+/// Numbers of a fixed stream, uniform with variance 1/12.
+#[cfg(test)]
+pub(super) fn stream(seed: &mut u64) -> f64 {
+    *seed = seed
+        .wrapping_mul(6_364_136_223_846_793_005)
+        .wrapping_add(1_442_695_040_888_963_407);
+    (*seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+}

@@ -1,0 +1,320 @@
+//! Findings for and against a fit of the family.
+//!
+//! Each rule is one observation with its own kind ([`hoid_model::Finding`]); the limits are stated
+//! where they are used; those on residuals are shared with all fits.
+
+use hoid_model::Finding;
+
+use super::{
+    agreement::Agreement,
+    clusters::ClusterKind,
+    instrumental::InstrumentalFit,
+    line_fit::LineFit,
+    parameter::Parameter,
+    prior::OperatorPrior,
+    result::{FreeModel, WeighedForm},
+};
+use crate::{Termination, diagnostics::residuals::ResidualMeasures};
+
+/// chi^2 per degree of freedom at the lines beyond which the describing function is missed.
+const LARGEST_REDUCED_CHI_SQUARED: f64 = 3.0;
+/// Level below which methods do not agree, and below which a free model refutes the form.
+const LEVEL: f64 = 0.01;
+/// Loss above that of a free model beyond which a refuted form is reported to be so.
+const LARGEST_EXCESS_LOSS: f64 = 0.01;
+/// Relative error of the response, at its best, beyond which nothing is known about the person.
+pub(super) const LARGEST_RESPONSE_ERROR: f64 = 0.5;
+/// Damping ratio above which the two neuromuscular poles are lags of their own, far apart: no muscle
+/// is so damped.
+pub(super) const MOST_DAMPED: f64 = 1.5;
+/// Weight from which on a form is settled.
+const SETTLED_WEIGHT: f64 = 0.95;
+/// Ratio of clustered to model-based standard errors that is worth a note.
+const NOTED_ERROR_RATIO: f64 = 1.5;
+
+/// Standard errors from which on what a prior moves a parameter by is reported.
+const NOTED_PULL: f64 = 0.5;
+
+/// Inputs of the diagnostics.
+pub(super) struct DiagnosticInputs<'a> {
+    pub termination: Termination,
+    pub delay: (f64, (f64, f64)),
+    pub parameters: &'a [Parameter],
+    pub prior: &'a OperatorPrior,
+    pub residuals: ResidualMeasures,
+    /// Share of the power of u that is left, where it is not noise.
+    pub noise_free: Option<f64>,
+    /// A doubt where the person is not the same throughout.
+    pub not_constant: Option<Finding>,
+    pub lines: Option<&'a LineFit>,
+    pub no_lines: Option<&'a str>,
+    pub agreement: Option<&'a Agreement>,
+    pub instrumental: Option<&'a InstrumentalFit>,
+    pub no_instrumental: Option<&'a str>,
+    pub free_model: Option<&'a FreeModel>,
+    pub loss: f64,
+    pub error_ratio: Option<f64>,
+    pub cluster_kind: ClusterKind,
+    pub clusters: usize,
+    pub has_covariance: bool,
+    /// Smallest relative standard error of the response over the band of manual control.
+    pub response_error: Option<f64>,
+    /// Whether the inputs are told apart by what excites them, and not by their supposed forms.
+    pub apart: bool,
+    /// The forms that the data leave, the one in front first.
+    pub weighed: &'a [WeighedForm],
+}
+
+/// All findings.
+pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
+    let mut all = Vec::new();
+    if !judged.termination.converged() {
+        all.push(Finding::doubt(
+            "not-converged",
+            format!("the search did not converge: {}", judged.termination),
+        ));
+    }
+    if !judged.has_covariance {
+        all.push(Finding::undetermined(
+            "singular",
+            "the data leave a combination of parameters open: there are no error bars",
+        ));
+    }
+    let (tau, (low, high)) = judged.delay;
+    if high > low && (tau <= low || tau >= high) {
+        all.push(Finding::doubt(
+            "delay-at-bound",
+            format!(
+                "the delay {tau:.3} s lies at the end of the range {low} to {high} s in which it was searched for; widen it"
+            ),
+        ));
+    }
+    if !judged.apart {
+        all.push(Finding::doubt(
+            "inputs-together",
+            "no excitation on lines of its own separates the error from the other inputs: both responses depend on the assumed forms; \
+             record a target and a disturbance on separate lines, over whole periods",
+        ));
+    }
+    determined(judged, &mut all);
+    all.extend(unsettled(judged.weighed));
+    if let Some(share) = judged.noise_free {
+        // What is left are the digits of the data, which no test of residuals and no other method is made for.
+        all.push(Finding::note(
+            "no-noise",
+            format!(
+                "there is no noise: the operator explains u to {:.0e} of its size, as in a simulation and of no person; error bars \
+                 are those of the digits of the data",
+                share.sqrt()
+            ),
+        ));
+        return all;
+    }
+    all.extend(judged.residuals.findings());
+    all.extend(judged.not_constant.clone());
+    methods(judged, &mut all);
+    if let Some(ratio) = judged.error_ratio.filter(|r| *r > NOTED_ERROR_RATIO) {
+        let what = match judged.cluster_kind {
+            ClusterKind::Runs => format!("{} runs", judged.clusters),
+            ClusterKind::Blocks => format!("{} blocks of the records", judged.clusters),
+        };
+        all.push(Finding::note(
+            "clustered-errors",
+            format!(
+                "error bars are those of the scatter between {what}, up to {ratio:.1} times those of the model, which \
+                 takes residuals for white and the person for constant"
+            ),
+        ));
+    }
+    all
+}
+
+/// Forms that the data do not distinguish.
+fn unsettled(weighed: &[WeighedForm]) -> Option<Finding> {
+    let front = weighed.first().filter(|front| front.weight < SETTLED_WEIGHT)?;
+    let mut all: Vec<&WeighedForm> = weighed.iter().filter(|w| w.weight >= 1.0 - SETTLED_WEIGHT).collect();
+    all.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+    let named: Vec<String> = all.iter().map(|w| format!("{} {:.2}", w.form, w.weight)).collect();
+    Some(Finding::note(
+        "form",
+        format!(
+            "the form is not settled: {}; parameters have the names of {}, and what the forms differ by is in all errors",
+            named.join(", "),
+            front.form
+        ),
+    ))
+}
+
+/// True if it rests at the end of the search range: it has no error of its own.
+fn at_bound(parameter: &Parameter) -> bool {
+    parameter.standard_error.is_none()
+}
+
+/// A parameter that the data determine and the prior moves: its values without and with the prior.
+fn pulled(parameter: &Parameter, prior: &OperatorPrior) -> Option<String> {
+    let pull = prior.pull(parameter)?;
+    let errors = pull.abs() * parameter.value / parameter.standard_error?;
+    (parameter.determined && errors > NOTED_PULL).then(|| {
+        let unit = if parameter.unit.is_empty() {
+            String::new()
+        } else {
+            format!(" {}", parameter.unit)
+        };
+        format!(
+            "{} from {:.3} to {:.3}{unit} ({errors:.1} of its standard error)",
+            parameter.name,
+            parameter.value * (-pull).exp(),
+            parameter.value
+        )
+    })
+}
+
+fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
+    let find = |name: &str| {
+        judged
+            .parameters
+            .iter()
+            .find(|p| p.name.split('[').next() == Some(name))
+    };
+    if let Some(error) = judged.response_error.filter(|e| *e > LARGEST_RESPONSE_ERROR) {
+        all.push(Finding::undetermined(
+            "response",
+            format!(
+                "the response of the person is not determined: its error is {:.0} % at the frequency at which it is known best",
+                100.0 * error
+            ),
+        ));
+    }
+    let gain = ["K_over_T_I", "K_I", "K_e", "K"].iter().find_map(|name| find(name));
+    if let Some(gain) = gain.filter(|g| !g.determined) {
+        all.push(Finding::note(
+            "gain",
+            format!(
+                "{} is not determined, the response in the middle of the band is",
+                gain.name
+            ),
+        ));
+    }
+    if let Some(tau) = find("tau_e").filter(|t| !t.determined) {
+        let words = match tau.prior_share > 0.5 {
+            true => "tau_e is determined by the prior alone".to_owned(),
+            false => "tau_e is not determined".to_owned(),
+        };
+        // As with other parameters: it has no digits, and the report next to it is valid.
+        all.push(Finding::note("delay", words));
+    }
+    if let Some((t_i, (low, high))) = find("T_I").and_then(|t| Some((t, t.interval?)))
+        && !t_i.determined
+    {
+        let words = if high.is_infinite() {
+            format!("T_I and K are not determined, K/T_I is: T_I is longer than {low:.2} s (95 %)")
+        } else {
+            format!("T_I is not determined: {low:.2} to {high:.2} s (95 %)")
+        };
+        all.push(Finding::note("lag", words));
+    }
+    if let Some(zeta) = find("zeta_nm").filter(|z| z.value > MOST_DAMPED) {
+        all.push(Finding::doubt(
+            "neuromuscular-lag",
+            format!(
+                "zeta_nm = {:.1}: the neuromuscular poles have become lags and carry no information about muscles; take a form with a lag, or \
+                 --neuromuscular no",
+                zeta.value
+            ),
+        ));
+    }
+    let mut prior_alone: Vec<&str> = Vec::new();
+    let mut open: Vec<&str> = Vec::new();
+    for parameter in judged.parameters.iter().filter(|p| !p.determined) {
+        let name = parameter.name.as_str();
+        if matches!(name, "omega_nm" | "zeta_nm") && parameter.value > 0.0 && at_bound(parameter) {
+            open.push(name);
+        } else if matches!(name, "omega_nm" | "zeta_nm") && parameter.prior_share > 0.5 {
+            prior_alone.push(name);
+        } else if !matches!(name, "K" | "T_I" | "tau_e" | "K_over_T_I" | "K_I" | "K_e") {
+            open.push(name);
+        }
+    }
+    if !prior_alone.is_empty() {
+        let verb = if prior_alone.len() == 1 { "is" } else { "are" };
+        all.push(Finding::note(
+            "prior",
+            format!("{} {verb} determined by the prior alone", prior_alone.join(" and ")),
+        ));
+    }
+    let pulled: Vec<String> = (judged.parameters.iter())
+        .filter_map(|parameter| pulled(parameter, judged.prior))
+        .collect();
+    if !pulled.is_empty() {
+        all.push(Finding::note(
+            "prior-pull",
+            format!("the prior moves {}; --prior none leaves it out", pulled.join(" and ")),
+        ));
+    }
+    if !open.is_empty() {
+        let verb = if open.len() == 1 { "is" } else { "are" };
+        all.push(Finding::note(
+            "undetermined-parameter",
+            format!("{} {verb} not determined by the data", open.join(", ")),
+        ));
+    }
+}
+
+fn methods(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
+    if let Some(reduced) = judged.lines.and_then(LineFit::reduced_chi_squared)
+        && reduced > LARGEST_REDUCED_CHI_SQUARED
+    {
+        all.push(Finding::doubt(
+            "describing-function",
+            format!("the operator misses the describing function: chi^2 per degree of freedom is {reduced:.1}"),
+        ));
+    }
+    if let Some(agreement) = judged.agreement.filter(|a| a.p_value < LEVEL) {
+        let (who, most) = match agreement.worst() {
+            Some(pair) => (
+                format!("{} and {}", pair.methods.0.words(), pair.methods.1.words()),
+                format!(
+                    ", most in {} by {:.1} errors of the difference",
+                    pair.most.0.name(),
+                    pair.most.1.abs()
+                ),
+            ),
+            None => ("the methods".to_owned(), String::new()),
+        };
+        all.push(Finding::doubt(
+            "agreement",
+            format!("{who} do not agree (p = {:.2e}{most})", agreement.p_value),
+        ));
+    }
+    let failed = match judged.instrumental {
+        Some(found) if !found.termination.converged() => Some(found.termination.to_string()),
+        _ => judged.no_instrumental.map(str::to_owned),
+    };
+    if let Some(why) = failed {
+        all.push(Finding::note(
+            "no-instruments",
+            format!("no RIV-BJ next to the other methods: {why}"),
+        ));
+    }
+    if let Some(free) = judged.free_model
+        && judged.loss > free.loss * (1.0 + LARGEST_EXCESS_LOSS)
+        && free.p_value < LEVEL
+    {
+        all.push(Finding::doubt(
+            "form-refuted",
+            format!(
+                "a Box-Jenkins model of the same orders has a loss smaller by {:.1} % (likelihood ratio {:.0} with {} \
+                 degrees of freedom): the form is refuted",
+                100.0 * (judged.loss / free.loss - 1.0),
+                free.likelihood_ratio,
+                free.degrees_of_freedom
+            ),
+        ));
+    }
+    if let Some(why) = judged.no_lines {
+        all.push(Finding::note(
+            "no-lines",
+            format!("no fit at the lines of the excitation: {why}"),
+        ));
+    }
+}

@@ -1,0 +1,275 @@
+//! Findings that make a describing function doubtful.
+//!
+//! Of n runs with a u that is not related to the excitation, the squared coherence `gamma^2` at a line exceeds x with
+//! the probability `(1 - x)^{n-1}` (N. R. Goodman, 1957, in J. S. Bendat and A. G. Piersol, *Random Data*, 2010,
+//! section 9.2): one of twenty is above `1 - 0.05^{1/(n-1)}`. So `-(n-1) ln(1 - gamma^2)` is exponential with mean 1,
+//! and twice its sum over K lines has the chi-square distribution with 2K degrees of freedom (R. A. Fisher's
+//! combination of tests): what all lines show together, which two periods are enough for.
+//!
+//! | finding | severity |
+//! |---|---|
+//! | `unrelated`: together the lines do not differ from chance | undetermined |
+//! | `low-coherence`: single lines do not | doubt next to the crossover or at half of the lines, else a note |
+//! | `few-runs`: one run has no errors, those of two are rough | doubt |
+//! | `periods-as-runs`: the errors are those between periods of one or two runs | note |
+//! | `no-reference`: no channel of the excitation | note |
+//! | `no-crossover`, `large-error`: crossover outside the lines; errors of the size of the value | doubt |
+//! | `several-crossovers`: the magnitude falls through 0 dB again | note |
+//! | `leakage`: the excitation has power at frequencies other than its lines | doubt above 1 %, else a note |
+//! | `offset-not-whole`: an offset that may have been meant as whole samples | note |
+
+use hoid_model::{Finding, Record};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::{
+    describe::DescribingFunction,
+    excitation::{Excitation, channel_of},
+    open_loop::{DescribingMargins, OpenLoop},
+    options::Realisation,
+    spectrum::{coefficients, power},
+    window::Window,
+};
+use crate::IdentError;
+
+/// Level at which chance is excluded.
+const LEVEL: f64 = 0.05;
+/// Share of the power of the excitation at frequencies other than its lines that is not rounding of
+/// the file.
+const LEAKAGE: f64 = 1e-4;
+const MUCH_LEAKAGE: f64 = 1e-2;
+/// Distance from a whole number of samples, from rounding to what is meant.
+const NEARLY_WHOLE: (f64, f64) = (1e-6, 0.05);
+
+/// Inputs of the diagnostics.
+pub(super) struct DiagnosticInputs<'a> {
+    pub function: &'a DescribingFunction,
+    pub excitation: &'a Excitation,
+    pub channel: Option<&'a str>,
+    pub realisation: Realisation,
+    /// The open loop and its margins, with a controlled element.
+    pub in_loop: Option<(&'a OpenLoop, &'a DescribingMargins)>,
+    pub offset_samples: f64,
+}
+
+/// Squared coherence that one of twenty sets of n unrelated runs exceeds; none for one run.
+pub fn chance_coherence(n: usize) -> Option<f64> {
+    (n > 1).then(|| 1.0 - LEVEL.powf(1.0 / (n as f64 - 1.0)))
+}
+
+/// Probability that n unrelated runs have coherences as large as these.
+fn probability_by_chance(coherences: &[f64], n: usize) -> Option<f64> {
+    let sum: f64 = coherences
+        .iter()
+        .map(|c| -(n as f64 - 1.0) * (1.0 - c.clamp(0.0, 1.0)).ln())
+        .sum();
+    if n < 2 || coherences.is_empty() || sum.is_nan() {
+        return None;
+    }
+    let chi_square = ChiSquared::new(2.0 * coherences.len() as f64).ok()?;
+    // All coherences 1: no remnant at all.
+    Some(if sum.is_finite() { chi_square.sf(2.0 * sum) } else { 0.0 })
+}
+
+/// All findings about the describing function of these records.
+pub(super) fn doubts(found: &DiagnosticInputs<'_>, records: &[Record]) -> Result<Vec<Finding>, IdentError> {
+    let mut findings = Vec::new();
+    findings.extend(of_runs(found, records.len()));
+    findings.extend(of_coherence(found));
+    if let Some((open_loop, margins)) = found.in_loop {
+        findings.extend(of_loop(open_loop, margins));
+    }
+    if found.channel.is_none() {
+        findings.push(Finding::note(
+            "no-reference",
+            "the channel of the excitation is not known: the ratios of u and e are averaged, which the remnant biases where \
+             it is large against e",
+        ));
+    }
+    findings.extend(leakage(found, records)?);
+    let offset = found.offset_samples;
+    let off = (offset - offset.round()).abs();
+    if NEARLY_WHOLE.0 < off && off < NEARLY_WHOLE.1 {
+        findings.push(Finding::note(
+            "offset-not-whole",
+            format!(
+                "the offset is {offset:.4} samples: if {} is meant, give it in samples",
+                offset.round()
+            ),
+        ));
+    }
+    Ok(findings)
+}
+
+fn of_runs(found: &DiagnosticInputs<'_>, records: usize) -> Option<Finding> {
+    let (n, periods) = (found.function.runs.len(), found.realisation == Realisation::Period);
+    let what = match (periods, records) {
+        (true, 1) => "periods of one run",
+        (true, _) => "periods of two runs",
+        (false, _) => "runs",
+    };
+    match n {
+        1 => Some(Finding::doubt(
+            "few-runs",
+            "one period of one run has neither errors nor coherence: record more runs, or longer ones",
+        )),
+        2 => Some(Finding::doubt(
+            "few-runs",
+            format!(
+                "the errors come from two {what} and are wrong by up to a factor of six at single lines: record more runs"
+            ),
+        )),
+        _ if periods => Some(Finding::note(
+            "periods-as-runs",
+            format!(
+                "the errors are those between {n} {what}, which differ less than runs do; three runs give their own"
+            ),
+        )),
+        _ => None,
+    }
+}
+
+fn of_coherence(found: &DiagnosticInputs<'_>) -> Option<Finding> {
+    let n = found.function.runs.len();
+    // Without the excitation it is that of u with e, which the loop makes large.
+    found.channel?;
+    let least = chance_coherence(n)?;
+    let lines = &found.function.lines;
+    let coherences: Vec<f64> = lines.iter().filter_map(|line| line.coherence).collect();
+    let by_chance = probability_by_chance(&coherences, n)?;
+    if by_chance > LEVEL {
+        return Some(Finding::undetermined(
+            "unrelated",
+            format!(
+                "u does not follow the excitation: {n} runs that have nothing to do with it would have coherences like these \
+                 with a probability of {by_chance:.2}"
+            ),
+        ));
+    }
+    let low: Vec<usize> = (0..lines.len())
+        .filter(|k| lines[*k].coherence.is_some_and(|c| c < least))
+        .collect();
+    // Two periods exclude chance at a single line only near 1, which `few-runs` has reported.
+    if low.is_empty() || n < 3 {
+        return None;
+    }
+    let at: Vec<String> = low.iter().map(|k| format!("{:.2}", lines[*k].omega_rad_s)).collect();
+    let words = format!(
+        "at {} rad/s u may have nothing to do with the excitation: the coherence is below {least:.2}, which one of twenty sets \
+         of {n} unrelated runs exceeds",
+        at.join(", ")
+    );
+    let crossover = found.in_loop.and_then(|(_, m)| m.crossover_rad_s);
+    let beside = |k: &usize| {
+        crossover.is_some_and(|c| {
+            let above = lines.partition_point(|line| line.omega_rad_s <= c.value);
+            *k == above || *k + 1 == above
+        })
+    };
+    Some(if 2 * low.len() >= lines.len() || low.iter().any(beside) {
+        Finding::doubt("low-coherence", words)
+    } else {
+        Finding::note("low-coherence", words)
+    })
+}
+
+fn of_loop(open_loop: &OpenLoop, margins: &DescribingMargins) -> Vec<Finding> {
+    let sizes: Vec<f64> = open_loop.response.iter().map(|l| l.norm()).collect();
+    let (Some(low), Some(high)) = (open_loop.omega_rad_s.first(), open_loop.omega_rad_s.last()) else {
+        return Vec::new();
+    };
+    let Some(crossover) = margins.crossover_rad_s else {
+        let where_ = if sizes.iter().all(|l| *l < 1.0) {
+            format!(
+                "the gain of the open loop is below 1 at all lines: the crossover lies below {low:.3} rad/s, if there is one"
+            )
+        } else if sizes.iter().all(|l| *l >= 1.0) {
+            format!("the gain of the open loop is above 1 at all lines: the crossover lies above {high:.3} rad/s")
+        } else {
+            "the gain of the open loop does not fall through 1 between the lines".to_owned()
+        };
+        return vec![Finding::doubt(
+            "no-crossover",
+            format!("{where_}; is the controlled element the right one, in the units of the record?"),
+        )];
+    };
+    let mut findings = Vec::new();
+    let again = sizes.windows(2).filter(|l| l[0] >= 1.0 && l[1] < 1.0).count();
+    if again > 1 {
+        findings.push(Finding::note(
+            "several-crossovers",
+            format!("the gain of the open loop falls through 1 {again} times between the lines; the lowest crossover is given"),
+        ));
+    }
+    let large = |name: &str, unit: &str, e: hoid_model::uncertainty::Estimate, part: f64| {
+        let s = e.standard_error.filter(|s| *s >= part * e.value.abs())?;
+        Some(Finding::doubt(
+            "large-error",
+            format!(
+                "the {name} of {:.3} {unit} has a standard error of {s:.3} {unit}",
+                e.value
+            ),
+        ))
+    };
+    findings.extend(large("crossover", "rad/s", crossover, 0.5));
+    findings.extend(
+        margins
+            .phase_margin_deg
+            .and_then(|e| large("phase margin", "deg", e, 1.0)),
+    );
+    findings
+}
+
+/// Power of the excitation at frequencies other than its lines: a span of no whole periods, a file
+/// that is damaged, or a channel that was measured with noise.
+fn leakage(found: &DiagnosticInputs<'_>, records: &[Record]) -> Result<Option<Finding>, IdentError> {
+    let Some(channel) = found.channel else {
+        return Ok(None);
+    };
+    let mut worst: Option<(f64, &str)> = None;
+    for record in records {
+        let values = channel_of(record, channel, "the channel of the excitation")?;
+        let window = Window::of_span(record, None, None, found.excitation.period_s())?;
+        let (x, n) = (coefficients(values), values.len());
+        let all: f64 = (1..x.len()).map(|k| power(&x, k, n)).sum();
+        let lines = found.excitation.harmonics().iter().map(|h| h * window.periods);
+        let at_lines: f64 = lines.filter(|k| *k < x.len()).map(|k| power(&x, k, n)).sum();
+        let off = 1.0 - at_lines / all;
+        if off.is_finite() && worst.is_none_or(|(most, _)| off > most) {
+            worst = Some((off, record.label()));
+        }
+    }
+    Ok(worst.filter(|(off, _)| *off > LEAKAGE).map(|(off, label)| {
+        let words = format!(
+            "{channel} of {label} has {:.2} % of its power at non-excited frequencies: the span is not whole periods, lines are missing, or \
+             {channel} is a noisy measurement",
+            100.0 * off
+        );
+        match off > MUCH_LEAKAGE {
+            true => Finding::doubt("leakage", words),
+            false => Finding::note("leakage", words),
+        }
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn coherence_by_chance_is_what_the_distribution_says() {
+        assert_eq!(chance_coherence(1), None);
+        assert!((chance_coherence(2).unwrap() - 0.95).abs() < 1e-15);
+        let ten = chance_coherence(10).unwrap();
+        assert!(((1.0 - ten).powi(9) - 0.05).abs() < 1e-15);
+        // One line: the probability is that of the line itself.
+        for (n, c) in [(2, 0.3), (5, 0.6), (10, ten)] {
+            let expected = (1.0_f64 - c).powi(n - 1);
+            let found = probability_by_chance(&[c], n as usize).unwrap();
+            assert!((found - expected).abs() < 1e-12, "{n} {c}: {found}");
+        }
+        assert_eq!(probability_by_chance(&[1.0, 0.5], 3), Some(0.0));
+        assert_eq!(probability_by_chance(&[0.5], 1), None);
+        assert_eq!(probability_by_chance(&[], 5), None);
+        assert_eq!(probability_by_chance(&[f64::NAN], 5), None);
+    }
+}

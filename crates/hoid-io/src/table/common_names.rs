@@ -1,0 +1,69 @@
+//! Error and control by the names that people give their columns.
+//!
+//! A column is meant whose whole name is a typical one, whatever its capitals; else the only one that has a common name
+//! as a word, as in `Tracking error`, `stick [V]` or `e (deg)`. A single letter counts as the first word alone.
+
+/// Names of the error, the most informative first.
+const ERRORS: [&str; 6] = ["e", "error", "err", "tracking_error", "tracking error", "e_t"];
+/// Names of the control.
+const CONTROLS: [&str; 8] = [
+    "u",
+    "control",
+    "stick",
+    "command",
+    "cmd",
+    "control_input",
+    "joystick",
+    "delta",
+];
+
+/// The column that is the tracking error by its name.
+#[must_use]
+pub fn error_among<'a>(columns: &[&'a str]) -> Option<&'a str> {
+    among(columns, &ERRORS)
+}
+
+/// The column that is the control by its name.
+#[must_use]
+pub fn control_among<'a>(columns: &[&'a str]) -> Option<&'a str> {
+    among(columns, &CONTROLS)
+}
+
+fn among<'a>(columns: &[&'a str], names: &[&str]) -> Option<&'a str> {
+    let whole = |name: &&str| columns.iter().copied().find(|column| column.eq_ignore_ascii_case(name));
+    names.iter().find_map(whole).or_else(|| {
+        let mut by_word = columns.iter().copied().filter(|column| has_word_of(column, names));
+        by_word.next().filter(|_| by_word.next().is_none())
+    })
+}
+
+fn has_word_of(column: &str, names: &[&str]) -> bool {
+    let words = column
+        .split(|c: char| !c.is_alphanumeric())
+        .filter(|word| !word.is_empty());
+    words.enumerate().any(|(at, word)| {
+        let is_word = |name: &&str| word.eq_ignore_ascii_case(name);
+        (at == 0 || word.chars().count() > 1) && names.iter().any(is_word)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_names_before_words_and_of_words_the_only_one() {
+        assert_eq!(error_among(&["t", "Error", "e"]), Some("e"));
+        assert_eq!(
+            error_among(&["Time (s)", "Tracking error", "Stick"]),
+            Some("Tracking error")
+        );
+        assert_eq!(
+            control_among(&["Time (s)", "Tracking error", "Stick [V]"]),
+            Some("Stick [V]")
+        );
+        assert_eq!(error_among(&["e (deg)", "u (deg)"]), Some("e (deg)"));
+        assert_eq!(control_among(&["stick force", "stick position"]), None);
+        assert_eq!(error_among(&["phase e", "terror", ""]), None);
+    }
+}

@@ -1,0 +1,204 @@
+//! Prior knowledge of a run before it starts and after its end, each written at once.
+
+use std::{collections::BTreeMap, path::Path};
+
+use hoid_io::{ColumnValues, OutputColumn, OutputTable};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use sha2::{Digest, Sha256};
+
+use super::folder::Stem;
+use crate::{
+    LabError,
+    config::{Condition, Limits},
+    plant::InputMap,
+    task::{Phase, Task},
+};
+
+/// Prior knowledge before a run: `run.json`, and `forcing.parquet` next to it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunStart {
+    /// Version of hoid.
+    pub hoid: String,
+    /// Number of the run in its session, from 1.
+    pub number: usize,
+    /// Its place in the plan of the session.
+    pub planned: usize,
+    /// Whether it is a training run.
+    pub training: bool,
+    /// When, in UTC.
+    pub utc: String,
+    /// The condition.
+    pub condition: Condition,
+    /// Place of the condition in the configuration, and the replication: with its seed they name the
+    /// phases.
+    pub cell: u64,
+    /// See `cell`.
+    pub replication: u64,
+    /// Ticks before the measurement.
+    pub run_in: usize,
+    /// All ticks.
+    pub ticks: usize,
+    /// From the device to u.
+    pub input: InputMap,
+    /// The device.
+    pub device: String,
+    /// `browser`, or `injected` if a program gives the time.
+    pub clock: String,
+    /// Time from frame to frame as measured before the run, ms.
+    pub refresh_ms: f64,
+    /// The clock of the browser at tick 0, ms.
+    pub zero_ms: f64,
+    /// Limits of the verdict.
+    pub limits: Limits,
+    /// The controlled elements.
+    pub phases: Vec<Phase>,
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum How {
+    /// To its end.
+    Finished,
+    /// By the person, a closed window, or an end of the server.
+    Interrupted,
+}
+
+/// Results known after a run: `end.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ended {
+    /// How.
+    pub how: How,
+    /// When, in UTC.
+    pub utc: String,
+    /// Counts of the page: events that no hand made, megabytes of its memory.
+    #[serde(default)]
+    pub counted: BTreeMap<String, f64>,
+    /// SHA-256 of ticks, events and frames, in that order.
+    pub sha256: Vec<String>,
+}
+
+/// The three files that are appended to.
+pub(super) const APPENDED: [&str; 3] = ["ticks.csv", "events.csv", "frames.csv"];
+
+impl RunStart {
+    /// Writes it, and the tables of the task.
+    ///
+    /// # Errors
+    /// [`LabError::Io`].
+    pub fn write(&self, stem: &Stem, task: &Task) -> Result<(), LabError> {
+        // Both as long as the target, which a preview shows beyond the end.
+        let mut disturbance = task.disturbance.clone();
+        disturbance.resize(task.target.len(), 0.0);
+        let column = |name: &str, values: Vec<f64>| OutputColumn {
+            name: name.to_owned(),
+            values: ColumnValues::Real(values),
+        };
+        let table = OutputTable {
+            comments: Vec::new(),
+            columns: vec![
+                column("target", task.target.clone()),
+                column("disturbance", disturbance),
+            ],
+        };
+        hoid_io::write_table(&stem.file("forcing.parquet"), &table)?;
+        write_json(&stem.file("run.json"), self)
+    }
+
+    /// Reads it.
+    ///
+    /// # Errors
+    /// [`LabError::Damaged`], [`LabError::Io`].
+    pub fn read(stem: &Stem) -> Result<Self, LabError> {
+        read_json(&stem.file("run.json"))
+    }
+
+    /// The task, of what was written before the run.
+    ///
+    /// # Errors
+    /// [`LabError::Damaged`] for tables of another length.
+    pub fn task(&self, stem: &Stem) -> Result<Task, LabError> {
+        let path = stem.file("forcing.parquet");
+        let table = hoid_io::read_table(&path)?;
+        let column = |name: &str| match table.column(name) {
+            Some(ColumnValues::Real(values)) => Ok(values.clone()),
+            _ => Err(LabError::damaged(
+                &path,
+                format!("there is no column {name} of numbers"),
+            )),
+        };
+        let (target, mut disturbance) = (column("target")?, column("disturbance")?);
+        disturbance.truncate(self.ticks);
+        if target.len() < self.ticks || disturbance.len() < self.ticks {
+            let reason = format!("{} rows, expected {} ticks", target.len(), self.ticks);
+            return Err(LabError::damaged(&path, reason));
+        }
+        let order = self.phases.first().map(|phase| phase.plant.order());
+        let fits = |phase: &Phase| phase.plant.is_sound() && Some(phase.plant.order()) == order;
+        if order.is_none() || !self.phases.iter().all(fits) {
+            let reason = "the matrices of its controlled element do not fit each other; it is not as hoid lab wrote it";
+            return Err(LabError::damaged(&stem.file("run.json"), reason));
+        }
+        Ok(Task {
+            run_in: self.run_in,
+            ticks: self.ticks,
+            phases: self.phases.clone(),
+            target,
+            disturbance,
+        })
+    }
+}
+
+impl Ended {
+    /// Writes it.
+    ///
+    /// # Errors
+    /// [`LabError::Io`].
+    pub fn write(&self, stem: &Stem) -> Result<(), LabError> {
+        write_json(&stem.file("end.json"), self)
+    }
+
+    /// Reads it; nothing if the run has not ended.
+    ///
+    /// # Errors
+    /// [`LabError::Damaged`], [`LabError::Io`].
+    pub fn read(stem: &Stem) -> Result<Option<Self>, LabError> {
+        let path = stem.file("end.json");
+        if !path.exists() {
+            return Ok(None);
+        }
+        read_json(&path).map(Some)
+    }
+
+    /// The hashes of the files as they are; empty for one that does not exist.
+    ///
+    /// # Errors
+    /// [`LabError::Io`].
+    pub fn hashes(stem: &Stem) -> Result<Vec<String>, LabError> {
+        APPENDED
+            .iter()
+            .map(|end| match stem.file(end) {
+                path if path.exists() => Ok(digest(&hoid_io::read_bytes(&path)?)),
+                _ => Ok(String::new()),
+            })
+            .collect()
+    }
+}
+
+/// SHA-256 in hexadecimal digits.
+pub fn digest(bytes: &[u8]) -> String {
+    data_encoding::HEXLOWER.encode(&Sha256::digest(bytes))
+}
+
+fn write_json(path: &Path, value: &impl Serialize) -> Result<(), LabError> {
+    let text = serde_json::to_string_pretty(value).map_err(|error| LabError::damaged(path, error.to_string()))?;
+    hoid_io::write_atomically(path, |file| file.write_all(text.as_bytes()))?;
+    Ok(())
+}
+
+fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, LabError> {
+    serde_json::from_str(&hoid_io::read_settings(path)?)
+        .map_err(|error| LabError::damaged(path, format!("{error}; it is not as hoid lab wrote it")))
+}

@@ -1,0 +1,233 @@
+//! Findings for and against a trace, and what the estimate of one sample is worth.
+//!
+//! A trace is as good as its start and as its rows. For the start fit all findings of [`hoid_ident::diagnostics`]
+//! count, none as more than a doubt: the recursion may leave it. A change inside the start span is a note for methods
+//! that forget, a doubt for those that do not. For the rows from which the estimate moves on, at most [`ROWS`] are
+//! examined, evenly apart:
+//!
+//! | kind | observation |
+//! |---|---|
+//! | `start-explains-little` | VAF of the simulated start fit on its span below 20 % |
+//! | `not-convertible` | more than 5 % of the rows do not correspond to any operator |
+//! | `gain` | K_e and K_e_dot are both open (within two standard errors of zero) in most rows |
+//! | `undetermined-parameter` | K_e is; where K_e_dot alone is, they answer like a gain (a note) |
+//! | `neuromuscular-lag` | poles of no person, or omega_nm at its bound, in a quarter of the rows |
+//! | `delay-at-bound` | the tracked delay rests at an end of its range in a quarter of the rows |
+//! | `covariance-blown-up` | a standard error 30 times its median: the data carry too little information to forget |
+//! | `steps-shortened` | more than 5 % of the steps made shorter by stability or a bound |
+//! | `faults` | more than 10 % of the samples were faults |
+//! | `held-back` | outliers that the guard held back (a note), in more than 1 % of the samples (a doubt) |
+//! | `hostile-span` | spans that no tracking makes, at which the estimate stayed constant |
+//! | `learnt-at-rest` | e and u stay constant for a second, and the guard that would hold the estimate there is off |
+//! | `restarted` | the guard started the estimate again |
+//! | `steps-in-signals` | jumps of e or u that stayed (a note) |
+//! | `gain-sign` | K_e is significantly positive in some rows and negative in others |
+//! | `negative-lead` | K_e and K_e_dot have significantly opposite signs in more than a tenth of the rows |
+//! | `idle-head` | a head in which neither e nor u moves: left out of the start span (a note), or in it (a doubt) |
+//! | `many-changes` | three changes or more, one in half a minute or oftener |
+//! | `supposed` | omega_nm, zeta_nm or tau_e of the last row are the prior before the record (a note) |
+//! | `last-row` | the estimate at the end is doubtful or no estimate, whatever the other rows are |
+//! | `not-followed` | what the last seconds of the record show against the last row |
+//! | `structure` | earlier errors carry more information about u than the operator at the end does |
+//! | `sign` | the response at .5 rad/s would push the error away, where no controlled element is named |
+//! | `unstable-loop`, `no-crossover` | with the controlled element, the loop of the last row could not have been held |
+//! | `undeclared-change`, `drifting`, `swaying` | the response is not the same where no change is declared |
+//! | `no-answer` | e does not answer to u |
+//! | `not-finite` | an estimate that is not a number |
+//!
+//! `operators` judges the operators of the rows, `recording` what the guard, the head and the end of the record show,
+//! `structure` the form of the operator, `steadiness` whether it is the same throughout, `moment` one sample. Where the
+//! response is known at the end, a gain and a lead that are open, or a lead below zero, are notes: they are one way to
+//! report the response, which may not be theirs.
+
+mod moment;
+mod operators;
+mod recording;
+mod steadiness;
+mod structure;
+#[cfg(test)]
+mod tests;
+
+use hoid_ident::{Choice, IdentError};
+use hoid_model::{Finding, Record, Severity, Verdict, uncertainty::Estimate};
+use hoid_numerics::statistics::upper_median;
+
+use self::operators::{Operator, operator_findings};
+use crate::trace::Trace;
+
+/// Rows that are examined.
+const ROWS: usize = 400;
+/// VAF in % of the simulated start fit below which it explains little.
+const LEAST_START_VAF: f64 = 20.0;
+/// Shares of steps and samples beyond which something is reported.
+const SHORTENED: f64 = 0.05;
+const FAULTS: f64 = 0.1;
+/// Standard error over its median beyond which the covariance has blown up.
+const BLOWN_UP: f64 = 30.0;
+
+impl Trace {
+    /// Verdict on the trace, on the record that it was made of and with the search that chose its
+    /// orders, where there was one.
+    ///
+    /// # Errors
+    /// The errors of the residuals of the start fit.
+    pub fn verdict(&self, record: &Record, choice: Option<&Choice>) -> Result<Verdict, IdentError> {
+        let mut all = self.start_findings(record, choice)?;
+        let rows = self.rows_judged();
+        if rows.iter().any(|row| self.theta(*row).iter().any(|v| !v.is_finite())) {
+            all.push(Finding::undetermined(
+                "not-finite",
+                "the estimate is not a number in some rows",
+            ));
+            return Ok(Verdict::of(all));
+        }
+        let operators: Vec<Operator> = rows.iter().map(|row| self.operator(*row)).collect();
+        all.extend(operator_findings(self, &operators));
+        all.extend(self.covariance_finding(&rows));
+        all.extend(self.count_findings());
+        all.extend(self.guard_findings());
+        all.extend(self.learnt_at_rest(record));
+        all.extend(self.idle_finding(record));
+        all.extend(self.supposed_finding());
+        all.extend(self.not_followed(record));
+        if !all.iter().any(|finding| finding.kind == "gain") {
+            all.extend(self.last_row_finding());
+        }
+        all.extend(self.many_changes_finding());
+        all.extend(self.missed_structure(record));
+        all.extend(self.response_doubt.clone());
+        all.extend(self.unsteady_finding(record));
+        all.extend(self.answer_finding(record));
+        Ok(Verdict::of(all))
+    }
+
+    /// Findings of the start fit, none graver than a doubt.
+    fn start_findings(&self, record: &Record, choice: Option<&Choice>) -> Result<Vec<Finding>, IdentError> {
+        let (Some(fit), Some((from, to))) = (self.start(), self.options().start_span(record)) else {
+            return Ok(Vec::new());
+        };
+        let span = [record.span(from, to)?];
+        let of_start = |finding: &Finding| Finding {
+            severity: match finding.kind {
+                // One that forgets is there to follow it; one that weighs the start against all that
+                // comes starts between the two.
+                "not-constant" if !self.options().method.is_model_of_change() => Severity::Note,
+                _ => finding.severity.min(Severity::Doubt),
+            },
+            message: format!("start fit: {}", finding.message),
+            ..finding.clone()
+        };
+        let mut all: Vec<Finding> = fit.verdict(&span, choice)?.findings().iter().map(of_start).collect();
+        if fit.model().structure().has_input() {
+            let vaf = fit.quality(&span)?.vaf_simulation;
+            if vaf < LEAST_START_VAF {
+                all.push(Finding::doubt(
+                    "start-explains-little",
+                    format!(
+                        "the start fit explains {vaf:.0} % of u (VAF of the simulation, expected {LEAST_START_VAF:.0} % or more); \
+                         take a longer span, or another"
+                    ),
+                ));
+            }
+        }
+        Ok(all)
+    }
+
+    /// Parameters of the last row that are the prior before the first sample.
+    fn supposed_finding(&self) -> Option<Finding> {
+        let row = self.len().checked_sub(1)?;
+        let operator = self
+            .operator(row)
+            .ok()
+            .filter(|_| self.options().method.starts_itself())?;
+        let open: Vec<&str> = (self.determined(&operator).into_iter())
+            .filter(|(name, yes)| !yes && ["omega_nm", "zeta_nm", "tau_e"].contains(name))
+            .map(|(name, _)| name)
+            .collect();
+        (!open.is_empty()).then(|| {
+            Finding::note(
+                "supposed",
+                format!(
+                    "{} at the end: not determined by the record, what is there is the prior before it, or one of \
+                     several that predict u as well",
+                    open.join(", ")
+                ),
+            )
+        })
+    }
+
+    /// Rows from which the estimate moves on, evenly apart, the last among them. A method that starts
+    /// itself has nothing before its first estimate.
+    fn rows_judged(&self) -> Vec<usize> {
+        let from = self.updated_from_s() - self.sample_time().s() / 2.0;
+        let mut first = self.times_s().partition_point(|t| *t < from);
+        while self.options().method.starts_itself() && first + 1 < self.len() && self.covariance(first).is_none() {
+            first += 1;
+        }
+        let count = self.len().saturating_sub(first);
+        let step = count.div_ceil(ROWS).max(1);
+        let mut rows: Vec<usize> = (first..self.len()).rev().step_by(step).collect();
+        rows.reverse();
+        rows
+    }
+
+    /// A standard error that grew without bound, of the coefficients that have one.
+    fn covariance_finding(&self, rows: &[usize]) -> Option<Finding> {
+        // The start may start from nothing.
+        let rows = &rows[rows.len() / 2..];
+        let names = self.parameter_names();
+        let estimates: Vec<Vec<Estimate>> = rows.iter().map(|row| self.parameters(*row)).collect();
+        let grown = |i: usize| {
+            let mut errors: Vec<f64> = estimates.iter().filter_map(|e| e[i].standard_error).collect();
+            let median = upper_median(&mut errors)?;
+            let largest = errors.into_iter().max_by(f64::total_cmp)?;
+            (median > 0.0 && largest > BLOWN_UP * median).then_some(largest / median)
+        };
+        let (name, ratio) = names
+            .iter()
+            .enumerate()
+            .filter_map(|(i, name)| Some((name, grown(i)?)))
+            .max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let remedy = match self.options().method.memories() {
+            Some(_) => " for the memory in use; take a longer one",
+            None => "",
+        };
+        Some(Finding::doubt(
+            "covariance-blown-up",
+            format!(
+                "the standard error of {name} grows to {ratio:.0} times its median: for a while the data carry too little information{remedy}"
+            ),
+        ))
+    }
+
+    fn count_findings(&self) -> Vec<Finding> {
+        let counts = self.counts();
+        let mut all = Vec::new();
+        let samples = counts.samples.max(1) as f64;
+        if counts.skipped as f64 > FAULTS * samples {
+            let share = 100.0 * counts.skipped as f64 / samples;
+            all.push(Finding::doubt(
+                "faults",
+                format!("{share:.0} % of the samples are faults in e or u, at which the estimate stays"),
+            ));
+        }
+        let last = self.times_s().last().copied().unwrap_or(f64::NAN);
+        let before = (last - self.updated_from_s()) / self.sample_time().s();
+        let moved = if before.is_finite() {
+            before.max(1.0).min(samples)
+        } else {
+            samples
+        };
+        if counts.shortened as f64 > SHORTENED * moved {
+            all.push(Finding::doubt(
+                "steps-shortened",
+                format!(
+                    "{:.0} % of the steps were made shorter to stay stable or within bounds: the estimate is not where the data \
+                     want it",
+                    100.0 * counts.shortened as f64 / moved
+                ),
+            ));
+        }
+        all
+    }
+}

@@ -1,0 +1,81 @@
+//! Reliability of the estimate of one sample.
+
+use hoid_ident::diagnostics::{gain_findings, is_open, neuromuscular_finding};
+use hoid_model::{
+    NotConvertible, SampleTime, Severity, VerdictLevel,
+    uncertainty::{Estimate, OperatorEstimate},
+};
+
+use super::operators::is_other;
+use crate::tracker::Tracker;
+
+/// After a restart the estimate is doubtful for so long, s.
+const UNSETTLED_S: f64 = 10.0;
+
+impl Tracker {
+    /// Reliability of the estimate of this moment, for the operator that [`Tracker::operator`]
+    /// gives.
+    pub fn level(&self, operator: &Result<OperatorEstimate, NotConvertible>) -> VerdictLevel {
+        if self.theta().iter().any(|v| !v.is_finite()) {
+            return VerdictLevel::NotDetermined;
+        }
+        let unsettled = self.is_paused() || self.since_restart_s().is_some_and(|s| s < UNSETTLED_S);
+        let level = self.level_of_estimate(operator);
+        if unsettled {
+            level.max(VerdictLevel::Doubtful)
+        } else {
+            level
+        }
+    }
+
+    fn level_of_estimate(&self, operator: &Result<OperatorEstimate, NotConvertible>) -> VerdictLevel {
+        if self.options().method.starts_itself() && self.covariance().is_none() {
+            return VerdictLevel::NotDetermined;
+        }
+        // Without an error of any of them, nothing states that they are known.
+        let known = |e: &Estimate| e.standard_error.is_some_and(|s| s > 0.0);
+        if !self.parameters().iter().any(known) {
+            return VerdictLevel::Doubtful;
+        }
+        match operator {
+            Ok(operator) => level_of_operator(operator, self.sample_time),
+            Err(_) if !is_other(operator) => VerdictLevel::Doubtful,
+            Err(_) => {
+                let open = self.response_is_open();
+                if open {
+                    VerdictLevel::NotDetermined
+                } else {
+                    VerdictLevel::Trustworthy
+                }
+            }
+        }
+    }
+
+    /// True if the model has an input and no coefficient of B is two standard errors from zero.
+    fn response_is_open(&self) -> bool {
+        let (names, estimates) = (self.parameter_names(), self.parameters());
+        let mut of_b = names
+            .iter()
+            .zip(&estimates)
+            .filter(|(name, _)| name.starts_with('b'))
+            .peekable();
+        of_b.peek().is_some() && of_b.all(|(_, e)| is_open(e))
+    }
+}
+
+fn level_of_operator(operator: &OperatorEstimate, sample_time: SampleTime) -> VerdictLevel {
+    let mut gains = gain_findings(&[("", *operator)]);
+    // Who answers like a gain has no lead to be determined.
+    if !is_open(&operator.k_e) && is_open(&operator.k_e_dot) {
+        gains.retain(|finding| finding.kind != "undetermined-parameter");
+    }
+    let senseless = neuromuscular_finding(operator.omega_nm_rad_s.value, operator.zeta_nm.value, sample_time);
+    let open = gains.iter().any(|finding| finding.severity == Severity::Undetermined);
+    if open {
+        VerdictLevel::NotDetermined
+    } else if !gains.is_empty() || senseless.is_some() || !operator.parameters().is_stable() {
+        VerdictLevel::Doubtful
+    } else {
+        VerdictLevel::Trustworthy
+    }
+}

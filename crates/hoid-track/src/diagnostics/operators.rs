@@ -1,0 +1,206 @@
+//! The operators of the rows of a trace: how many there are, whether their gains are known and have
+//! a sign and a lead that a person has, and whether poles and delay are those of one.
+
+use hoid_ident::diagnostics::{is_open, leads_backwards, neuromuscular_finding};
+use hoid_model::{
+    Finding, NotConvertible, Severity,
+    uncertainty::{Estimate, OperatorEstimate},
+};
+
+use crate::trace::Trace;
+
+/// For one row, or why there is none.
+pub(super) type Operator = Result<OperatorEstimate, NotConvertible>;
+
+/// True if the coefficients are not meant to be an operator.
+pub(super) fn is_other(operator: &Operator) -> bool {
+    matches!(
+        operator,
+        Err(NotConvertible::OtherOrders { .. } | NotConvertible::PolesInBoth { .. } | NotConvertible::OtherForm { .. })
+    )
+}
+
+/// Shares of the rows beyond which something is reported.
+const NOT_CONVERTIBLE: f64 = 0.05;
+const MOST: f64 = 0.5;
+const QUARTER: f64 = 0.25;
+const SIGN: f64 = 0.02;
+const NEGATIVE_LEAD: f64 = 0.1;
+/// Upper bound of omega_nm of the physical recursions as a share of the Nyquist frequency, less
+/// rounding.
+const AT_FASTEST: f64 = 0.4999;
+
+/// Findings about the operators in the rows of a trace.
+pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Finding> {
+    let mut all = Vec::new();
+    if operators.is_empty() || operators.iter().all(is_other) {
+        return all;
+    }
+    let share = |count: usize, of: usize| count as f64 / of.max(1) as f64;
+    let found: Vec<&OperatorEstimate> = operators.iter().filter_map(|o| o.as_ref().ok()).collect();
+    let lacking = share(operators.len() - found.len(), operators.len());
+    if lacking > NOT_CONVERTIBLE {
+        let reason = operators.iter().find_map(|o| o.as_ref().err());
+        let reason = reason.map_or(String::new(), |r| format!(", as {r}"));
+        let words = format!(
+            "{:.0} % of the rows do not correspond to any operator{reason}",
+            100.0 * lacking
+        );
+        // A gain of zero in all rows is not a model of another form: nothing was found.
+        let nothing = operators.iter().all(|o| matches!(o, Err(NotConvertible::ZeroGain)));
+        all.push(match nothing {
+            true => Finding::undetermined("not-convertible", words),
+            false => Finding::doubt("not-convertible", words),
+        });
+    }
+    let rows_with = |is: &dyn Fn(&OperatorEstimate) -> bool| share(found.iter().filter(|o| is(o)).count(), found.len());
+    let remembers = trace.options().method.memories().is_some();
+    // Where the response is known, gain and lead are one way to report it, which may not be theirs.
+    let of_response = |finding: Finding| match trace.response_is_known {
+        true => Finding {
+            severity: Severity::Note,
+            ..finding
+        },
+        false => finding,
+    };
+    all.extend(gains_over_rows(&rows_with, remembers).map(of_response));
+    all.extend(sign_finding(&rows_with));
+    all.extend(lead_finding(&rows_with).map(of_response));
+    let nyquist = trace.sample_time().nyquist_rad_s();
+    let bounded = trace.options().method.is_physical();
+    let senseless = rows_with(&|o| {
+        let omega = o.omega_nm_rad_s.value;
+        neuromuscular_finding(omega, o.zeta_nm.value, trace.sample_time()).is_some()
+            || (bounded && omega >= AT_FASTEST * nyquist)
+    });
+    if senseless > QUARTER {
+        all.push(Finding::doubt(
+            "neuromuscular-lag",
+            format!(
+                "in {:.0} % of the rows the two poles are a lag and carry no information about the neuromuscular system (omega_nm near \
+                 or above the Nyquist frequency, or zeta_nm above 3)",
+                100.0 * senseless
+            ),
+        ));
+    }
+    if let Some((low, high)) = trace.options().method.track_delay_s().filter(|(low, high)| high > low) {
+        let near = 1e-6 * (high - low);
+        let at_end = rows_with(&|o| o.tau_e_s.value <= low + near || o.tau_e_s.value >= high - near);
+        if at_end > QUARTER {
+            all.push(Finding::doubt(
+                "delay-at-bound",
+                format!(
+                    "in {:.0} % of the rows the delay rests at an end of its range {low} to {high} s; widen it",
+                    100.0 * at_end
+                ),
+            ));
+        }
+    }
+    all
+}
+
+/// A gain that changes its sign: no one does, a channel that was turned over does.
+fn sign_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
+    let beyond = |e: &Estimate, sign: f64| e.standard_error.is_some_and(|s| sign * e.value > 3.0 * s);
+    let positive = rows_with(&|o| beyond(&o.k_e, 1.0));
+    let negative = rows_with(&|o| beyond(&o.k_e, -1.0));
+    (positive > SIGN && negative > SIGN).then(|| {
+        Finding::doubt(
+            "gain-sign",
+            format!(
+                "K_e is positive in {:.0} % of the rows and negative in {:.0} %: look whether the sign of e or u changes",
+                100.0 * positive,
+                100.0 * negative
+            ),
+        )
+    })
+}
+
+/// A lead below zero: no one has one; a gain and a lead that represent a lag do.
+fn lead_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
+    let negative = rows_with(&leads_backwards);
+    (negative > NEGATIVE_LEAD).then(|| {
+        Finding::doubt(
+            "negative-lead",
+            format!(
+                "the lead T_L is negative in {:.0} % of the rows, by two standard errors of K_e and of K_e_dot: a gain and a \
+                 lead are not the form of this person, who may have a lag; K_e, T_L and K_e_dot are none of their parameters \
+                 then, only the response is theirs (hoid identify finds the form)",
+                100.0 * negative
+            ),
+        )
+    })
+}
+
+/// Share of the rows whose operator has a property.
+type ShareOfRows<'a> = dyn Fn(&dyn Fn(&OperatorEstimate) -> bool) -> f64 + 'a;
+
+/// Gains that are open in most rows. With a memory it may be longer; a method without one has no such option.
+fn gains_over_rows(rows_with: &ShareOfRows<'_>, remembers: bool) -> Option<Finding> {
+    let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+    let both = rows_with(&|o| is_open(&o.k_e) && is_open(&o.k_e_dot));
+    if both > MOST {
+        let why = if remembers { " for the memory in use" } else { "" };
+        return Some(Finding::undetermined(
+            "gain",
+            format!(
+                "in {} of the rows no gain differs from zero by two standard errors: there is too little response to e{why}",
+                percent(both)
+            ),
+        ));
+    }
+    let no_gain = rows_with(&|o| is_open(&o.k_e) && !is_open(&o.k_e_dot));
+    let no_lead = rows_with(&|o| is_open(&o.k_e_dot) && !is_open(&o.k_e));
+    if no_gain > MOST {
+        let remedy = if remembers { "; take a longer memory" } else { "" };
+        return Some(Finding::doubt(
+            "undetermined-parameter",
+            format!(
+                "K_e is within two standard errors of zero in {} of the rows{remedy}",
+                percent(no_gain)
+            ),
+        ));
+    }
+    (no_lead > MOST).then(|| {
+        Finding::note(
+            "undetermined-parameter",
+            format!(
+                "in {} of the rows no lead is distinguished from zero, and the gain is: they answer like a gain, and T_L and K_e_dot are \
+                 none of their parameters",
+                percent(no_lead)
+            ),
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_negative_lead_is_no_lead() {
+        let operator = |k_e: f64, k_e_dot: f64| OperatorEstimate {
+            k_e: Estimate::with_variance(k_e, 0.01),
+            t_l_s: Estimate::fixed(k_e_dot / k_e),
+            k_e_dot: Estimate::with_variance(k_e_dot, 0.01),
+            omega_nm_rad_s: Estimate::fixed(11.0),
+            zeta_nm: Estimate::fixed(0.25),
+            tau_e_s: Estimate::fixed(0.2),
+        };
+        // Two standard errors are .2.
+        for (k_e, k_e_dot, expected) in [
+            (1.0, 1.0, false),
+            (1.0, -0.3, true),
+            (1.0, -0.1, false),
+            (-1.0, 0.3, true),
+            (0.1, -0.3, false),
+            (-1.0, -0.3, false),
+        ] {
+            assert_eq!(leads_backwards(&operator(k_e, k_e_dot)), expected, "{k_e}, {k_e_dot}");
+        }
+        let share = |negative: f64| move |_: &dyn Fn(&OperatorEstimate) -> bool| negative;
+        assert!(lead_finding(&share(0.05)).is_none());
+        assert_eq!(lead_finding(&share(0.4)).unwrap().kind, "negative-lead");
+    }
+}

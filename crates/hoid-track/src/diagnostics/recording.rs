@@ -1,0 +1,204 @@
+//! Information of the recording itself about a trace: what the guard did, an idle head, and whether
+//! the last seconds are followed by the last row.
+
+use hoid_ident::diagnostics::{is_open, leads_backwards, operator_step};
+use hoid_model::{Finding, Record};
+
+use crate::{
+    guard::{GuardAction, GuardChoice, GuardKind, TrackFault},
+    stationary::BOTH_S,
+    trace::Trace,
+};
+
+/// Share of samples held back beyond which it is a doubt.
+const HELD: f64 = 0.01;
+/// Spans that are named one by one.
+const NAMED: usize = 3;
+/// Lengths of the end of the record at which the last row is held against it, s.
+const LAST_S: [f64; 2] = [16.0, 30.0];
+/// Changes from which there are many, and s of the record for each.
+const MANY: usize = 3;
+const FOR_EACH_S: f64 = 30.0;
+/// p-value of one of ten comparisons below which they differ.
+const UNLIKELY: f64 = 1e-4;
+
+impl Trace {
+    /// Actions of the guard.
+    pub(super) fn guard_findings(&self) -> Vec<Finding> {
+        let mut all = Vec::new();
+        let of = |is: &dyn Fn(&TrackFault) -> bool| -> Vec<TrackFault> {
+            self.faults().iter().filter(|fault| is(fault)).copied().collect()
+        };
+        let samples = |faults: &[TrackFault]| -> f64 {
+            faults
+                .iter()
+                .map(|f| ((f.to_s - f.from_s) / self.sample_time().s()).round())
+                .sum()
+        };
+        let held = of(&|f| f.kind == GuardKind::Outlier);
+        if !held.is_empty() {
+            let count = samples(&held);
+            let sample = if count == 1.0 { "sample" } else { "samples" };
+            let words = format!("{count} {sample} held back as outliers ({})", named(&held));
+            all.push(match count > HELD * self.counts().samples as f64 {
+                true => Finding::doubt("held-back", words),
+                false => Finding::note("held-back", words),
+            });
+        }
+        let steps = of(&|f| f.kind == GuardKind::Step);
+        if !steps.is_empty() {
+            let words = format!(
+                "{} jumps that stayed, taken as they came ({})",
+                steps.len(),
+                named(&steps)
+            );
+            all.push(Finding::note("steps-in-signals", words));
+        }
+        let spans = of(&|f| !matches!(f.kind, GuardKind::Outlier | GuardKind::Step));
+        if !spans.is_empty() {
+            all.push(Finding::doubt(
+                "hostile-span",
+                format!(
+                    "the estimate stays constant in {} spans in which e and u are not tracking ({})",
+                    spans.len(),
+                    named(&spans)
+                ),
+            ));
+        }
+        let again = of(&|f| matches!(f.action, GuardAction::Restarted | GuardAction::Relearnt));
+        if !again.is_empty() {
+            all.push(Finding::doubt(
+                "restarted",
+                format!("the estimate was started again after {} of them", again.len()),
+            ));
+        }
+        all
+    }
+
+    /// Where e and u stay constant and the estimate continues, which was requested: nothing arrives there, and its
+    /// error bars go to zero with the innovations ([`crate::stationary`]).
+    pub(super) fn learnt_at_rest(&self, record: &Record) -> Option<Finding> {
+        if self.options().method.guard() != Some(GuardChoice::No) {
+            return None;
+        }
+        let (e, u) = (record.input(), record.output());
+        let begins = |k: usize| k == 0 || e.get(k - 1) != e.get(k) || u[k - 1] != u[k];
+        let begun: Vec<usize> = (0..u.len()).filter(|k| begins(*k)).chain([u.len()]).collect();
+        let longest = begun.windows(2).max_by_key(|of| of[1] - of[0])?;
+        let [from, to] = [longest[0], longest[1]].map(|k| record.time_s(k));
+        (to - from >= BOTH_S).then(|| {
+            Finding::doubt(
+                "learnt-at-rest",
+                format!(
+                    "neither e nor u moves from {from:.2} to {to:.2} s and the estimate is updated there: its error bars shrink without \
+                     information; keep the default guard, which holds the estimate"
+                ),
+            )
+        })
+    }
+
+    /// Evidence of the last seconds of the record against the last row: a delay that is another now, or an estimate
+    /// that has not come back. A step of [`operator_step`] that is [`UNLIKELY`] next to its own error and that of the
+    /// row; of a delay that is a whole number of samples, beyond one and a half.
+    pub(super) fn not_followed(&self, record: &Record) -> Option<Finding> {
+        let row = self.len().checked_sub(1)?;
+        let operator = self.operator(row).ok()?;
+        // A gain and a lead that represent another form answer otherwise than the estimate does.
+        if self.response_is_known && (is_open(&operator.k_e) || leads_backwards(&operator)) {
+            return None;
+        }
+        let end = self.times_s()[row] + self.sample_time().s();
+        let of_row = |name: &str| {
+            let rows = operator.rows();
+            rows.iter()
+                .find(|(known, ..)| *known == name)
+                .and_then(|(_, _, e)| e.standard_error)
+        };
+        let mut worst: Option<(f64, String)> = None;
+        for length in LAST_S {
+            let from = end - length;
+            if from < record.time_s(0) {
+                continue;
+            }
+            let steps = record
+                .span(from, end)
+                .ok()
+                .and_then(|span| operator_step(&operator.parameters(), &span));
+            for step in steps.into_iter().flatten() {
+                let (name, own) = (step.name, of_row(step.name));
+                let whole_samples = name == "tau_e" && own.is_none();
+                let grid = if whole_samples {
+                    1.5 * self.sample_time().s()
+                } else {
+                    0.0
+                };
+                let p_value = step.p_value(own.unwrap_or(0.0), grid);
+                if p_value < UNLIKELY && worst.as_ref().is_none_or(|(known, _)| p_value < *known) {
+                    let words = format!(
+                        "the last {length:.0} s ask for another {name} than the last row, by {}: the person changed in a way \
+                         that the estimate does not follow, or it has not come back; start it again there",
+                        step.by
+                    );
+                    worst = Some((p_value, words));
+                }
+            }
+        }
+        worst.map(|(_, words)| Finding::doubt("not-followed", words))
+    }
+
+    /// An estimate that is invalid at the end, whatever it was before.
+    pub(super) fn last_row_finding(&self) -> Option<Finding> {
+        let operator = self.operator(self.len().checked_sub(1)?).ok()?;
+        let nothing = is_open(&operator.k_e) && is_open(&operator.k_e_dot) && !self.response_is_known;
+        nothing.then(|| {
+            Finding::doubt(
+                "last-row",
+                "at the end of the record no gain differs from zero by two standard errors: report an earlier row",
+            )
+        })
+    }
+
+    /// More changes than people make.
+    pub(super) fn many_changes_finding(&self) -> Option<Finding> {
+        let changes = self.changes().len();
+        let length = self.times_s().last()? - self.times_s().first()?;
+        (changes >= MANY && changes as f64 * FOR_EACH_S >= length).then(|| {
+            Finding::doubt(
+                "many-changes",
+                format!(
+                    "{changes} changes are declared in {length:.0} s: a person who changes so often is rare, a remnant that grows \
+                     with the error, gaps that were filled and steps of a sensor are not; look at e and u there"
+                ),
+            )
+        })
+    }
+
+    /// An idle head of the record.
+    pub(super) fn idle_finding(&self, record: &Record) -> Option<Finding> {
+        let idle_s = self.idle_s();
+        let (from, _) = self.options().start_span(record)?;
+        if idle_s <= 0.0 {
+            return None;
+        }
+        let left_out = from - record.time_s(0) >= idle_s - 0.5 * self.sample_time().s();
+        let words = format!("neither e nor u moves in the first {idle_s:.1} s");
+        Some(if left_out {
+            Finding::note("idle-head", format!("{words}: left out of the start fit"))
+        } else {
+            Finding::doubt(
+                "idle-head",
+                format!("{words}, which are in the start fit; start it after them"),
+            )
+        })
+    }
+}
+
+/// The first spans as text.
+fn named(faults: &[TrackFault]) -> String {
+    let one = |f: &TrackFault| format!("{} in {} at {:.2} to {:.2} s", f.kind, f.channel, f.from_s, f.to_s);
+    let mut text = faults.iter().take(NAMED).map(one).collect::<Vec<_>>().join("; ");
+    if faults.len() > NAMED {
+        text.push_str("; ...");
+    }
+    text
+}

@@ -1,0 +1,124 @@
+//! Whether the response is constant where the trace reports no change, and whether e answers to u.
+//!
+//! The gains of the basis and the delay are fitted to each stretch between two declared changes, and held against
+//! jumps, drifts and sways ([`hoid_ident::diagnostics::unsteady`]).
+
+use std::ops::Range;
+
+use hoid_ident::diagnostics::{Course, LoopResponse, Unsteady, answer, unsteady};
+use hoid_model::{Finding, Record};
+
+use super::structure::columns;
+use crate::trace::Trace;
+
+/// Probability below which a response is not the same throughout a stretch. Instants of a jump, and frequencies and phases
+/// of a sway, are counted one by one though neighbours are alike: of steady people less than one in a hundred is below.
+const UNLIKELY_STEP: f64 = 0.02;
+const UNLIKELY_DRIFT: f64 = 0.01;
+const UNLIKELY_SWAY: f64 = 0.05;
+/// Share of what older e and u leave of e that the latest u explains, below which e does not answer: in loops it is
+/// above one half, of two runs with the same forcing below .03.
+const NO_ANSWER: f64 = 0.05;
+/// A declared change is in neither of the stretches next to it for so long, s.
+const ABOUT_S: f64 = 5.0;
+
+impl Trace {
+    /// The stretches in which no change is reported, in samples of the record.
+    fn stretches(&self, record: &Record) -> Vec<Range<usize>> {
+        let ts = self.sample_time().s();
+        let sample = |t: f64| ((t - record.time_s(0)) / ts).round().clamp(0.0, record.len() as f64) as usize;
+        let mut from = sample(self.settled_s(record));
+        let mut all = Vec::new();
+        let mut times: Vec<f64> = self
+            .changes()
+            .iter()
+            .map(|(t, change)| t - change.seconds_ago)
+            .collect();
+        times.sort_by(f64::total_cmp);
+        for at in times {
+            all.push(from..sample(at - ABOUT_S));
+            from = from.max(sample(at + ABOUT_S));
+        }
+        all.push(from..record.len());
+        all.retain(|stretch| stretch.start < stretch.end);
+        all
+    }
+
+    /// Test result for each stretch, the most significant first; p-values count the stretches.
+    pub(super) fn unsteady(&self, record: &Record) -> Vec<Unsteady> {
+        let Some((_, signals)) = self.signals(record) else {
+            return Vec::new();
+        };
+        let signals = columns(&signals);
+        let stretches = self.stretches(record);
+        let ts = self.sample_time().s();
+        let mut all: Vec<Unsteady> = stretches
+            .iter()
+            .flat_map(|stretch| unsteady(&signals, record.output(), stretch.clone(), ts))
+            .map(|found| Unsteady {
+                p_value: (found.p_value * stretches.len() as f64).min(1.0),
+                ..found
+            })
+            .collect();
+        all.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
+        all
+    }
+
+    /// The response goes another way than the trace reports. A method that forgets, or that has a model of how people
+    /// drift, does not report that they are constant between its changes.
+    pub(super) fn unsteady_finding(&self, record: &Record) -> Option<Finding> {
+        self.options().method.lag_of_basis_s()?;
+        let unlikely = |found: &Unsteady| match found.course {
+            Course::Sway(_) => found.p_value / UNLIKELY_SWAY,
+            Course::Step => found.p_value / UNLIKELY_STEP,
+            Course::Drift => found.p_value / UNLIKELY_DRIFT,
+        };
+        let found = self.unsteady(record).into_iter().filter(|found| unlikely(found) < 1.0);
+        let found = found.min_by(|a, b| unlikely(a).total_cmp(&unlikely(b)))?;
+        let [by, error] = found.by;
+        let size = match found.name {
+            "gain" => format!("{:+.0} ± {:.0} %", 100.0 * by, 100.0 * error),
+            _ => format!("{by:+.3} ± {error:.3} s"),
+        };
+        let (name, p) = (found.name, found.p_value);
+        let (kind, words) = match found.course {
+            Course::Step => (
+                "undeclared-change",
+                format!(
+                    "their {name} changes by {size} about {:.0} s after the start (p = {p:.0e}), where the trace declares no change",
+                    record.time_s(found.at) - record.time_s(0)
+                ),
+            ),
+            Course::Drift => (
+                "drifting",
+                format!("their {name} drifts by {size} if the trace declares no change (p = {p:.0e})"),
+            ),
+            Course::Sway(period) => (
+                "swaying",
+                format!("their {name} sways by {size} with a period of about {period:.0} s (p = {p:.0e})"),
+            ),
+        };
+        Some(Finding::doubt(
+            kind,
+            format!("{words}; bands hold what is the same throughout, and are too narrow here"),
+        ))
+    }
+
+    /// How e answers to u.
+    pub(super) fn answer(&self, record: &Record) -> Option<LoopResponse> {
+        answer(record.input(), record.output(), 0, self.sample_time().s())
+    }
+
+    /// u does not come back in e.
+    pub(super) fn answer_finding(&self, record: &Record) -> Option<Finding> {
+        let found = self.answer(record).filter(|found| found.share < NO_ANSWER)?;
+        Some(Finding::doubt(
+            "no-answer",
+            format!(
+                "e does not answer to u, as it does in a loop (the latest u explains {:.1} % of what is new in e): look whether u and e \
+                 are of the same run",
+                100.0 * found.share
+            ),
+        ))
+    }
+}

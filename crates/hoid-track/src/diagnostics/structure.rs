@@ -1,0 +1,164 @@
+//! Whether the operator of the last row has the structure that the person has.
+//!
+//! The numerator, corrections of the poles and of the delay, and a level are what the basis of people can estimate;
+//! together they span the six signals of its filter, and one after its lag once more is the correction of the lag,
+//! where that is all that is missed. Whether the errors before, since the last change, carry more information about u
+//! is the question ([`hoid_ident::diagnostics::residual_response()`]).
+
+use hoid_core::adaptive::basis::{Basis, Point, Signals};
+use hoid_ident::diagnostics::{ResidualResponse, residual_response};
+use hoid_model::{Finding, Record};
+
+use crate::{guard::GuardKind, trace::Trace};
+
+/// Probability below which a structure is missed.
+const UNLIKELY: f64 = 1e-3;
+/// Probability from which another lag explains what is left.
+const OF_LAG: f64 = 0.02;
+/// Seconds that are examined, at most, and at the start not: the filter is at rest there.
+const LONGEST_S: f64 = 120.0;
+const SETTLING_S: f64 = 10.0;
+/// Lag of the basis where the method has none of its own, s.
+const LAG_S: f64 = 3.0;
+
+impl Trace {
+    /// Evidence of the record against the structure.
+    pub(super) fn missed_structure(&self, record: &Record) -> Option<Finding> {
+        let found = self.residual_response(record)?;
+        (found.p_value < UNLIKELY).then(|| {
+            Finding::doubt(
+                "structure",
+                format!(
+                    "structure missed: the errors before carry more information about u than the operator at the end does, with any gains \
+                     and corrections (p = {:.1e}, {:.1} % of the innovations); its parameters are those of the nearest \
+                     person that the method knows",
+                    found.p_value,
+                    100.0 * found.share
+                ),
+            )
+        })
+    }
+
+    /// The test itself, where the method has a basis.
+    pub(super) fn residual_response(&self, record: &Record) -> Option<ResidualResponse> {
+        self.options().method.lag_of_basis_s()?;
+        let ts = self.sample_time().s();
+        let end = self.times_s().last()? + ts;
+        let changed = self.changes().last().map(|(t, change)| t - change.seconds_ago);
+        let from = (self.settled_s(record))
+            .max(changed.unwrap_or(f64::MIN))
+            .max(end - LONGEST_S);
+        let first = ((from - record.time_s(0)) / ts).round().max(0.0) as usize;
+        let (basis, signals) = self.signals(record)?;
+        let mut columns = columns(&signals);
+        columns.push(slower(&columns[0], basis.point().lag, ts));
+        let of = |columns: &[Vec<f64>]| residual_response(columns, record.input(), record.output(), first, ts);
+        let corrected = of(&columns)?;
+        if corrected.p_value > OF_LAG {
+            return Some(corrected);
+        }
+        columns.pop();
+        of(&columns)
+    }
+
+    /// From when the filters of the basis have settled: what was not tracking is in them until it has faded.
+    pub(super) fn settled_s(&self, record: &Record) -> f64 {
+        let outliers = [GuardKind::Outlier, GuardKind::Step];
+        let hostile = self.faults().iter().filter(|fault| !outliers.contains(&fault.kind));
+        hostile.fold(record.time_s(0), |last, fault| last.max(fault.to_s)) + SETTLING_S
+    }
+
+    /// The basis of the operator of the last row, and its signals over the record.
+    pub(super) fn signals(&self, record: &Record) -> Option<(Basis, Vec<Signals>)> {
+        let operator = self.operator(self.len().checked_sub(1)?).ok()?;
+        let ts = record.sample_time().s();
+        let point = Point {
+            tau: operator.tau_e_s.value + 0.5 * ts,
+            omega: operator.omega_nm_rad_s.value,
+            zeta: operator.zeta_nm.value,
+            lag: self.options().method.lag_of_basis_s().unwrap_or(LAG_S),
+        };
+        let mut basis = Basis::new(point, ts)?;
+        let (e, delay) = (record.input(), basis.delay());
+        let error = |k: usize, ago: usize| k.checked_sub(ago).map_or(0.0, |k| e[k]);
+        let rows = (0..e.len())
+            .map(|k| basis.step([0, 1, 2].map(|j| error(k, delay + j))))
+            .collect();
+        Some((basis, rows))
+    }
+}
+
+/// A signal filtered by the lag once more: with it the lag of the basis has a correction, as poles and delay have.
+fn slower(signal: &[f64], lag_s: f64, sample_time_s: f64) -> Vec<f64> {
+    let pole = (-sample_time_s / lag_s).exp();
+    let step = |state: &mut f64, z: &f64| {
+        *state = pole * *state + (1.0 - pole) * z;
+        Some(*state)
+    };
+    signal.iter().scan(0.0, step).collect()
+}
+
+/// Rows as columns.
+pub(super) fn columns<const N: usize>(rows: &[[f64; N]]) -> Vec<Vec<f64>> {
+    (0..N).map(|j| rows.iter().map(|row| row[j]).collect()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_model::{
+        Channel,
+        scenario::{Condition, Scenario},
+    };
+    use hoid_sim::{RunSeed, Simulator};
+
+    use super::*;
+    use crate::{Method, TrackOptions, track};
+
+    fn run(replication: u64) -> Record {
+        let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+        let seed = RunSeed {
+            seed: 4400,
+            replication,
+            ..RunSeed::default()
+        };
+        simulator.run(seed, false).unwrap()
+    }
+
+    /// The same with another response to the error on its way: this share of K_e, so many samples later.
+    fn with_echo(record: &Record, share: f64, later: usize) -> Record {
+        let e = record.input();
+        let echo = |k: usize| k.checked_sub(later).map_or(0.0, |k| share * 0.09 * e[k]);
+        let u = (0..e.len()).map(|k| record.output()[k] + echo(k)).collect();
+        let channel = |name: &str, values| Channel::new(name, "deg", values);
+        Record::new(record.sample_time(), channel("e", e.to_vec()), channel("u", u)).unwrap()
+    }
+
+    fn found(record: &Record) -> ResidualResponse {
+        let options = TrackOptions::default_for(Method::adaptive(), 29);
+        track(record, &options, 50).unwrap().residual_response(record).unwrap()
+    }
+
+    #[test]
+    fn chance_is_chance_and_another_response_is_seen() {
+        // Of 30 people of the right form 1.5 are below .05 by chance, standard error 1.2.
+        let clean: Vec<f64> = (0..30).map(|i| found(&run(i)).p_value).collect();
+        assert!(clean.iter().filter(|p| **p < 0.05).count() <= 6, "{clean:?}");
+        assert!(clean.iter().all(|p| *p > UNLIKELY), "{clean:?}");
+        // A third of the gain once more, .85 s after the error: far beyond the delay and its corrections.
+        let echoes: Vec<ResidualResponse> = (0..6).map(|i| found(&with_echo(&run(i), 0.33, 85))).collect();
+        let seen = echoes.iter().filter(|f| f.p_value < UNLIKELY);
+        assert!(seen.count() >= 5, "{echoes:?}");
+    }
+
+    #[test]
+    fn too_little_says_nothing() {
+        let record = run(0).span(0.0, 25.0).unwrap();
+        let trace = track(&record, &TrackOptions::default_for(Method::adaptive(), 29), 50).unwrap();
+        assert_eq!(trace.residual_response(&record), None);
+        // A method without this basis is not asked.
+        let record = run(0);
+        let trace = track(&record, &TrackOptions::default_for(Method::rls(), 29), 50).unwrap();
+        assert_eq!(trace.missed_structure(&record), None);
+    }
+}

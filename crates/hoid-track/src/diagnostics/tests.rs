@@ -1,0 +1,263 @@
+#![allow(clippy::unwrap_used)]
+use hoid_model::{
+    Channel, Orders, Severity, Structure, VerdictLevel,
+    scenario::{Condition, Scenario},
+};
+use hoid_sim::{RunSeed, Simulator};
+
+use super::*;
+use crate::{Method, TrackOptions, Tracker, track};
+use hoid_model::uncertainty::OperatorEstimate;
+
+fn simulated(condition: Condition) -> Record {
+    let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
+    simulator.run(RunSeed::default(), false).unwrap()
+}
+
+fn kinds(verdict: &Verdict) -> Vec<&'static str> {
+    verdict.findings().iter().map(|f| f.kind).collect()
+}
+
+fn judged(record: &Record, options: &TrackOptions) -> Verdict {
+    track(record, options, 10).unwrap().verdict(record, None).unwrap()
+}
+
+/// The recursion of the text, without a guard, reported 11.3293 ± .0096 rad/s of a person who had
+/// gone.
+#[test]
+fn a_rest_from_which_is_learnt_is_a_doubt() {
+    let record = simulated(Condition::C1);
+    let stopped = |name: &str, values: &[f64]| {
+        let values = (0..values.len()).map(|k| values[k.min(4100)]).collect();
+        Channel::new(name, "", values)
+    };
+    let (e, u) = (stopped("e", record.input()), stopped("u", record.output()));
+    let gone = Record::new(record.sample_time(), e, u).unwrap();
+    for (record, guard, told) in [(&gone, "no", true), (&gone, "yes", false), (&record, "no", false)] {
+        let options = TrackOptions::default_for(Method::rpem(), 29)
+            .with(&[("guard", guard)])
+            .unwrap();
+        let verdict = judged(record, &options);
+        assert_eq!(kinds(&verdict).contains(&"learnt-at-rest"), told, "{guard}: {verdict}");
+    }
+}
+
+#[test]
+fn a_method_that_starts_itself_says_what_it_supposes() {
+    let record = simulated(Condition::C1);
+    let options = TrackOptions::default_for(Method::adaptive(), 29);
+    let short = judged(&record.span(0.0, 3.0).unwrap(), &options);
+    assert!(kinds(&short).contains(&"supposed"), "{short}");
+    assert!(!kinds(&short).contains(&"not-convertible"), "{short}");
+    let mut tracker = Tracker::new(&options, None, record.sample_time()).unwrap();
+    assert_eq!(tracker.level(&tracker.operator()), VerdictLevel::NotDetermined);
+    for (e, u) in record.input().iter().zip(record.output()) {
+        tracker.step(*e, *u);
+    }
+    assert_eq!(tracker.level(&tracker.operator()), VerdictLevel::Trustworthy);
+}
+
+/// A change of nothing.
+fn change() -> crate::Change {
+    let same = [Estimate::fixed(1.0); 2];
+    crate::Change {
+        seconds_ago: 1.0,
+        odds: 10.0,
+        k_e: same,
+        k_e_dot: same,
+        omega_nm_rad_s: same,
+        zeta_nm: same,
+        tau_e_s: same,
+        t_l_s: [1.0; 2],
+        innovation_variance: [1.0; 2],
+        z: [0.0; 6],
+        of_operator: true,
+    }
+}
+
+/// An output of zero has no gain: that is not a doubtful operator, it is none.
+#[test]
+fn an_output_that_is_zero_is_not_determined() {
+    let record = simulated(Condition::C1);
+    let input = Channel::new("e", "", record.input().to_vec());
+    let silent = Channel::new("u", "", vec![0.0; record.len()]);
+    let other = Record::new(record.sample_time(), input, silent).unwrap();
+    let trace = track(&other, &TrackOptions::default_for(Method::adaptive(), 29), 10).unwrap();
+    let verdict = trace.verdict(&other, None).unwrap();
+    assert_eq!(verdict.level, VerdictLevel::NotDetermined, "{verdict}");
+}
+
+/// A trace with an operator in each row, as recursions in its parameters have it.
+fn in_the_operators_parameters(record: &Record, every: usize) -> Trace {
+    let options = TrackOptions::default_for(Method::rpem(), 29)
+        .with(&[("memory", "20s")])
+        .unwrap();
+    let mut trace = track(record, &options, every).unwrap();
+    trace.operator = (0..trace.len()).map(|row| trace.operator(row).unwrap()).collect();
+    trace
+}
+
+/// A trace of C1 whose rows are as they are wanted.
+fn changed(change: impl FnOnce(&mut Trace)) -> Vec<&'static str> {
+    let record = simulated(Condition::C1);
+    let mut trace = in_the_operators_parameters(&record, 100);
+    change(&mut trace);
+    kinds(&trace.verdict(&record, None).unwrap())
+}
+
+#[test]
+fn each_size_of_the_trace_has_its_finding() {
+    assert!(changed(|_| ()).is_empty());
+    let counted = changed(|trace| (trace.counts.shortened, trace.counts.skipped) = (1000, 1000));
+    assert_eq!(counted, ["faults", "steps-shortened"]);
+    let open = |e: &mut Estimate| e.standard_error = Some(e.value.abs());
+    let one = changed(|trace| trace.operator.iter_mut().for_each(|o| open(&mut o.k_e)));
+    assert_eq!(one, ["undetermined-parameter"]);
+    let both = changed(|trace| {
+        for o in &mut trace.operator {
+            open(&mut o.k_e);
+            open(&mut o.k_e_dot);
+        }
+    });
+    assert_eq!(both, ["gain"]);
+    let lag = changed(|trace| trace.operator.iter_mut().for_each(|o| o.zeta_nm.value = 4.0));
+    assert_eq!(lag, ["neuromuscular-lag"]);
+    let none = changed(|trace| trace.operator.iter_mut().for_each(|o| o.t_l_s.value = f64::NAN));
+    assert_eq!(none, ["not-convertible"]);
+    let grown = changed(|trace| {
+        let last = trace.covariance.len() - 1;
+        trace.covariance[last] *= 1e4;
+    });
+    assert_eq!(grown, ["covariance-blown-up"]);
+    let at_the_end = changed(|trace| {
+        let last = trace.operator.last_mut().unwrap();
+        open(&mut last.k_e);
+        open(&mut last.k_e_dot);
+    });
+    assert_eq!(at_the_end, ["last-row"]);
+    // 81.92 s: three are many, two are not.
+    for (count, expected) in [(2, vec![]), (3, vec!["many-changes"])] {
+        let often = changed(|trace| trace.changes = vec![(40.0, change()); count]);
+        assert_eq!(often, expected);
+    }
+    let broken = changed(|trace| *trace.theta.last_mut().unwrap() = f64::NAN);
+    assert_eq!(broken, ["not-finite"]);
+}
+
+#[test]
+fn orders_of_no_operator_are_judged_by_their_coefficients() {
+    let record = simulated(Condition::C1);
+    let orders = Orders {
+        na: 3,
+        nb: 3,
+        nk: 29,
+        ..Orders::default()
+    };
+    let options = TrackOptions::new(Method::rls(), Structure::Arx, orders);
+    let tracker = Tracker::new(&options, Some(&record), record.sample_time()).unwrap();
+    assert_eq!(tracker.level(&tracker.operator()), VerdictLevel::Trustworthy);
+    let verdict = judged(&record, &options);
+    assert!(!kinds(&verdict).contains(&"not-convertible"), "{verdict}");
+}
+
+fn with_signals(record: &Record, e: Vec<f64>, u: Vec<f64>) -> Record {
+    let (e, u) = (Channel::new("e", "", e), Channel::new("u", "", u));
+    Record::new(record.sample_time(), e, u).unwrap()
+}
+
+fn typical() -> TrackOptions {
+    TrackOptions::default_for(Method::adaptive(), 29)
+}
+
+#[test]
+fn a_sign_that_is_wrong_is_told_with_and_without_a_controlled_element() {
+    let scenario = Scenario::condition(Condition::C1);
+    let record = simulated(Condition::C1);
+    let turned = record.input().iter().map(|e| -e).collect();
+    let turned = with_signals(&record, turned, record.output().to_vec());
+    let element = scenario.initial.controlled_element.transfer_function().unwrap();
+    let with_element = TrackOptions {
+        controlled_element: Some(element),
+        ..typical()
+    };
+    for (options, kinds_expected) in [
+        (typical(), ["sign"; 2]),
+        (with_element, ["unstable-loop", "no-crossover"]),
+    ] {
+        let clean = judged(&record, &options);
+        assert_eq!(clean.level, VerdictLevel::Trustworthy, "{clean}");
+        let told = judged(&turned, &options);
+        assert!(kinds(&told).iter().any(|kind| kinds_expected.contains(kind)), "{told}");
+    }
+}
+
+#[test]
+fn the_output_of_another_run_is_told() {
+    let record = simulated(Condition::C1);
+    let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+    let seed = RunSeed {
+        replication: 1,
+        ..RunSeed::default()
+    };
+    let other = simulator.run(seed, false).unwrap();
+    let exchanged = with_signals(&record, record.input().to_vec(), other.output().to_vec());
+    let told = judged(&exchanged, &typical());
+    assert!(kinds(&told).contains(&"no-answer"), "{told}");
+    assert!(!kinds(&judged(&record, &typical())).contains(&"no-answer"));
+}
+
+/// u is scaled after the person: what the loop does of it is another matter.
+#[test]
+fn a_gain_that_drifts_and_one_that_sways_are_told() {
+    let record = simulated(Condition::C1);
+    let scaled = |gain: &dyn Fn(f64) -> f64| {
+        let u = (0..record.len())
+            .map(|k| gain(record.time_s(k)) * record.output()[k])
+            .collect();
+        judged(&with_signals(&record, record.input().to_vec(), u), &typical())
+    };
+    let drifts = scaled(&|t| 1.0 - 0.5 * t / 82.0);
+    assert!(kinds(&drifts).contains(&"drifting"), "{drifts}");
+    let sways = scaled(&|t| 1.0 + 0.4 * (t * 2.0 * std::f64::consts::PI / 20.0).sin());
+    assert!(kinds(&sways).contains(&"swaying"), "{sways}");
+}
+
+#[test]
+fn who_answers_like_a_gain_is_trustworthy_and_no_remedy_is_refused() {
+    let record = simulated(Condition::C1);
+    let lead_is_open = |mut trace: Trace| {
+        for o in &mut trace.operator {
+            o.k_e_dot.standard_error = Some(o.k_e_dot.value.abs());
+        }
+        trace.verdict(&record, None).unwrap()
+    };
+    let verdict = lead_is_open(in_the_operators_parameters(&record, 10));
+    let found = verdict.findings().iter().find(|f| f.kind == "undetermined-parameter");
+    assert_eq!(found.map(|f| f.severity), Some(Severity::Note), "{verdict}");
+    // Without a memory none is asked to be longer.
+    assert!(
+        !lead_is_open(track(&record, &typical(), 10).unwrap())
+            .to_string()
+            .contains("memory")
+    );
+    let operator = |k_e_dot: f64| OperatorEstimate {
+        k_e: Estimate::with_variance(1.0, 0.01),
+        t_l_s: Estimate::with_variance(k_e_dot, 0.01),
+        k_e_dot: Estimate::with_variance(k_e_dot, 0.01),
+        omega_nm_rad_s: Estimate::with_variance(11.0, 1.0),
+        zeta_nm: Estimate::with_variance(0.3, 0.001),
+        tau_e_s: Estimate::with_variance(0.2, 0.001),
+    };
+    let record = simulated(Condition::C1);
+    let mut tracker = Tracker::new(&typical(), None, record.sample_time()).unwrap();
+    for (e, u) in record.input().iter().zip(record.output()) {
+        tracker.step(*e, *u);
+    }
+    for k_e_dot in [0.0, 1.0] {
+        assert_eq!(
+            tracker.level(&Ok(operator(k_e_dot))),
+            VerdictLevel::Trustworthy,
+            "{k_e_dot}"
+        );
+    }
+}

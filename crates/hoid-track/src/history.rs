@@ -1,0 +1,85 @@
+//! The last values of a signal, the newest first.
+
+use hoid_core::state::{State, visit_all};
+
+/// Largest size of a value in a recursion. Its fourth power is still a number, so that covariances
+/// of filtered signals are.
+const LARGEST: f64 = 1e60;
+
+/// The value as a recursion takes it: within 1e60, and zero if a product of large numbers has no
+/// value.
+pub fn bounded(x: f64) -> f64 {
+    if x.is_nan() { 0.0 } else { x.clamp(-LARGEST, LARGEST) }
+}
+
+/// The last n values in one slice. Each is written twice, n places apart, so that nothing is ever
+/// moved.
+#[derive(Debug, Clone)]
+pub struct History {
+    values: Vec<f64>,
+    n: usize,
+    at: usize,
+}
+
+impl State for History {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        visit_all(&mut [&mut self.values.as_mut_slice(), &mut self.at], each);
+    }
+}
+
+impl History {
+    /// n zeros.
+    pub fn new(n: usize) -> Self {
+        Self {
+            values: vec![0.0; 2 * n],
+            n,
+            at: 0,
+        }
+    }
+
+    /// Takes the next value; the oldest one goes.
+    pub fn push(&mut self, x: f64) {
+        if self.n == 0 {
+            return;
+        }
+        self.at = if self.at == 0 { self.n } else { self.at } - 1;
+        let x = bounded(x);
+        self.values[self.at] = x;
+        self.values[self.at + self.n] = x;
+    }
+
+    /// `[x(t), x(t-1), ..., x(t-n+1)]` when x(t) was the last value taken.
+    pub fn newest(&self) -> &[f64] {
+        &self.values[self.at..self.at + self.n]
+    }
+}
+
+/// `sum c_i x(t-i)` over as many terms as there are coefficients.
+pub fn weighted(coefficients: &[f64], past: &[f64]) -> f64 {
+    coefficients.iter().zip(past).map(|(c, x)| c * x).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn holds_the_last_values_newest_first() {
+        for n in 0..4 {
+            let mut past = History::new(n);
+            for t in 1..=9 {
+                past.push(f64::from(t));
+                let expected: Vec<f64> = (0..n).map(|i| f64::from((t - i as i32).max(0))).collect();
+                assert_eq!(past.newest(), expected);
+            }
+        }
+    }
+
+    #[test]
+    fn values_stay_numbers() {
+        let mut past = History::new(3);
+        [f64::NAN, f64::INFINITY, -1e300].into_iter().for_each(|x| past.push(x));
+        assert_eq!(past.newest(), [-LARGEST, LARGEST, 0.0]);
+        assert_eq!(weighted(&[1.0, 1.0], past.newest()), 0.0);
+    }
+}

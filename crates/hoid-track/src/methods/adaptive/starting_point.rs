@@ -1,0 +1,442 @@
+//! Where the recursion starts: the basis, how well it is known, and the estimate of an earlier fit.
+//!
+//! **A fit** has coordinates x of an operator Y(x) with covariance C. The recursion has gains theta of
+//! the responses x_i of a basis made at the fit's delay, neuromuscular system and lag, and corrections
+//! of the first two. The gains are those whose response is nearest to Y at [`FREQUENCIES`] rad/s,
+//!
+//! `theta = argmin sum_k |(sum_i theta_i h_i(w_k) - Y(w_k))/Y(w_k)|^2`,
+//!
+//! and the derivatives of the state s = (theta, level, corrections) along x follow from the same problem for dY/dx,
+//! except for those that are corrections: `S = J C J'`. For the forms with a lag, and of a gain with a lead, the
+//! nearest is the operator itself.
+//!
+//! The remnant of the fit is `v = (C/D) eps` with the impulse response g, whose autocovariances over
+//! the variance of eps are `r_k = sum_j g_j g_{j+k}`.
+
+use hoid_core::adaptive::{
+    DYNAMICS, GAINS, LARGEST_ORDER, LINEAR, STATES,
+    basis::{Basis, Point, REFERENCE},
+    defaults::{DefaultOperator, GIVEN_DELAY_S, LAG_S},
+    initial_estimate::InitialEstimate,
+    noise::Lags,
+};
+use hoid_ident::IdentError;
+use hoid_model::{Complex64, FittedOperator, SampleTime, operator_family::Coordinate, uncertainty::variance_along};
+
+use crate::person_prior::PersonPrior;
+
+/// Spread of the fixed dynamics where nothing is known: shares of omega and zeta, and s for the
+/// delay.
+const WIDE: [f64; DYNAMICS] = [0.45, 0.75, 0.15];
+/// Frequencies at which the gains of a fit are found, rad/s: the range, and how many.
+const FREQUENCIES: ([f64; 2], usize) = ([0.3, 8.0], 24);
+/// Lags that a basis may have, s: beyond the longest a lag cannot be distinguished from an
+/// integration.
+const LAGS_S: [f64; 2] = [0.05, 10.0];
+/// Root mean square of the relative misfit beyond which a form has no place in the basis.
+const MISFIT: f64 = 0.1;
+/// Seconds that the remnant of a fit counts for.
+const REMNANT_S: f64 = 20.0;
+/// Longest remnant that is summed, s, and what may be left of it.
+const LONGEST_S: f64 = 60.0;
+const LEFT: f64 = 1e-6;
+/// The level of u that is not known before the first second, in standard deviations of the remnant.
+const LEVEL: f64 = 3.0;
+
+/// The basis at the start, and how far a person is from it.
+pub(super) struct StartingPoint {
+    pub point: Point,
+    /// Shares of omega and zeta, and s for the delay.
+    pub spread: [f64; DYNAMICS],
+}
+
+impl StartingPoint {
+    /// From the prior; `tau_s` is the delay, for an error that is straight between samples, and whether it has been
+    /// given.
+    pub fn of(prior: &PersonPrior, tau_s: f64, is_given: bool, sample_time: SampleTime) -> Result<Self, IdentError> {
+        let DefaultOperator {
+            mut point, mut spread, ..
+        } = DefaultOperator::with_delay(tau_s);
+        // An error that is held comes half a sample later than one that is straight.
+        let hold = 0.5 * sample_time.s();
+        let of_delay = |otherwise: f64| if is_given { GIVEN_DELAY_S } else { otherwise };
+        spread[2] = of_delay(spread[2]);
+        match prior {
+            PersonPrior::Population => {}
+            PersonPrior::Nothing => spread = [WIDE[0], WIDE[1], of_delay(WIDE[2])],
+            PersonPrior::Named(_) => {
+                let places = [&mut point.omega, &mut point.zeta];
+                for ((name, place), spread) in ["omega_nm", "zeta_nm"].into_iter().zip(places).zip(&mut spread) {
+                    if let Some((centre, relative)) = prior.named(name) {
+                        (*place, *spread) = (centre, relative);
+                    }
+                }
+                if let Some((centre, relative)) = prior.named("tau_e") {
+                    (point.tau, spread[2]) = (centre + hold, centre * relative);
+                }
+                if let Some((centre, _)) = prior.named("T_I") {
+                    point.lag = centre.clamp(LAGS_S[0], LAGS_S[1]);
+                }
+            }
+            PersonPrior::Fit(fit) => {
+                let Some((omega, zeta)) = fit.operator.neuromuscular() else {
+                    return Err(no_place(
+                        fit,
+                        "it has no neuromuscular system, and the basis of people has one; identify the person with \
+                         --neuromuscular yes",
+                    ));
+                };
+                let all = fit.operator.form().coordinates(true);
+                let rate = all.iter().position(|c| *c == Coordinate::LagRate);
+                let lag = match rate.map(|i| fit.operator.coordinates()[i]) {
+                    Some(rate) => 1.0 / rate.max(1.0 / LAGS_S[1]),
+                    None if fit.operator.form().has_pole() => LAGS_S[1],
+                    // A square of a lead without a lag is nearest to one with a short lag.
+                    None if fit.operator.form().degree() == 2 => LAGS_S[0],
+                    None => LAG_S,
+                };
+                point = Point {
+                    tau: fit.operator.tau_e_s() + hold,
+                    omega,
+                    zeta,
+                    lag: lag.max(LAGS_S[0]),
+                };
+            }
+        }
+        Ok(Self { point, spread })
+    }
+}
+
+fn no_place(fit: &FittedOperator, why: &str) -> IdentError {
+    IdentError::BadStart {
+        reason: format!("{}: {why}, or start with --prior population", fit.source),
+    }
+}
+
+/// The estimate of a fit in a basis that `StartingPoint::of` has made for it.
+///
+/// # Errors
+/// [`IdentError::BadStart`] for a form that is not near to any gains.
+pub(super) fn initial_estimate(
+    fit: &FittedOperator,
+    basis: &Basis,
+    sample_time: SampleTime,
+) -> Result<InitialEstimate, IdentError> {
+    let nearest = Nearest::new(fit, basis, sample_time);
+    let (value, misfit) = nearest.gains(|k| nearest.responses[k].value);
+    if misfit > MISFIT {
+        return Err(no_place(
+            fit,
+            &format!(
+                "the form {} is {:.0} % away from what the basis of people can be; identify with a form that has a lag, as \
+                 --form lead-lag",
+                fit.operator.form(),
+                100.0 * misfit
+            ),
+        ));
+    }
+    let mut state = [0.0; STATES];
+    state[..GAINS].copy_from_slice(&value);
+    let coordinates = fit.operator.form().coordinates(true);
+    let p = coordinates.len();
+    let point = basis.point();
+    // Rows of J by the coordinates, then S = J C J'.
+    let columns: Vec<[f64; STATES]> = (0..p)
+        .map(|j| {
+            let mut column = [0.0; STATES];
+            match coordinates[j] {
+                Coordinate::LogOmega => column[LINEAR] = point.omega,
+                Coordinate::LogZeta => column[LINEAR + 1] = point.zeta,
+                Coordinate::Delay => column[LINEAR + 2] = 1.0,
+                _ => column[..GAINS].copy_from_slice(&nearest.gains(|k| nearest.responses[k].gradient[j]).0),
+            }
+            column
+        })
+        .collect();
+    let mut covariance = [[0.0; STATES]; STATES];
+    for (i, a) in columns.iter().enumerate() {
+        for (j, b) in columns.iter().enumerate() {
+            for (row, a) in covariance.iter_mut().zip(a) {
+                for (c, b) in row.iter_mut().zip(b) {
+                    *c += a * fit.covariance[i * p + j] * b;
+                }
+            }
+        }
+    }
+    let widened = nearest.lost(fit, &coordinates, &columns);
+    covariance.iter_mut().flatten().for_each(|c| *c *= widened);
+    let lags = remnant(fit, sample_time);
+    let power = lags.map_or(1.0, |lags| lags[0]) * fit.innovation_variance;
+    covariance[GAINS][GAINS] = LEVEL * LEVEL * power;
+    Ok(InitialEstimate {
+        state,
+        covariance: symmetric(&covariance),
+        variance: fit.innovation_variance,
+        unit: fit.operator.response_and_gradient(REFERENCE).value.norm(),
+        remnant: lags.map(|lags| (lags, REMNANT_S)),
+    })
+}
+
+/// Rounding leaves nothing that is not symmetric.
+fn symmetric(c: &[[f64; STATES]; STATES]) -> [[f64; STATES]; STATES] {
+    std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (c[i][j] + c[j][i])))
+}
+
+/// Autocovariances of `C/D` over the variance of eps; `None` if it does not die out.
+fn remnant(fit: &FittedOperator, sample_time: SampleTime) -> Option<Lags> {
+    let (c, d) = &fit.noise;
+    let longest = (LONGEST_S / sample_time.s()) as usize;
+    let mut g = vec![0.0; longest];
+    for k in 0..longest {
+        let moving = if k == 0 {
+            1.0
+        } else {
+            c.get(k - 1).copied().unwrap_or(0.0)
+        };
+        let past: f64 = d.iter().take(k).enumerate().map(|(i, d)| d * g[k - 1 - i]).sum();
+        g[k] = moving - past;
+    }
+    let power = |g: &[f64]| g.iter().map(|x| x * x).sum::<f64>();
+    let all = power(&g);
+    if !all.is_finite() || power(&g[longest / 2..]) > LEFT * all {
+        return None;
+    }
+    let of = |k: usize| g.iter().zip(&g[k.min(longest)..]).map(|(a, b)| a * b).sum();
+    let lags: Lags = std::array::from_fn(of);
+    debug_assert_eq!(lags.len(), LARGEST_ORDER + 1);
+    Some(lags)
+}
+
+/// The problem of the nearest gains.
+struct Nearest {
+    /// For the operator, held.
+    responses: Vec<hoid_model::operator_family::FamilyResponse>,
+    /// For the basis, over the operator's.
+    basis: Vec<[Complex64; GAINS]>,
+}
+
+impl Nearest {
+    /// Amount by which the covariance of the state is to be larger, so that the response is nowhere better known than
+    /// by the fit: gains of one lag cannot report how a lag that is not known goes with the frequency.
+    fn lost(&self, fit: &FittedOperator, coordinates: &[Coordinate], columns: &[[f64; STATES]]) -> f64 {
+        let p = coordinates.len();
+        let sizes = |g: &[Complex64]| -> [f64; 2] {
+            let of = |part: fn(&Complex64) -> f64| {
+                let gradient: Vec<f64> = g.iter().map(part).collect();
+                variance_along(&gradient, &fit.covariance)
+            };
+            [of(|g| g.re), of(|g| g.im)]
+        };
+        let ratio = |k: usize| {
+            let response = &self.responses[k];
+            let whole: Vec<Complex64> = response.gradient.iter().map(|g| g / response.value).collect();
+            let kept: Vec<Complex64> = (0..p)
+                .map(|j| match coordinates[j] {
+                    Coordinate::LogOmega | Coordinate::LogZeta | Coordinate::Delay => whole[j],
+                    _ => self.basis[k].iter().zip(&columns[j]).map(|(h, c)| h * c).sum(),
+                })
+                .collect();
+            let (whole, kept) = (sizes(&whole), sizes(&kept));
+            (whole[0] + whole[1]) / (kept[0] + kept[1])
+        };
+        let ratios = (0..self.responses.len()).map(ratio);
+        ratios.filter(|ratio| ratio.is_finite()).fold(1.0, f64::max)
+    }
+
+    fn new(fit: &FittedOperator, basis: &Basis, sample_time: SampleTime) -> Self {
+        let ([low, high], count) = FREQUENCIES;
+        let high = high.min(0.9 * sample_time.nyquist_rad_s());
+        let at = |k: usize| low * (high / low).powf(k as f64 / (count as f64 - 1.0));
+        let held = |omega: f64| {
+            let half = 0.5 * omega * sample_time.s();
+            Complex64::from_polar(half.sin() / half, -half)
+        };
+        let responses: Vec<_> = (0..count)
+            .map(|k| {
+                let mut found = fit.operator.response_and_gradient(at(k));
+                let hold = held(at(k));
+                found.value *= hold;
+                found.gradient.iter_mut().for_each(|g| *g *= hold);
+                found
+            })
+            .collect();
+        let over = |k: usize| {
+            let h = basis.response(at(k), basis.point());
+            h.map(|[re, im]| Complex64::new(re, im) / responses[k].value)
+        };
+        Self {
+            basis: (0..count).map(over).collect(),
+            responses,
+        }
+    }
+
+    /// Gains whose response is nearest to a target, and the root mean square of the relative misfit.
+    fn gains(&self, target: impl Fn(usize) -> Complex64) -> ([f64; GAINS], f64) {
+        let count = self.basis.len();
+        let relative = |k: usize| target(k) / self.responses[k].value;
+        let (mut a, mut b) = ([[0.0; GAINS]; GAINS], [0.0; GAINS]);
+        for (k, h) in self.basis.iter().enumerate() {
+            for i in 0..GAINS {
+                b[i] += (h[i].conj() * relative(k)).re;
+                for j in 0..GAINS {
+                    a[i][j] += (h[i].conj() * h[j]).re;
+                }
+            }
+        }
+        let gains = solved(a, b);
+        let left = |k: usize| {
+            let sum: Complex64 = gains.iter().zip(&self.basis[k]).map(|(g, h)| h * *g).sum();
+            (sum - relative(k)).norm_sqr()
+        };
+        let misfit = ((0..count).map(left).sum::<f64>() / count as f64).sqrt();
+        (gains, misfit)
+    }
+}
+
+/// The solution of three equations, by the determinants of Cramer: the responses of the basis are far
+/// from dependent.
+fn solved(a: [[f64; GAINS]; GAINS], b: [f64; GAINS]) -> [f64; GAINS] {
+    let determinant = |m: &[[f64; GAINS]; GAINS]| {
+        m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])
+            + m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0])
+    };
+    let whole = determinant(&a);
+    std::array::from_fn(|j| {
+        let mut with = a;
+        for (row, b) in with.iter_mut().zip(b) {
+            row[j] = b;
+        }
+        determinant(&with) / whole
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_core::adaptive::defaults;
+    use hoid_model::{FamilyOperator, Form, uncertainty::variance_along};
+
+    use super::*;
+    use crate::{Method, TrackOptions, Tracker};
+
+    /// A fit of a form with errors of some percent that go together.
+    fn fitted(form: Form, x: &[f64]) -> FittedOperator {
+        let p = x.len();
+        let size = |i: usize| 0.03 * x[i].abs().max(0.3);
+        FittedOperator {
+            operator: FamilyOperator::new(form, true, x).unwrap(),
+            covariance: (0..p * p)
+                .map(|k| size(k / p) * size(k % p) * if k / p == k % p { 1.0 } else { 0.2 })
+                .collect(),
+            noise: (vec![0.4], vec![-1.5, 0.56]),
+            innovation_variance: 0.01,
+            sample_time: SampleTime::HUNDREDTH,
+            units: [String::new(), String::new()],
+            source: "fit.json".to_owned(),
+        }
+    }
+
+    fn tracker(fit: FittedOperator) -> Result<Tracker, IdentError> {
+        let mut options = TrackOptions::default_for(Method::adaptive(), 21);
+        options.method.start_from(fit).unwrap();
+        Tracker::new(&options, None, SampleTime::HUNDREDTH)
+    }
+
+    /// Before the first sample gain and phase are those of the fit, with its errors.
+    #[test]
+    fn the_estimate_begins_at_the_fit_with_its_errors() {
+        for (form, x, near) in [
+            (Form::Lead, vec![2.0, 0.4, 2.3, -1.2, 0.18], 0.001),
+            (Form::LeadLag, vec![1.4, 0.5, 0.25, 2.4, -1.4, 0.153], 0.01),
+            (Form::Lead2Lag, vec![1.4, 0.3, 0.4, 2.4, -1.4, 0.2], 0.01),
+            // Hardly a lag: the basis has the longest that it may have.
+            (Form::LeadLag, vec![1.4, 0.5, 0.02, 2.4, -1.4, 0.2], 0.15),
+            (Form::Lag, vec![1.4, 5.0, 2.4, -1.4, 0.2], 0.01),
+        ] {
+            let fit = fitted(form, &x);
+            let told = tracker(fit.clone()).unwrap();
+            for omega in [0.5, 1.0, 2.5, 5.0] {
+                let expected = fit.operator.response_and_gradient(omega);
+                let half = 0.005 * omega;
+                let value = expected.value * Complex64::from_polar(half.sin() / half, -half);
+                let response = told.response(omega).unwrap();
+                let [re, im] = response.value;
+                let off = (Complex64::new(re, im) - value).norm() / value.norm();
+                assert!(off < near, "{form} {omega}: {off}");
+                let relative: Vec<Complex64> = expected.gradient.iter().map(|g| g / expected.value).collect();
+                let along = |part: fn(&Complex64) -> f64| {
+                    let gradient: Vec<f64> = relative.iter().map(part).collect();
+                    variance_along(&gradient, &fit.covariance).sqrt()
+                };
+                let db = 20.0 / std::f64::consts::LN_10;
+                for (found, expected) in [
+                    (response.gain_db(), db * along(|r| r.re)),
+                    (response.phase_deg(), along(|r| r.im).to_degrees()),
+                ] {
+                    let ratio = found.standard_error.unwrap() / expected;
+                    // A lag that is not known is a phase that is not known, which the gains cannot report at low
+                    // frequencies, where it is small compared with the gain's; elsewhere they carry a little more
+                    // information.
+                    assert!((ratio > 0.9 || omega < 1.0) && ratio < 1.5, "{form} {omega}: {ratio}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_form_that_has_no_place_is_refused() {
+        let none = fitted(Form::LeadDroop, &[1.4, 0.9, 6.0, 2.4, -1.4, 0.2]);
+        let refused = tracker(none).err().map(|e| e.to_string());
+        assert!(refused.is_none_or(|words| words.contains("--form")));
+        let mut still = fitted(Form::LeadLag, &[1.4, 0.5, 0.25, 2.4, -1.4, 0.153]);
+        still.operator = FamilyOperator::new(Form::LeadLag, false, &[1.4, 0.5, 0.25, 0.153]).unwrap();
+        still.covariance = vec![0.0; 16];
+        let words = tracker(still).unwrap_err().to_string();
+        assert!(words.contains("--neuromuscular yes"), "{words}");
+        let other = FittedOperator {
+            sample_time: SampleTime::new(0.02).unwrap(),
+            ..fitted(Form::Lead, &[2.0, 0.4, 2.3, -1.2, 0.18])
+        };
+        assert!(tracker(other).unwrap_err().to_string().contains("50.000000 Hz"));
+        assert!(
+            Method::rpem()
+                .start_from(fitted(Form::Lead, &[2.0, 0.4, 2.3, -1.2, 0.18]))
+                .is_err()
+        );
+    }
+
+    #[test]
+    fn the_remnant_of_a_fit_is_summed() {
+        // An autoregression of order 1 with the pole .8: .8^k/(1 - .64).
+        let fit = FittedOperator {
+            noise: (Vec::new(), vec![-0.8]),
+            ..fitted(Form::Lead, &[2.0, 0.4, 2.3, -1.2, 0.18])
+        };
+        let lags = remnant(&fit, SampleTime::HUNDREDTH).unwrap();
+        for (k, lag) in lags.iter().enumerate() {
+            assert!((lag - 0.8_f64.powi(k as i32) / 0.36).abs() < 1e-9);
+        }
+        let endless = FittedOperator {
+            noise: (Vec::new(), vec![-1.0]),
+            ..fit
+        };
+        assert!(remnant(&endless, SampleTime::HUNDREDTH).is_none());
+    }
+
+    #[test]
+    fn what_is_named_moves_the_basis_and_the_rest_stays_usual() {
+        let named = Method::adaptive()
+            .with("prior", "omega_nm=9:0.2,tau_e=0.25:0.1")
+            .unwrap();
+        let prior = named.person_prior().unwrap();
+        let found = StartingPoint::of(prior, 0.205, false, SampleTime::HUNDREDTH).unwrap();
+        assert_eq!(
+            (found.point.omega, found.point.zeta, found.point.lag),
+            (9.0, defaults::ZETA, LAG_S)
+        );
+        assert!((found.point.tau - 0.255).abs() < 1e-12);
+        assert_eq!(found.spread, [0.2, defaults::SPREAD[1], 0.025]);
+        let wide = StartingPoint::of(&PersonPrior::Nothing, 0.205, false, SampleTime::HUNDREDTH).unwrap();
+        assert!(wide.spread.iter().zip(defaults::SPREAD).all(|(a, b)| *a > b));
+    }
+}

@@ -1,0 +1,68 @@
+//! Three gains of a nominal person as a random walk, after a whitening filter: recursive least
+//! squares with a population basis (R. E. Kalman, J. Basic Engineering 82 (1960) 35-45; L. Ljung,
+//! *System Identification*, 1999, section 11.6).
+//!
+//! The gains drift by a tenth of the response at 2 rad/s in a root second; innovations are limited
+//! at 3.5 standard deviations. Nothing is declared.
+
+use super::{
+    super::entrant::{Entrant, EntrantResult, Task},
+    basis::{GAINS, product, reported, whitened, worth},
+};
+
+const DRIFT: f64 = 0.1;
+const DRIFT_AT_RAD_S: f64 = 2.0;
+const LIMIT: f64 = 3.5;
+/// Memory of the innovation variance, s.
+const MEMORY_S: f64 = 20.0;
+
+pub(super) struct Kalman;
+
+impl Entrant for Kalman {
+    fn name(&self) -> String {
+        "basis-kalman".to_owned()
+    }
+
+    fn follow(&self, task: &Task) -> Result<EntrantResult, String> {
+        let run = whitened(task)?;
+        let (mut theta, mut p, mut variance) = (run.theta, run.covariance, run.variance);
+        let worth = worth(task, DRIFT_AT_RAD_S);
+        let response = worth
+            .iter()
+            .zip(&theta)
+            .map(|(g, t)| g * t)
+            .sum::<hoid_model::Complex64>();
+        let drift: [f64; GAINS] = std::array::from_fn(|i| match worth[i].norm() {
+            0.0 => (DRIFT * run.size_u).powi(2) * run.every_s,
+            size => (DRIFT * response.norm() / size).powi(2) * run.every_s,
+        });
+        let forgets = 1.0 - (-run.every_s / MEMORY_S).exp();
+        let mut answer = EntrantResult::default();
+        for sample in &run.samples {
+            while (task.asked_s.get(answer.said.len())).is_some_and(|t| *t < sample.t_s) {
+                answer.said.push(reported(task, &theta, &p));
+            }
+            if sample.is_void || sample.t_s < task.start_s.1 {
+                continue;
+            }
+            (0..GAINS).for_each(|i| p[i][i] += drift[i]);
+            let px: [f64; GAINS] = std::array::from_fn(|i| product(&p[i], &sample.x));
+            let expected = product(&px, &sample.x) + variance;
+            let bound = LIMIT * expected.sqrt();
+            let innovation = (sample.y - product(&theta, &sample.x)).clamp(-bound, bound);
+            for i in 0..GAINS {
+                theta[i] += px[i] * innovation / expected;
+            }
+            for i in 0..GAINS {
+                for j in 0..GAINS {
+                    p[i][j] -= px[i] * px[j] / expected;
+                }
+            }
+            variance += forgets * variance * (innovation * innovation / expected - 1.0);
+        }
+        answer
+            .said
+            .resize_with(task.asked_s.len(), || reported(task, &theta, &p));
+        Ok(answer)
+    }
+}
