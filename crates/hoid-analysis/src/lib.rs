@@ -20,6 +20,7 @@
 //! | the fit, a second opinion, the loop, the settings of the estimator | `estimators`: a file each |
 //! | what the recordings show | `identified`, `recordings` |
 //! | what each answer is worth, and the verdict on those that were requested | `answers` |
+//! | polynomials with several inputs | `several_inputs` |
 //! | a describing function, from recordings to its verdict | `describing` |
 //! | a recursion over a recording, from it to the verdict | `tracking` |
 //! | the level of u, the settings that all share | `level`, `settings` |
@@ -64,6 +65,7 @@ pub mod registry;
 mod repair;
 mod request;
 mod settings;
+mod several_inputs;
 mod tracking;
 
 pub use answers::{Answered, Answers};
@@ -82,5 +84,6 @@ pub use rate::kept_rate;
 pub use reading::Reading;
 pub use recordings::{Account, Recordings};
 pub use request::{Request, ResolvedRequest};
+pub use several_inputs::{SeveralInputsResult, several_inputs};
 pub use settings::Setting;
 pub use tracking::{Tracked, Tracking, plan_of, relative_errors, settings_of_recursion};

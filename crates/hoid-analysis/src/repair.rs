@@ -10,6 +10,8 @@ use crate::{
     recordings::{Account, Recordings},
 };
 
+/// Shortest piece between two faults that is used, s: a few seconds determine no operator.
+const SHORTEST_PIECE_S: f64 = 4.0;
 /// Largest number of values of an input that steps.
 const MOST_LEVELS: usize = 16;
 
@@ -42,6 +44,17 @@ impl Recordings {
             let whole = found.segments.len() == 1 && found.segments[0].len() == record.len();
             let mut findings = found.findings;
             findings.extend(findings_of_quality(&account, &record, of));
+            let ts_s = record.sample_time().s();
+            let longest = found.segments.iter().map(Record::len).max().unwrap_or(0);
+            let is_short = |piece: &Record| piece.len() < longest && (piece.len() as f64) * ts_s < SHORTEST_PIECE_S;
+            if of == Of::Person && found.segments.iter().any(is_short) {
+                let left: f64 = found.segments.iter().filter(|piece| is_short(piece)).map(|p| p.len() as f64 * ts_s).sum();
+                found.segments.retain(|piece| !is_short(piece));
+                findings.push(Finding::note(
+                    "short-piece",
+                    format!("pieces between faults that are shorter than {SHORTEST_PIECE_S} s were left out: {left:.1} s"),
+                ));
+            }
             let mut account = Account {
                 faults: found.faults,
                 findings,

@@ -56,6 +56,7 @@
 //! | [`Fit`] | the model, its covariance and criteria; prediction, simulation, frequency response, poles and margins |
 //! | [`validation`] | VAF, NRMSE, residual tests |
 //! | [`order_selection`] | ranges of orders and delay, criteria, the chosen model |
+//! | [`several_inputs`] | polynomial models with several inputs |
 //! | [`iv`] | instrumental variables, in open and closed loop |
 //! | [`family`] | operators of recorded people: form, parameters, errors that hold, a verdict |
 //! | [`grey_box`] | the fit in physical parameters: operator with a real delay, remnant filter |
@@ -102,6 +103,7 @@ mod pem;
 pub mod progress;
 mod searched_delay;
 pub mod settings;
+pub mod several_inputs;
 pub mod shared_options;
 mod sigmoid;
 mod summary;

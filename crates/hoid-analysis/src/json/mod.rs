@@ -35,6 +35,7 @@ use hoid_model::{
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
+pub(crate) use operator::response;
 pub use polynomials::{PolynomialAnswer, of_family};
 pub use result::{BatchAnswer, BatchResult};
 pub use trace::{change, open_loop, responses, track_fault, tracked_operator};

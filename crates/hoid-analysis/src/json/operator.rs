@@ -145,7 +145,7 @@ fn channels(found: &Identified) -> Value {
 }
 
 /// Gain and phase with their errors, as those of the lines of a describing function.
-fn response(points: &[ResponsePoint]) -> Value {
+pub(crate) fn response(points: &[ResponsePoint]) -> Value {
     let one = |p: &ResponsePoint| {
         json!({
             "omega_rad_s": number(p.omega_rad_s),

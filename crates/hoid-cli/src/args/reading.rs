@@ -51,6 +51,17 @@ pub struct ReadArgs {
     pub detrend: Detrend,
 }
 
+impl ReadArgs {
+    /// The same with the first input alone: further ones are channels of the record, which it has anyway.
+    pub fn with_one_input(&self) -> Self {
+        Self {
+            inputs: self.inputs[..1].to_vec(),
+            ..self.clone()
+        }
+    }
+}
+
+
 /// Treatment of a record before it is used, in this order.
 #[derive(Debug, Clone, Args)]
 pub struct PrepareArgs {

@@ -87,7 +87,7 @@ impl NoiseProducts {
 /// Start of an ARMA noise model, `[c.., d..]`: with the innovations of a long autoregression, v is
 /// regressed on its own past and on theirs (E. J. Hannan and J. Rissanen, *Biometrika* 69 (1982)
 /// 81-94). A C that is not invertible is drawn in, `c_k rho^k`.
-pub(super) fn hannan_rissanen(series: &[Vec<f64>], (nc, nd): (usize, usize), long: usize) -> Option<Vec<f64>> {
+pub(crate) fn hannan_rissanen(series: &[Vec<f64>], (nc, nd): (usize, usize), long: usize) -> Option<Vec<f64>> {
     let d = NoiseProducts::new(series, long).fit(long)?.d;
     let q = nc + nd;
     let mut products = Gram::new(q + 1);

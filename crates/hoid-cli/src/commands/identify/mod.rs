@@ -4,6 +4,7 @@ mod family;
 mod family_form;
 mod request;
 mod run;
+mod several;
 mod sigmoid;
 
 pub use run::run;

@@ -15,26 +15,26 @@ use hoid::model::{GainUnit, Record};
 use hoid::report::{FitSummary, ModelSection, Report, known_operator, model_figure, model_picture, write_report};
 use serde_json::Value;
 
-use super::{family, request, sigmoid};
+use super::{family, request, several, sigmoid};
 use crate::{
-    args::{IdentifyArgs, ReadArgs},
+    args::IdentifyArgs,
     commands::{figure, output_paths, paper_table, reading},
     error::CliError,
     family_operator, json, output, text,
 };
 
 pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
+    if let Some(structure) = several::structure(args) {
+        check_places(args)?;
+        return several::run(args, structure);
+    }
     let asked = request::asked(args)?;
     check_places(args)?;
     paper_table::check(&args.show)?;
     if let Some(path) = &args.picture.figure {
         figure::check(path)?;
     }
-    // Inputs beside the first are channels of the record, which it has anyway.
-    let first = ReadArgs {
-        inputs: args.read.inputs[..1].to_vec(),
-        ..args.read.clone()
-    };
+    let first = args.read.with_one_input();
     let reading = reading::of(&first, Some(&args.mask), asked.has_input())?;
     let read = reading.files(&args.records, reading::told)?;
     let (rate, counts) = (args.read.prepare.rate.decimate, asked.counts_samples());

@@ -1,0 +1,196 @@
+//! Polynomial models with several inputs: from texts and recordings to a result and its verdict.
+//!
+//! Orders have one number for all inputs (`nb=2`), or one for each (`nb=2,3`), as nk has.
+
+use hoid_ident::{
+    IdentError,
+    several_inputs::{InputOrders, SeveralInputs, SeveralInputsFit},
+};
+use hoid_model::{Decimation, FaultHandling, Finding, Structure, Verdict};
+use serde_json::{Map, Value, json};
+
+use crate::{
+    AnalysisError,
+    json::{envelope, number, optional, termination},
+    quality::Of,
+    recordings::Recordings,
+    settings::Setting,
+};
+
+/// Frequencies of the responses, as a share of the Nyquist frequency.
+const RESPONSE_AT: [f64; 12] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.035, 0.05, 0.1, 0.2, 0.35, 0.5, 0.9];
+/// Standard errors from zero of a coefficient that is determined.
+const LEAST_ERRORS: f64 = 2.0;
+
+/// A fit with several inputs, and its verdict.
+#[derive(Debug, Clone)]
+pub struct SeveralInputsResult {
+    /// The fit.
+    pub fit: SeveralInputsFit,
+    /// Its verdict.
+    pub verdict: Verdict,
+    /// The recordings as they were fitted.
+    pub data: Recordings,
+}
+
+/// The model of a structure with these orders, `na=2,nb=2,3`, and delays, `29,12`, for these inputs.
+///
+/// # Errors
+/// [`AnalysisError::Options`] for orders without meaning.
+pub fn several_inputs(
+    structure: Structure,
+    orders: &str,
+    nk: Option<&str>,
+    inputs: &[String],
+) -> Result<SeveralInputs, AnalysisError> {
+    let options = |reason: String| AnalysisError::Options { reason };
+    let number = |name: &str, text: &str| {
+        text.trim().parse::<usize>().map_err(|_| {
+            options(format!("orders: {name} is {text:?}, expected a number for each input, as nb=2,3"))
+        })
+    };
+    let mut named: Vec<(String, Vec<usize>)> = Vec::new();
+    for part in orders.split(',').map(str::trim).filter(|part| !part.is_empty()) {
+        match (part.split_once('='), named.last_mut()) {
+            (Some((name, value)), _) => named.push((name.trim().to_owned(), vec![number(name, value)?])),
+            (None, Some((name, values))) => values.push(number(name, part)?),
+            (None, None) => return Err(options(format!("orders: found {part:?}, expected NAME=NUMBER, as na=2,nb=2,3"))),
+        }
+    }
+    if let Some(text) = nk {
+        let values = text.split(',').map(|value| number("nk", value)).collect::<Result<_, _>>()?;
+        named.push(("nk".to_owned(), values));
+    }
+    let count = inputs.len();
+    let all = |name: &str| named.iter().find(|(known, _)| known == name).map(|(_, values)| values.as_slice());
+    if let Some((name, _)) = named.iter().find(|(name, _)| !["na", "nb", "nc", "nd", "nf", "nk"].contains(&name.as_str())) {
+        return Err(options(format!("orders: there is no order {name}; expected na, nb, nc, nd, nf, nk")));
+    }
+    let each = |name: &str, default: usize| match all(name) {
+        None => Ok(vec![default; count]),
+        Some([one]) => Ok(vec![*one; count]),
+        Some(values) if values.len() == count => Ok(values.to_vec()),
+        Some(values) => Err(options(format!(
+            "orders: {name} has {} numbers for {count} inputs; give one for all, or one for each",
+            values.len()
+        ))),
+    };
+    let one = |name: &str, default: usize| match all(name) {
+        None => Ok(default),
+        Some([one]) => Ok(*one),
+        Some(values) => Err(options(format!("orders: {name} has {} numbers, expected one", values.len()))),
+    };
+    let default = structure.operator_orders(1);
+    let (nb, nf, nk) = (each("nb", default.nb)?, each("nf", default.nf)?, each("nk", default.nk)?);
+    let model = SeveralInputs {
+        na: one("na", default.na)?,
+        nc: one("nc", default.nc)?,
+        nd: one("nd", default.nd)?,
+        inputs: (inputs.iter().enumerate())
+            .map(|(i, name)| (name.clone(), InputOrders { nb: nb[i], nf: nf[i], nk: nk[i] }))
+            .collect(),
+        ..SeveralInputs::new(structure)
+    };
+    model.check()?;
+    Ok(model)
+}
+
+impl SeveralInputsResult {
+    /// Repairs the recordings, fits, and forms the verdict.
+    ///
+    /// # Errors
+    /// [`AnalysisError`] where there is no result.
+    pub fn of(
+        model: &SeveralInputs,
+        recordings: Recordings,
+        faults: FaultHandling,
+        rate: Decimation,
+    ) -> Result<Self, AnalysisError> {
+        if recordings.is_empty() {
+            return Err(AnalysisError::NoRecordings);
+        }
+        let data = recordings.repaired(faults, Of::System)?.at_rate(rate, true)?;
+        // A piece of a recording that a fault has cut short determines nothing, and does not stop the fit.
+        let fit = match model.fit(&data.records) {
+            Err(IdentError::TooFewSamples { .. }) if data.len() > 1 => {
+                let longest = data.records.iter().map(hoid_model::Record::len).max().unwrap_or(0);
+                let records: Vec<_> = data.records.iter().filter(|r| 2 * r.len() >= longest).cloned().collect();
+                model.fit(&records)?
+            }
+            other => other?,
+        };
+        let mut findings = Vec::new();
+        if !fit.termination.converged() {
+            findings.push(Finding::doubt("not-converged", format!("the search did not converge: {}", fit.termination)));
+        }
+        if fit.covariance().is_none() {
+            let message = "the data leave a combination of coefficients open: there are no error bars";
+            findings.push(Finding::undetermined("singular", message));
+        }
+        for (name, _) in &model.inputs {
+            let own = format!("[{name}]");
+            let gains = fit.parameters().into_iter().filter(|(p, _)| p.starts_with('b') && p.ends_with(&own));
+            let open = |e: &hoid_model::uncertainty::Estimate| {
+                e.standard_error.is_some_and(|s| e.value.abs() < LEAST_ERRORS * s)
+            };
+            if gains.clone().count() > 0 && gains.clone().all(|(_, e)| open(&e)) {
+                findings.push(Finding::doubt(
+                    "undetermined-input",
+                    format!("no coefficient of {name} differs from zero by two standard errors: a response to it is not determined"),
+                ));
+            }
+        }
+        let verdict = data.judged(Verdict::of(findings));
+        Ok(Self { fit, verdict, data })
+    }
+
+    /// The result as a JSON object.
+    pub fn json(&self) -> Map<String, Value> {
+        let (fit, data) = (&self.fit, &self.data);
+        let model = &fit.model;
+        let settings = [Setting::new("structure", model.structure.name().to_owned())];
+        let mut map = envelope("polynomial", &data.names, &data.records, &data.accounts, &self.verdict, &settings);
+        let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
+        let of_inputs = |of: fn(&InputOrders) -> usize| model.inputs.iter().map(|(_, o)| of(o)).collect::<Vec<_>>();
+        set("structure", json!(model.structure.name()));
+        set(
+            "orders",
+            json!({
+                "na": model.na, "nb": of_inputs(|o| o.nb), "nc": model.nc, "nd": model.nd,
+                "nf": of_inputs(|o| o.nf), "nk": of_inputs(|o| o.nk),
+            }),
+        );
+        let parameters = fit.parameters();
+        let coefficient = |(name, e): &(String, hoid_model::uncertainty::Estimate)| {
+            json!({"name": name, "value": number(e.value), "standard_error": optional(e.standard_error)})
+        };
+        set("parameters", parameters.iter().map(coefficient).collect());
+        set("loss", number(fit.loss));
+        set("innovation_variance", number(fit.innovation_variance));
+        set("residuals", json!(fit.residuals));
+        set("termination", termination(&fit.termination));
+        set("fit", json!({"vaf_prediction": number(fit.vaf_prediction), "aic": number(fit.aic())}));
+        let nyquist = fit.sample_time.nyquist_rad_s();
+        let omega: Vec<f64> = RESPONSE_AT.iter().map(|share| share * nyquist).collect();
+        let channel = |(k, (name, _)): (usize, &(String, InputOrders))| {
+            let own = format!("[{name}]");
+            let own = parameters.iter().filter(|(p, _)| p.ends_with(&own));
+            json!({
+                "input": name,
+                "role": if k == 0 { "feedback" } else { "feedforward" },
+                "form": Value::Null,
+                "parameters": own.map(coefficient).collect::<Vec<_>>(),
+                "response": crate::json::response(&fit.frequency_response(k, &omega)),
+            })
+        };
+        set("channels", model.inputs.iter().enumerate().map(channel).collect());
+        set(
+            "covariance",
+            fit.covariance().map_or(Value::Null, |c| {
+                let rows = c.chunks(parameters.len());
+                rows.map(|row| row.iter().map(|v| number(*v)).collect::<Vec<_>>()).collect::<Vec<_>>().into()
+            }),
+        );
+        map
+    }
+}

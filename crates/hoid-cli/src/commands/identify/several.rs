@@ -1,0 +1,76 @@
+//! `hoid identify` of polynomials with several inputs.
+
+use hoid::analysis::{Recordings, SeveralInputsResult, several_inputs};
+use hoid::model::Structure;
+use serde_json::Value;
+
+use crate::{
+    args::IdentifyArgs,
+    commands::{paper_table, reading},
+    error::CliError,
+    json, output, text,
+};
+
+/// Options that have a meaning for them.
+const OPTIONS: [&str; 3] = ["orders", "nk", "role"];
+
+/// The structure, where polynomials with several inputs are requested.
+pub fn structure(args: &IdentifyArgs) -> Option<Structure> {
+    let name = args.structure.as_deref()?.trim().to_ascii_lowercase();
+    (args.read.inputs.len() > 1).then(|| name.parse().ok()).flatten()
+}
+
+pub fn run(args: &IdentifyArgs, structure: Structure) -> Result<(), CliError> {
+    if let Some((name, _)) = args.options.given().find(|(name, _)| !OPTIONS.contains(name)) {
+        return Err(CliError::Usage(format!(
+            "--{} does not belong to polynomials with several inputs: they take --orders and --nk",
+            name.replace('_', "-")
+        )));
+    }
+    let others = [
+        (args.picture.figure.is_some(), "--figure"),
+        (args.report.is_some(), "--report"),
+        (args.validate.is_some(), "--validate"),
+        (args.horizon.is_some(), "--horizon"),
+        (args.trace.is_some(), "--trace"),
+    ];
+    if let Some((_, option)) = others.into_iter().find(|(given, _)| *given) {
+        return Err(CliError::Usage(format!("{option} belongs to a model with one input")));
+    }
+    let text = |name: &str| args.options.text(name);
+    let model = several_inputs(structure, text("orders").unwrap_or_default(), text("nk"), &args.read.inputs)
+        .map_err(CliError::of_options)?;
+    paper_table::check(&args.show)?;
+    let first = args.read.with_one_input();
+    let read: Recordings = reading::of(&first, Some(&args.mask), true)?.files(&args.records, reading::told)?;
+    let rate = args.read.prepare.rate.decimate;
+    let found = output::watched("fitting", || SeveralInputsResult::of(&model, read, args.faults.faults, rate))?;
+    paper_table::write(&args.show, || Ok(found.json()))?;
+    if args.show.json {
+        json::print(&Value::Object(found.json()))?;
+    } else {
+        output::show(&page(&found))?;
+    }
+    CliError::of_verdict(&found.verdict)
+}
+
+fn page(found: &SeveralInputsResult) -> String {
+    let fit = &found.fit;
+    let mut page = text::verdict(&found.verdict);
+    let inputs: Vec<&str> = fit.model.inputs.iter().map(|(name, _)| name.as_str()).collect();
+    page.push_str(&format!("{} with the inputs {}\n", fit.model.structure.label(), inputs.join(", ")));
+    let rows = fit.parameters().into_iter().map(|(name, e)| (name, String::new(), e));
+    let rows: Vec<_> = rows.collect();
+    let table = text::estimates("coefficient", rows.iter().map(|(name, unit, e)| (name.as_str(), unit.clone(), *e)));
+    page.push_str(&format!("{table}\n"));
+    page.push_str(&format!(
+        "Fit: VAF of the prediction {:.2} %, loss {}, {} residuals. Search: {}.\n",
+        fit.vaf_prediction,
+        hoid::report::numbers::plain(fit.loss),
+        fit.residuals,
+        fit.termination
+    ));
+    let data = &found.data;
+    page.push_str(&text::records(&data.names, &data.records, &data.accounts, false));
+    page
+}

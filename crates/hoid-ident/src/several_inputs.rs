@@ -1,0 +1,645 @@
+//! Polynomial models with several inputs.
+//!
+//! `A(q) u(t) = sum_i (B_i(q)/F_i(q)) q^-nk_i x_i(t) + (C(q)/D(q)) eps(t)`
+//!
+//! by the prediction error method (L. Ljung, *System Identification*, 1999, section 4.2, eq. 4.35): ARX, FIR, ARMAX, ARARX,
+//! ARARMAX, output error, Box-Jenkins and the general structure, with nb, nf and nk for each input. FIR and ARX are linear in theta and
+//! solved in one step. The others start from an ARX model of high order: the response of each input by itself has hardly any noise,
+//! and its own B and F follow from it as from a record with one input.
+//!
+//! ```
+//! use hoid_ident::several_inputs::{InputOrders, SeveralInputs};
+//! use hoid_model::{Channel, Record, SampleTime, Structure};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let e: Vec<f64> = (0..400).map(|t| (0.3 * f64::from(t)).sin() + (0.7 * f64::from(t * t)).cos()).collect();
+//! let r: Vec<f64> = (0..400).map(|t| (0.9 * f64::from(t * t)).sin()).collect();
+//! let mut u = vec![0.0; 400];
+//! for t in 3..400 {
+//!     u[t] = 0.8 * u[t - 1] + 0.5 * e[t - 2] + 0.2 * r[t - 1] - 0.1 * r[t - 2];
+//! }
+//! let record = Record::new(SampleTime::HUNDREDTH, Channel::new("e", "", e), Channel::new("u", "", u))?
+//!     .with_channel(Channel::new("r", "", r))?;
+//! let fit = SeveralInputs {
+//!     na: 1,
+//!     inputs: vec![
+//!         ("e".to_owned(), InputOrders { nb: 1, nf: 0, nk: 2 }),
+//!         ("r".to_owned(), InputOrders { nb: 2, nf: 0, nk: 1 }),
+//!     ],
+//!     ..SeveralInputs::new(Structure::Arx)
+//! }
+//! .fit(&[record])?;
+//! let b0_of_r = fit.parameters().into_iter().find(|(name, _)| name == "b0[r]").unwrap().1;
+//! assert!((b0_of_r.value - 0.2).abs() < 1e-10);
+//! # Ok(())
+//! # }
+//! ```
+
+use hoid_core::filter::{divide_in_place, fir};
+use hoid_model::{
+    Channel, Complex64, Orders, Record, SampleTime, Structure, polynomial,
+    uncertainty::{Estimate, variance_along},
+};
+
+pub use crate::criterion::further::InputOrders;
+use crate::{
+    Estimator, IdentError, InitialState, Reason, ResponsePoint, SearchOptions, Termination,
+    criterion::{Criterion, Data, Workspace, further::FurtherInput},
+    family::noise::{NoiseProducts, hannan_rissanen},
+    informative_data::{check_degrees_of_freedom, common_sample_time},
+    linalg::least_squares::{add_scaled, solve_symmetric},
+    optimize::{Objective, minimise},
+};
+
+/// Coefficients of A and of each B in the model of high order.
+const HIGH_ORDER: usize = 12;
+/// Relative part of its diagonal that is added to the normal matrix of the model of high order.
+const RIDGE: f64 = 1e-8;
+/// Order of the autoregression that gives the innovations for the start of C.
+const LONG: usize = 24;
+
+/// A model with several inputs, and how it is estimated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SeveralInputs {
+    /// The structure; one with an input.
+    pub structure: Structure,
+    /// Coefficients of A.
+    pub na: usize,
+    /// Coefficients of C.
+    pub nc: usize,
+    /// Coefficients of D.
+    pub nd: usize,
+    /// Name and orders of each input. The first is the input of the records, the others are channels of them.
+    pub inputs: Vec<(String, InputOrders)>,
+    /// Initial states: estimated (the default) or zero.
+    pub initial_state: InitialState,
+    /// Whether each record has a constant of u that is estimated as its initial states are. Default true.
+    pub level: bool,
+    /// Limits of the search.
+    pub search: SearchOptions,
+}
+
+/// The result of [`SeveralInputs::fit`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct SeveralInputsFit {
+    /// What was fitted.
+    pub model: SeveralInputs,
+    theta: Vec<f64>,
+    covariance: Option<Vec<f64>>,
+    /// Loss `V = sum eps^2/n`.
+    pub loss: f64,
+    /// Unbiased innovation variance.
+    pub innovation_variance: f64,
+    /// Number n of residuals.
+    pub residuals: usize,
+    /// How the search ended.
+    pub termination: Termination,
+    /// VAF of the one-step-ahead prediction, %.
+    pub vaf_prediction: f64,
+    /// Time between two samples.
+    pub sample_time: SampleTime,
+}
+
+impl SeveralInputs {
+    /// A structure without orders and inputs.
+    pub fn new(structure: Structure) -> Self {
+        Self {
+            structure,
+            na: 0,
+            nc: 0,
+            nd: 0,
+            inputs: Vec::new(),
+            initial_state: InitialState::Estimate,
+            level: true,
+            search: SearchOptions::default(),
+        }
+    }
+
+    fn refuse<T>(option: &str, found: impl ToString, expected: impl ToString) -> Result<T, IdentError> {
+        Err(IdentError::BadOption {
+            option: option.to_owned(),
+            found: found.to_string(),
+            expected: expected.to_string(),
+        })
+    }
+
+    /// The orders of A, C, D, and of the first input.
+    fn orders(&self) -> Orders {
+        let first = self.inputs.first().map_or_else(InputOrders::default, |(_, orders)| *orders);
+        Orders {
+            na: self.na,
+            nb: first.nb,
+            nc: self.nc,
+            nd: self.nd,
+            nf: first.nf,
+            nk: first.nk,
+        }
+    }
+
+    /// Checks structure, orders and inputs against each other.
+    ///
+    /// # Errors
+    /// [`IdentError`] that names what is wrong.
+    pub fn check(&self) -> Result<(), IdentError> {
+        if !self.structure.has_input() {
+            return Self::refuse("the structure", self.structure, "one with inputs");
+        }
+        if self.inputs.is_empty() {
+            return Self::refuse("the inputs", "none", "at least one, with its orders");
+        }
+        if self.initial_state == InitialState::Backcast {
+            return Self::refuse("the initial states", "backcast", "estimate or zero for several inputs");
+        }
+        for (k, (name, orders)) in self.inputs.iter().enumerate() {
+            if self.inputs[..k].iter().any(|(other, _)| other == name) {
+                return Self::refuse("the inputs", format!("{name} twice"), "each input once");
+            }
+            Orders {
+                nb: orders.nb,
+                nf: orders.nf,
+                nk: orders.nk,
+                ..self.orders()
+            }
+            .check(self.structure)?;
+        }
+        Ok(())
+    }
+
+    /// Fits one model to all records.
+    ///
+    /// # Errors
+    /// [`IdentError`] for orders, inputs or records without meaning, and where there is no minimum.
+    pub fn fit(&self, records: &[Record]) -> Result<SeveralInputsFit, IdentError> {
+        self.check()?;
+        let sample_time = common_sample_time(records)?;
+        let criterion = self.criterion(records, self.orders(), |(_, orders)| *orders)?;
+        check_degrees_of_freedom(&criterion, records)?;
+        let mut workspace = Workspace::of_thread();
+        let (theta, termination) = if self.structure.is_linear() {
+            let at = criterion.linearise(&vec![0.0; self.parameters_count()], &mut workspace);
+            let direct = Termination {
+                reason: Reason::Direct,
+                iterations: 0,
+            };
+            (self.refined(&criterion, &at.gram, &at.descent, &mut workspace)?, direct)
+        } else {
+            let start = self.start(records, &mut workspace)?;
+            let found = minimise(&criterion, start, &self.search, None, &mut workspace).ok_or(IdentError::NoFiniteLoss)?;
+            (found.theta, found.termination)
+        };
+        let at = criterion.linearise(&theta, &mut workspace);
+        let n = criterion.residuals();
+        let innovation_variance = at.sum_of_squares / (n - theta.len() - criterion.states()) as f64;
+        let p = theta.len();
+        let mut covariance = Vec::with_capacity(p * p);
+        for i in 0..p {
+            let mut unit = vec![0.0; p];
+            unit[i] = innovation_variance;
+            match solve_symmetric(&at.gram, &unit) {
+                Some(row) => covariance.extend(row),
+                None => break,
+            }
+        }
+        let first = criterion.first;
+        let power: f64 = records.iter().map(|record| spread(&record.output()[first..])).sum();
+        Ok(SeveralInputsFit {
+            model: self.clone(),
+            covariance: (covariance.len() == p * p).then_some(covariance),
+            loss: at.sum_of_squares / n as f64,
+            innovation_variance,
+            residuals: n,
+            termination,
+            vaf_prediction: if power > 0.0 { 100.0 * (1.0 - at.sum_of_squares / power).max(0.0) } else { 0.0 },
+            theta,
+            sample_time,
+        })
+    }
+
+    /// The normal equations with one step of refinement by the residuals themselves.
+    fn refined(
+        &self,
+        criterion: &Criterion<'_>,
+        gram: &[f64],
+        descent: &[f64],
+        workspace: &mut Workspace,
+    ) -> Result<Vec<f64>, IdentError> {
+        let singular = || IdentError::SingularRegressors {
+            columns: self.names().join(", "),
+        };
+        let mut theta = solve_symmetric(gram, descent).ok_or_else(singular)?;
+        for _ in 0..2 {
+            let left = criterion.linearise(&theta, workspace).descent;
+            let step = solve_symmetric(gram, &left).ok_or_else(singular)?;
+            add_scaled(&mut theta, 1.0, &step);
+        }
+        Ok(theta)
+    }
+
+    fn parameters_count(&self) -> usize {
+        let of_inputs: usize = self.inputs.iter().map(|(_, o)| o.nb + o.nf).sum();
+        self.na + self.nc + self.nd + of_inputs
+    }
+
+    /// Names of the coefficients in the order of theta: those of A, B, C, D, F with the first input, then B and F of each
+    /// further one.
+    fn names(&self) -> Vec<String> {
+        let own = self.orders().parameter_names();
+        let first = self.inputs.first().map_or("", |(name, _)| name.as_str());
+        let mut all: Vec<String> = (own.into_iter())
+            .map(|coefficient| match coefficient.chars().next() {
+                Some('b' | 'f') => format!("{coefficient}[{first}]"),
+                _ => coefficient,
+            })
+            .collect();
+        for (name, orders) in self.inputs.iter().skip(1) {
+            all.extend((0..orders.nb).map(|i| format!("b{i}[{name}]")));
+            all.extend((1..=orders.nf).map(|i| format!("f{i}[{name}]")));
+        }
+        all
+    }
+
+    /// The criterion of these orders, with those of each input by `of`.
+    fn criterion<'a>(
+        &self,
+        records: &'a [Record],
+        orders: Orders,
+        of: impl Fn(&(String, InputOrders)) -> InputOrders,
+    ) -> Result<Criterion<'a>, IdentError> {
+        let mut further = Vec::with_capacity(self.inputs.len());
+        for input in self.inputs.iter().skip(1) {
+            let values = records.iter().map(|record| channel(record, &input.0)).collect::<Result<_, _>>()?;
+            further.push(FurtherInput {
+                orders: of(input),
+                values,
+            });
+        }
+        let late = further.iter().map(|f| f.orders.first_regressed_sample()).max().unwrap_or(0);
+        let level = self.level && self.initial_state != InitialState::Zero;
+        let data = Data::of(records).into_iter().map(|d| Data { level, ..d });
+        let criterion = Criterion {
+            first: match self.initial_state {
+                InitialState::Zero => 0,
+                _ => orders.first_regressed_sample().max(late) + orders.nd,
+            },
+            further,
+            data: data.collect(),
+            initial: self.initial_state,
+            orders,
+            weights: None,
+        };
+        match records.iter().find(|record| record.len() <= criterion.first) {
+            None => Ok(criterion),
+            Some(short) => Self::refuse(
+                &format!("the samples of record {}", short.label()),
+                short.len(),
+                format!("more than {}, which orders and delays need", criterion.first),
+            ),
+        }
+    }
+
+    /// Theta to start from: B and F of each input by its response in an ARX model of high order, then the noise.
+    fn start(&self, records: &[Record], workspace: &mut Workspace) -> Result<Vec<f64>, IdentError> {
+        let shortest = records.iter().map(Record::len).min().unwrap_or(0);
+        let high = HIGH_ORDER.min(shortest / (4 * (self.inputs.len() + 1))).max(2);
+        let own = |(_, o): &(String, InputOrders)| InputOrders {
+            nb: o.nb + high,
+            nf: 0,
+            nk: o.nk,
+        };
+        let poles = self.na.max(self.inputs.iter().map(|(_, o)| o.nf).max().unwrap_or(0));
+        let first = own(&self.inputs[0]);
+        let orders = Orders {
+            na: poles + high,
+            nb: first.nb,
+            nk: first.nk,
+            ..Orders::default()
+        };
+        let criterion = self.criterion(records, orders, own)?;
+        let counts: Vec<usize> = self.inputs.iter().map(|input| own(input).nb).collect();
+        let p = orders.na + counts.iter().sum::<usize>();
+        let mut at = criterion.linearise(&vec![0.0; p], workspace);
+        (0..p).for_each(|i| at.gram[i * p + i] *= 1.0 + RIDGE);
+        let theta = solve_symmetric(&at.gram, &at.descent).ok_or(IdentError::NoFiniteLoss)?;
+        let a = polynomial::reflected_inside(&theta[..orders.na]).ok_or(IdentError::NoFiniteLoss)?;
+        if self.na > 0 && self.inputs.iter().all(|(_, o)| o.nf == 0) {
+            return self.start_with_a(records, workspace);
+        }
+        let mut from = orders.na;
+        let (mut systems, mut left) = (Vec::new(), outputs(records));
+        for ((name, o), count) in self.inputs.iter().zip(counts) {
+            let b = &theta[from..from + count];
+            from += count;
+            let mut clean = Vec::with_capacity(records.len());
+            for record in records {
+                let x = channel_or_input(record, name, &self.inputs[0].0)?;
+                let mut w = vec![0.0; x.len()];
+                fir(b, o.nk, x, &mut w);
+                divide_in_place(&a, &mut w);
+                clean.push(Record::new(
+                    record.sample_time(),
+                    Channel::new("x", "", x.to_vec()),
+                    Channel::new("w", "", w),
+                )?);
+            }
+            let (structure, alone) = if o.nf == 0 {
+                (Structure::Fir, Orders { nb: o.nb, nk: o.nk, ..Orders::default() })
+            } else {
+                let alone = Orders {
+                    nb: o.nb,
+                    nf: o.nf,
+                    nk: o.nk,
+                    ..Orders::default()
+                };
+                (Structure::OutputError, alone)
+            };
+            let fit = Estimator::new(structure, alone).fit(&clean)?;
+            let (b, f) = fit.model().theta().split_at(o.nb);
+            for (record, left) in clean.iter().zip(&mut left) {
+                let mut w = vec![0.0; left.len()];
+                fir(b, o.nk, record.input(), &mut w);
+                divide_in_place(f, &mut w);
+                add_scaled(left, -1.0, &w);
+            }
+            systems.push((b.to_vec(), f.to_vec()));
+        }
+        for series in &mut left {
+            let mean = series.iter().sum::<f64>() / series.len() as f64;
+            series.iter_mut().for_each(|v| *v -= mean);
+        }
+        let noise = self.noise(&left);
+        Ok(self.theta_of(&vec![0.0; self.na], &systems, &noise))
+    }
+
+    /// The same where A takes the place of the F: an ARX model, and no noise model yet.
+    fn start_with_a(&self, records: &[Record], workspace: &mut Workspace) -> Result<Vec<f64>, IdentError> {
+        let arx = Orders {
+            nc: 0,
+            nd: 0,
+            ..self.orders()
+        };
+        let criterion = self.criterion(records, arx, |(_, o)| *o)?;
+        let p = self.parameters_count() - self.nc - self.nd;
+        let at = criterion.linearise(&vec![0.0; p], workspace);
+        let theta = solve_symmetric(&at.gram, &at.descent).ok_or(IdentError::NoFiniteLoss)?;
+        let (a, mut rest) = theta.split_at(self.na);
+        let mut systems = Vec::new();
+        for (_, o) in &self.inputs {
+            let (b, others) = rest.split_at(o.nb);
+            systems.push((b.to_vec(), Vec::new()));
+            rest = others;
+        }
+        Ok(self.theta_of(a, &systems, &vec![0.0; self.nc + self.nd]))
+    }
+
+    /// C and D for what the inputs leave of u.
+    fn noise(&self, left: &[Vec<f64>]) -> Vec<f64> {
+        let none = || vec![0.0; self.nc + self.nd];
+        if self.nc == 0 {
+            let products = NoiseProducts::new(left, self.nd);
+            return products.fit_up_to(self.nd).map_or_else(none, |found| found.d);
+        }
+        hannan_rissanen(left, (self.nc, self.nd), LONG).unwrap_or_else(none)
+    }
+
+    fn theta_of(&self, a: &[f64], systems: &[(Vec<f64>, Vec<f64>)], noise: &[f64]) -> Vec<f64> {
+        let mut theta = a.to_vec();
+        theta.extend(&systems[0].0);
+        theta.extend(noise);
+        theta.extend(&systems[0].1);
+        for (b, f) in &systems[1..] {
+            theta.extend(b);
+            theta.extend(f);
+        }
+        theta
+    }
+}
+
+fn spread(values: &[f64]) -> f64 {
+    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    values.iter().map(|v| (v - mean) * (v - mean)).sum()
+}
+
+fn outputs(records: &[Record]) -> Vec<Vec<f64>> {
+    records.iter().map(|record| record.output().to_vec()).collect()
+}
+
+fn channel<'r>(record: &'r Record, name: &str) -> Result<&'r [f64], IdentError> {
+    record.channel(name).ok_or_else(|| IdentError::BadOption {
+        option: "the inputs".to_owned(),
+        found: format!("no channel {name} in {}", record.label()),
+        expected: record.channels().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", "),
+    })
+}
+
+/// The first input is that of the record, whatever it is called.
+fn channel_or_input<'r>(record: &'r Record, name: &str, first: &str) -> Result<&'r [f64], IdentError> {
+    if name == first { Ok(record.input()) } else { channel(record, name) }
+}
+
+impl SeveralInputsFit {
+    /// Names and estimates of all coefficients: `a1`, `b0[e]`, `f1[r]`, `c1`, `d1`.
+    pub fn parameters(&self) -> Vec<(String, Estimate)> {
+        let p = self.theta.len();
+        let estimate = |i: usize| match &self.covariance {
+            Some(c) => Estimate::with_variance(self.theta[i], c[i * p + i]),
+            None => Estimate::fixed(self.theta[i]),
+        };
+        let names = self.model.names().into_iter().enumerate();
+        names.map(|(i, name)| (name, estimate(i))).collect()
+    }
+
+    /// Covariance of the coefficients by rows.
+    pub fn covariance(&self) -> Option<&[f64]> {
+        self.covariance.as_deref()
+    }
+
+    /// Akaike's criterion `n ln V + 2 p`.
+    pub fn aic(&self) -> f64 {
+        self.residuals as f64 * self.loss.ln() + 2.0 * self.theta.len() as f64
+    }
+
+    /// Places of A, and of B and F of an input, in theta.
+    fn places(&self, input: usize) -> [std::ops::Range<usize>; 3] {
+        let o = self.model.orders();
+        let a = 0..o.na;
+        if input == 0 {
+            let f = o.na + o.nb + o.nc + o.nd;
+            return [a, o.na..o.na + o.nb, f..f + o.nf];
+        }
+        let mut from = o.parameters();
+        for (_, orders) in &self.model.inputs[1..input] {
+            from += orders.nb + orders.nf;
+        }
+        let own = self.model.inputs[input].1;
+        [a, from..from + own.nb, from + own.nb..from + own.nb + own.nf]
+    }
+
+    /// Gain and phase from an input, by its number, to u at frequencies in rad/s: `B_i/(A F_i) q^-nk_i`.
+    pub fn frequency_response(&self, input: usize, omega_rad_s: &[f64]) -> Vec<ResponsePoint> {
+        let [a, b, f] = self.places(input);
+        let nk = self.model.inputs[input].1.nk;
+        let p = self.theta.len();
+        let point = |&omega: &f64| {
+            let back = |k: usize| Complex64::from_polar(1.0, -omega * self.sample_time.s() * k as f64);
+            let one = Complex64::new(1.0, 0.0);
+            let sum = |places: &std::ops::Range<usize>| -> Complex64 {
+                (1..).zip(places.clone()).map(|(k, i)| self.theta[i] * back(k)).sum()
+            };
+            let (of_a, of_f) = (one + sum(&a), one + sum(&f));
+            let of_b: Complex64 = b.clone().map(|i| self.theta[i] * back(nk + i - b.start)).sum();
+            let response = of_b / (of_a * of_f);
+            // Of ln H.
+            let mut slopes = vec![Complex64::new(0.0, 0.0); p];
+            a.clone().for_each(|i| slopes[i] = -back(i - a.start + 1) / of_a);
+            f.clone().for_each(|i| slopes[i] = -back(i - f.start + 1) / of_f);
+            b.clone().for_each(|i| slopes[i] = back(nk + i - b.start) / of_b);
+            let error = |part: fn(&Complex64) -> f64| {
+                let gradient: Vec<f64> = slopes.iter().map(part).collect();
+                self.covariance.as_ref().map(|c| variance_along(&gradient, c).max(0.0).sqrt())
+            };
+            ResponsePoint {
+                omega_rad_s: omega,
+                magnitude_db: Estimate {
+                    value: 20.0 * response.norm().log10(),
+                    standard_error: error(|z| z.re).map(|e| e * 20.0 / std::f64::consts::LN_10),
+                },
+                phase_deg: Estimate {
+                    value: response.arg().to_degrees(),
+                    standard_error: error(|z| z.im).map(f64::to_degrees),
+                },
+            }
+        };
+        omega_rad_s.iter().map(point).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Random(u64);
+
+    impl Random {
+        fn next(&mut self) -> f64 {
+            self.0 = self
+                .0
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        }
+    }
+
+    /// `u = (.5 + .2 q^-1) q^-2/(1 - .7 q^-1) e + .3 q^-1/(1 - .9 q^-1) r + (1 + .4 q^-1)/(1 - .8 q^-1) eps`.
+    fn record(n: usize, noise: f64, seed: u64) -> Record {
+        let mut random = Random(seed);
+        let mut input = || -> Vec<f64> { (0..n).map(|_| random.next()).collect() };
+        let (e, r, eps) = (input(), input(), input());
+        let (mut w, mut v, mut x, mut u) = (vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        let at = |s: &[f64], t: usize, lag: usize| t.checked_sub(lag).map_or(0.0, |i| s[i]);
+        for t in 0..n {
+            w[t] = 0.7 * at(&w, t, 1) + 0.5 * at(&e, t, 2) + 0.2 * at(&e, t, 3);
+            v[t] = 0.9 * at(&v, t, 1) + 0.3 * at(&r, t, 1);
+            x[t] = 0.8 * at(&x, t, 1) + noise * (eps[t] + 0.4 * at(&eps, t, 1));
+            u[t] = w[t] + v[t] + x[t] + 1.5;
+        }
+        Record::new(SampleTime::HUNDREDTH, Channel::new("e", "", e), Channel::new("u", "", u))
+            .unwrap()
+            .with_channel(Channel::new("r", "", r))
+            .unwrap()
+    }
+
+    fn box_jenkins() -> SeveralInputs {
+        let of = |nb, nf, nk| InputOrders { nb, nf, nk };
+        SeveralInputs {
+            nc: 1,
+            nd: 1,
+            inputs: vec![("e".to_owned(), of(2, 1, 2)), ("r".to_owned(), of(1, 1, 1))],
+            ..SeveralInputs::new(Structure::BoxJenkins)
+        }
+    }
+
+    #[test]
+    fn two_systems_and_their_noise_are_found() {
+        // 40 records: a mean of squared errors over standard errors of one, within 4 of its standard errors.
+        let truth = [0.5, 0.2, 0.4, -0.8, -0.7, 0.3, -0.9];
+        let (mut squares, mut count) = (0.0, 0.0);
+        for seed in 1..=40 {
+            let fit = box_jenkins().fit(&[record(1500, 0.1, seed)]).unwrap();
+            assert!(fit.termination.converged(), "{}", fit.termination);
+            for ((name, estimate), truth) in fit.parameters().iter().zip(truth) {
+                let z = (estimate.value - truth) / estimate.standard_error.unwrap();
+                assert!(z.abs() < 5.0, "{seed} {name} {estimate} {truth}");
+                squares += z * z;
+                count += 1.0;
+            }
+        }
+        let mean: f64 = squares / count;
+        assert!((mean - 1.0).abs() < 4.0 * (2.0_f64 / count).sqrt() + 0.1, "{mean}");
+    }
+
+    #[test]
+    fn without_noise_the_coefficients_are_exact() {
+        let fit = SeveralInputs { nc: 0, nd: 0, ..box_jenkins() };
+        let fit = SeveralInputs { structure: Structure::OutputError, ..fit };
+        let found = fit.fit(&[record(400, 0.0, 3)]).unwrap();
+        for ((name, estimate), truth) in found.parameters().iter().zip([0.5, 0.2, -0.7, 0.3, -0.9]) {
+            assert!((estimate.value - truth).abs() < 1e-8, "{name} {estimate}");
+        }
+        assert!(found.vaf_prediction > 99.999_999);
+    }
+
+    #[test]
+    fn with_one_input_it_is_the_estimator_of_one() {
+        let record = record(600, 0.1, 9);
+        for (structure, na, nc, nd, nf) in [
+            (Structure::Arx, 2, 0, 0, 0),
+            (Structure::Armax, 2, 1, 0, 0),
+            (Structure::BoxJenkins, 0, 1, 2, 2),
+            (Structure::OutputError, 0, 0, 0, 2),
+        ] {
+            let orders = Orders { na, nb: 2, nc, nd, nf, nk: 2 };
+            let one = Estimator { level: true, ..Estimator::new(structure, orders) }.fit(std::slice::from_ref(&record)).unwrap();
+            let several = SeveralInputs {
+                na,
+                nc,
+                nd,
+                inputs: vec![("e".to_owned(), InputOrders { nb: 2, nf, nk: 2 })],
+                ..SeveralInputs::new(structure)
+            };
+            let several = several.fit(std::slice::from_ref(&record)).unwrap();
+            assert!((several.loss / one.loss() - 1.0).abs() < 1e-7, "{structure} {} {}", several.loss, one.loss());
+            for ((name, a), (_, b)) in one.parameters().iter().zip(several.parameters()) {
+                let (s, t) = (a.standard_error.unwrap(), b.standard_error.unwrap());
+                assert!((a.value - b.value).abs() < 1e-3 * s && (s / t - 1.0).abs() < 1e-3, "{structure} {name} {a} {b}");
+            }
+            let omega = [1.0, 7.0, 40.0];
+            for (a, b) in one.frequency_response(&omega).iter().zip(several.frequency_response(0, &omega)) {
+                assert!((a.magnitude_db.value - b.magnitude_db.value).abs() < 1e-3, "{structure}");
+                let (s, t) = (a.phase_deg.standard_error.unwrap(), b.phase_deg.standard_error.unwrap());
+                assert!((s / t - 1.0).abs() < 1e-2, "{structure} {s} {t}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_has_no_meaning_is_refused() {
+        let data = [record(200, 0.1, 1)];
+        let said = |how: SeveralInputs| how.fit(&data).unwrap_err().to_string();
+        let twice = SeveralInputs { inputs: vec![box_jenkins().inputs[0].clone(); 2], ..box_jenkins() };
+        assert!(said(twice).contains("e twice"));
+        let none = SeveralInputs { inputs: Vec::new(), ..box_jenkins() };
+        assert!(said(none).contains("at least one"));
+        let mut unknown = box_jenkins();
+        unknown.inputs[1].0 = "q".to_owned();
+        assert!(said(unknown).contains("no channel q"));
+        assert!(said(SeveralInputs { structure: Structure::Ar, ..box_jenkins() }).contains("one with inputs"));
+        let mut late = box_jenkins();
+        late.inputs[1].1.nk = 400;
+        assert!(!said(late).is_empty());
+        let same = data[0].clone().with_channel(Channel::new("copy", "", data[0].input().to_vec())).unwrap();
+        let mut alike = SeveralInputs { na: 1, nc: 0, nd: 0, ..box_jenkins() };
+        alike.structure = Structure::Arx;
+        alike.inputs = vec![("e".to_owned(), InputOrders { nb: 1, nf: 0, nk: 1 }), ("copy".to_owned(), InputOrders { nb: 1, nf: 0, nk: 1 })];
+        assert!(matches!(alike.fit(&[same]), Err(IdentError::SingularRegressors { .. })));
+    }
+}
