@@ -57,7 +57,7 @@ def test_every_result_has_the_same_envelope(c1: pyhoid.Record) -> None:
 def test_what_is_no_result_is_refused(fit: pyhoid.Fit) -> None:
     text = fit.to_json()
     for wrong in ("", "[1]", "{}", '{"estimator": "pem"}', text[: len(text) // 2]):
-        with pytest.raises(pyhoid.DataError, match="no result of a fit"):
+        with pytest.raises(pyhoid.DataError, match="not a result of a fit"):
             pyhoid.from_json(wrong)
     changed = json.loads(text)
     changed["estimator"] = "operator"

@@ -120,7 +120,7 @@ def test_so_it_is_by_every_estimator(
     if told is not None:
         assert fit.levels[0] is not None and fit.levels[0].value == told["value"]
     if how == "clipped":
-        assert "is at an end of its range" in fit.verdict.reasons[0]
+        assert "is saturated in" in fit.verdict.reasons[0]
         assert "saturated" in [fault["kind"] for fault in fit.faults]
 
 
@@ -154,7 +154,7 @@ def test_a_trace_hears_of_its_channels(
     found = cli.json("track", path, "--out", tmp_path / "trace.csv")
     trace = pyhoid.track(pyhoid.read(path))
     assert trace.verdict.reasons == found["verdict"]["reasons"]
-    assert "is at an end of its range" in trace.verdict.reasons[0]
+    assert "is saturated in" in trace.verdict.reasons[0]
 
 
 def test_two_runs_with_a_stick_at_its_end_are_doubtful(
@@ -165,11 +165,11 @@ def test_two_runs_with_a_stick_at_its_end_are_doubtful(
         pyhoid.write(path, spoilt(record, "clipped"))
     person = pyhoid.identify([pyhoid.read(path) for path in paths])
     assert person.verdict.level == "doubtful"
-    assert "run1: u is at an end of its range" in person.verdict.reasons[0]
+    assert "run1: u is saturated in" in person.verdict.reasons[0]
     same(person, cli.json("identify", *paths), f"{tmp_path}/")
     # Polynomials are of the same recordings.
     fit = pyhoid.identify([pyhoid.read(path) for path in paths], "bj", nk=29, nd=1)
-    assert "is at an end" in fit.verdict.reasons[0]
+    assert "is saturated in" in fit.verdict.reasons[0]
 
 
 def test_a_run_that_is_given_twice_is_refused(runs: list[pyhoid.Record]) -> None:

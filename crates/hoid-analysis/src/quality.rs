@@ -2,7 +2,7 @@
 //!
 //! | finding | where | why |
 //! |---|---|---|
-//! | `stick-at-its-end` | u at an end of its range in more than 5 % of the rows | what the person would have done beyond it is lost: gains and margins are those of the stick |
+//! | `stick-at-its-end` | u at a limit of its range in more than 5 % of the samples | the intended output beyond the limit is unknown: gain and margins are biased |
 //! | `resting-stick` | u comes back to one value, exactly, in 10 % of the samples or more ([`Rest`]) | a dead zone, or control in pulses: a note, as the operator is the linear part of the response |
 //! | `coarse` | e in steps of more than .05, u of more than .15 of its deviation | rounding is not a remnant: intervals and bands are too narrow |
 //! | `bridged` | a gap of more than .25 s on a straight line | the line counts as tracking |
@@ -45,8 +45,7 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
         all.push(Finding::doubt(
             "stick-at-its-end",
             format!(
-                "{output} is at an end of its range in {:.0} % of the rows: what the person would have done beyond it is lost, \
-                 and gain and margins are those of the stick",
+                "{output} is saturated in {:.0} % of the samples: gain and margins are biased",
                 100.0 * at_ends
             ),
         ));

@@ -86,7 +86,7 @@ fn a_stick_at_its_end_is_told_of_files_and_of_records_alike() {
     assert_eq!(words(&of_records), words(&of_files));
     let first = &words(&of_files)[0];
     assert!(
-        first.starts_with("run 1: u is at an end of its range in 28 % of the rows"),
+        first.starts_with("run 1: u is saturated in 28 % of the samples"),
         "{first}"
     );
 }
@@ -295,7 +295,7 @@ fn every_estimator_hears_of_the_recordings() {
             .run(Recordings::of_records([record.clone()]))
             .unwrap();
         let first = found.verdict.reasons().next().unwrap_or_default().to_owned();
-        assert!(first.contains("is at an end of its range"), "{first}");
+        assert!(first.contains("is saturated in"), "{first}");
     }
     let record = clipped(1);
     let polynomials = Polynomials {

@@ -91,7 +91,7 @@ fn the_kind_is_found_and_another_is_refused() {
         "{\"estimator\": \"operator\", \"state\": \"\"}",
     ] {
         let words = BatchResult::from_json(wrong).unwrap_err().to_string();
-        assert!(words.contains("no result of a fit"), "{words}");
+        assert!(words.contains("not a result of a fit"), "{words}");
     }
 }
 

@@ -157,7 +157,7 @@ mod tests {
     use super::*;
 
     fn rows() -> Rows {
-        let mut rows = Rows::under(&["person", "phase margin (deg)", "what is to be reported"]);
+        let mut rows = Rows::under(&["person", "phase margin (deg)", "remark"]);
         rows.add_row(["anna", "13.5 ± 1.9", "at the end of its range"]);
         rows.add_row(["bert", "7 ± 19", ""]);
         rows
@@ -203,7 +203,7 @@ mod tests {
         assert!(
             whole
                 .lines()
-                .any(|l| l.contains("phase margin (deg)") && l.contains("what is to be reported"))
+                .any(|l| l.contains("phase margin (deg)") && l.contains("remark"))
         );
         assert_eq!(rows().on(Some(110)), whole);
         let narrow = rows().on(Some(38));

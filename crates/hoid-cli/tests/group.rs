@@ -262,7 +262,7 @@ fn a_manifest_is_made_from_names_and_mistakes_are_named() {
         at,
         &["group", "init", ".", "--pattern", "{subject}_{condition}_{run}.csv"],
     );
-    assert!(code == 2 && message.contains("there already"), "{message}");
+    assert!(code == 2 && message.contains("already present"), "{message}");
     let (code, message) = bad(at, &["group", "init", ".", "--pattern", "{who}.csv", "--out", "x.toml"]);
     assert!(code == 2 && message.contains("{subject}"), "{message}");
     let (code, message) = bad(at, &["group", "nowhere", "--out", "x"]);

@@ -51,7 +51,7 @@ fn info_shows_what_is_inside() {
         assert!(text.contains(words), "{words}: {text}");
     }
     fs::write(at.join("bad.mat"), "t,e,u").unwrap();
-    assert!(bad(at, &["info", "bad.mat"]).1.contains("is not a MATLAB file"));
+    assert!(bad(at, &["info", "bad.mat"]).1.contains("is not in the format MATLAB"));
 }
 
 #[test]

@@ -129,7 +129,7 @@ fn what_is_said_of_several_files_is_said_once_and_after_the_answer() {
     let said = String::from_utf8(output.stderr).unwrap();
     let of_rows: Vec<&str> = said
         .lines()
-        .filter(|line| line.contains("twice") || line.contains("repeated"))
+        .filter(|line| line.contains("duplicated") || line.contains("repeated"))
         .collect();
     assert!(of_rows.iter().all(|line| line.contains("1.csv and 1 more: ")), "{said}");
     assert_eq!(of_rows.len(), 1, "{said}");

@@ -279,7 +279,7 @@ mod tests {
     fn what_cannot_be_says_why() {
         for (method, options, reason) in [
             ("kalman", "{}", "adaptive"),
-            ("rpem", "[1]", "no object in JSON"),
+            ("rpem", "[1]", "not an object in JSON"),
             ("rpem", "{\"nk\": -1}", "whole number"),
             ("rpem", "{\"nk\": [30, 20]}", "smaller first"),
             ("rpem", "{\"nd\": 65}", "64"),

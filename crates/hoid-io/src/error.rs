@@ -523,7 +523,7 @@ pub enum IoError {
     },
     /// Bytes of another format than the extension states.
     #[error(
-        "{file} is no {format} file: {found}, expected {expected}; copy or write it again if it was cut short, or give it the extension of what it is"
+        "{file} is not in the format {format}: {found}, expected {expected}; copy or write it again if it was cut short, or give it the extension of what it is"
     )]
     WrongFormat {
         /// The file.

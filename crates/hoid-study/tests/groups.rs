@@ -243,7 +243,7 @@ fn a_bad_file_is_a_row_and_a_bad_manifest_an_error() {
 
     let text = manifest.text();
     for (from, to, words) in [
-        ("run = \"2\"", "run = \"1\"", "there twice"),
+        ("run = \"2\"", "run = \"1\"", "duplicated"),
         ("subject = \"A\"", "subject = \"\"", "no subject"),
         ("trace_every = 16", "trace_every = 0", "trace_every is 0"),
         ("trace_every = 16", "trace_evry = 16", "unknown field"),

@@ -66,7 +66,7 @@ class MethodSettings(TypedDict, total=False):
     limit: float | None
 
     # How far each variance in P may grow where nothing excites its parameter, as a multiple of
-    # what it is at the start; off: without end. For rls, rpem, physical.
+    # its initial value; off: without end. For rls, rpem, physical.
     windup_guard: float | Literal["off"] | None
 
     # Memory of single parameters, or of all of one letter, as b0=256,f=inf,K_e=5s. For rls,
@@ -133,8 +133,8 @@ class MethodSettings(TypedDict, total=False):
     # Logarithm of the odds from which a change is declared. For multiple-model.
     alarm: float | None
 
-    # At each sample what all of a recorded run shows about it, by hypotheses run from both ends, in
-    # place of the prediction from the past alone. For multiple-model.
+    # At each sample what all of a recorded run shows about it, by hypotheses run from both
+    # ends, in place of the prediction from the past alone. For multiple-model.
     smooth: bool | None
 
     # False alarms in an hour that are accepted: a lower number finds fewer changes, later. For
@@ -145,9 +145,9 @@ class MethodSettings(TypedDict, total=False):
     # microcontroller does. For adaptive.
     replay: float | None
 
-    # What is known of the person before the first sample: population, none, NAME=CENTRE:SPREAD
-    # of omega_nm, zeta_nm, tau_e, T_I (the spread is relative), or an earlier fit of them, a
-    # file that hoid identify --json has printed. For adaptive.
+    # Prior knowledge of the person before the first sample: population, none,
+    # NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_I (the spread is relative), or an
+    # earlier fit of them, a file that hoid identify --json has printed. For adaptive.
     prior: str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit | None
 
     # Drift of K_e and K_e_dot in a root second, share of their start. For dual-ekf.
@@ -283,8 +283,8 @@ class BatchSettings(TypedDict, total=False):
     # For pem.
     coefficient_prior: Mapping[str, tuple[float, float]] | None
 
-    # Loss of Huber instead of squares: residuals beyond a given number of standard deviations count
-    # linearly; of no number 1.345. For pem.
+    # Loss of Huber instead of squares: residuals beyond a given number of standard deviations
+    # count linearly; of no number 1.345. For pem.
     robust: float | bool | None
 
     # Take only models that are stable from e to u (C and F always are stable). For pem.
@@ -366,8 +366,8 @@ SETTINGS = """covariance : float
         alarm : float
             Logarithm of the odds from which a change is declared. For multiple-model.
         smooth : bool
-            At each sample what all of a recorded run shows about it, by hypotheses run from both
-            ends, in place of the prediction from the past alone. For multiple-model.
+            At each sample what all of a recorded run shows about it, by hypotheses run from
+            both ends, in place of the prediction from the past alone. For multiple-model.
         false_alarms : float
             False alarms in an hour that are accepted: a lower number finds fewer changes,
             later. For adaptive.
@@ -375,7 +375,7 @@ SETTINGS = """covariance : float
             Time that is read again and again; 0 for a recursion that reads each sample once, as
             a microcontroller does. For adaptive.
         prior : str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit
-            What is known of the person before the first sample: population, none,
+            Prior knowledge of the person before the first sample: population, none,
             NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_I (the spread is relative), or an
             earlier fit of them, a file that hoid identify --json has printed. For adaptive.
         gain_drift : float
@@ -468,8 +468,8 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
             Guesses of coefficients with a weight W, as f1=-1.9:0.5: the loss grows by W (f1 +
             1.9)^2. For pem.
         robust : float | bool
-            Loss of Huber instead of squares: residuals beyond a given number of standard deviations count
-            linearly; of no number 1.345. For pem.
+            Loss of Huber instead of squares: residuals beyond a given number of standard
+            deviations count linearly; of no number 1.345. For pem.
         stable : bool
             Take only models that are stable from e to u (C and F always are stable). For pem.
         instruments : str

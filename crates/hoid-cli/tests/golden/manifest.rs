@@ -7,7 +7,7 @@ use serde::Deserialize;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
-    /// Relative difference of numbers that is invalid.
+    /// Relative difference below which numbers count as equal.
     pub tolerance: f64,
     #[serde(rename = "input")]
     pub inputs: Vec<Input>,

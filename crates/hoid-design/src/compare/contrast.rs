@@ -341,7 +341,7 @@ mod tests {
         let people = [("P", "a"), ("P", "b"), ("Q", "a"), ("Q", "b")];
         for (factors, word) in [
             (&["display"][..], "levels are not known"),
-            (&["x:a;z"], "z is not a condition"),
+            (&["x:a;z"], "z is neither a condition"),
             (&["who:one=P;two=Q", "else:1=P;2=Q"], "one of them at a time"),
         ] {
             let error = of(&people, factors).unwrap_err().to_string();

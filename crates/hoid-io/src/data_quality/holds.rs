@@ -45,7 +45,7 @@ pub(super) fn standing(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<Quali
         let places: Vec<RowSpan> = rows.iter().map(|row| signals.place(&(*row..row + 1))).collect();
         let Some(first) = places.first() else { continue };
         let what = if kind == QualityIssueKind::Repeated {
-            "there twice, time included"
+            "duplicated, time included"
         } else {
             "no later than the row before, with other values"
         };

@@ -16,7 +16,7 @@ use super::step::Step;
 use crate::IoError;
 use crate::wording::decimal;
 
-/// Distance from a whole number of samples that is invalid.
+/// Distance from a whole number of samples that counts as zero.
 const WHOLE: f64 = 1e-6;
 
 /// Amount by which a channel was recorded later than it happened; negative when earlier.

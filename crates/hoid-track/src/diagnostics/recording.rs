@@ -146,7 +146,7 @@ impl Trace {
         worst.map(|(_, words)| Finding::doubt("not-followed", words))
     }
 
-    /// An estimate that is invalid at the end, whatever it was before.
+    /// An estimate that is not valid at the end, whatever it was before.
     pub(super) fn last_row_finding(&self) -> Option<Finding> {
         let operator = self.operator(self.len().checked_sub(1)?).ok()?;
         let nothing = is_open(&operator.k_e) && is_open(&operator.k_e_dot) && !self.response_is_known;

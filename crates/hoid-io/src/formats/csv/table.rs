@@ -186,7 +186,7 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// Takes the rows of plain numbers from `from` on; where the first starts that is invalid.
+    /// Takes the rows of plain numbers from `from` on; returns the start of the first line that is not plain.
     fn plain(&mut self, from: usize, columns: &mut [Column]) -> usize {
         if self.commas {
             return from;

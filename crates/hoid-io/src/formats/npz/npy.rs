@@ -261,7 +261,7 @@ fn clock_unit(descr: &str) -> Option<f64> {
     Some(count * unit_s)
 }
 
-/// The numbers of a clock in s, moments from the first; those that is invalid (NaT) are NaN.
+/// The numbers of a clock in s, moments from the first; invalid ones (NaT) are NaN.
 fn clock(counts: &Numbers, unit_s: f64, moments: bool) -> Numbers {
     let known: Vec<Option<i64>> = (0..counts.len())
         .map(|at| counts.whole(at).filter(|n| *n != i64::MIN))
