@@ -48,11 +48,18 @@ impl Recordings {
             let longest = found.segments.iter().map(Record::len).max().unwrap_or(0);
             let is_short = |piece: &Record| piece.len() < longest && (piece.len() as f64) * ts_s < SHORTEST_PIECE_S;
             if of == Of::Person && found.segments.iter().any(is_short) {
-                let left: f64 = found.segments.iter().filter(|piece| is_short(piece)).map(|p| p.len() as f64 * ts_s).sum();
+                let left: f64 = found
+                    .segments
+                    .iter()
+                    .filter(|piece| is_short(piece))
+                    .map(|p| p.len() as f64 * ts_s)
+                    .sum();
                 found.segments.retain(|piece| !is_short(piece));
                 findings.push(Finding::note(
                     "short-piece",
-                    format!("pieces between faults that are shorter than {SHORTEST_PIECE_S} s were left out: {left:.1} s"),
+                    format!(
+                        "pieces between faults that are shorter than {SHORTEST_PIECE_S} s were left out: {left:.1} s"
+                    ),
                 ));
             }
             let mut account = Account {

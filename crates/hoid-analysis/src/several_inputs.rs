@@ -46,7 +46,9 @@ pub fn several_inputs(
     let options = |reason: String| AnalysisError::Options { reason };
     let number = |name: &str, text: &str| {
         text.trim().parse::<usize>().map_err(|_| {
-            options(format!("orders: {name} is {text:?}, expected a number for each input, as nb=2,3"))
+            options(format!(
+                "orders: {name} is {text:?}, expected a number for each input, as nb=2,3"
+            ))
         })
     };
     let mut named: Vec<(String, Vec<usize>)> = Vec::new();
@@ -54,17 +56,34 @@ pub fn several_inputs(
         match (part.split_once('='), named.last_mut()) {
             (Some((name, value)), _) => named.push((name.trim().to_owned(), vec![number(name, value)?])),
             (None, Some((name, values))) => values.push(number(name, part)?),
-            (None, None) => return Err(options(format!("orders: found {part:?}, expected NAME=NUMBER, as na=2,nb=2,3"))),
+            (None, None) => {
+                return Err(options(format!(
+                    "orders: found {part:?}, expected NAME=NUMBER, as na=2,nb=2,3"
+                )));
+            }
         }
     }
     if let Some(text) = nk {
-        let values = text.split(',').map(|value| number("nk", value)).collect::<Result<_, _>>()?;
+        let values = text
+            .split(',')
+            .map(|value| number("nk", value))
+            .collect::<Result<_, _>>()?;
         named.push(("nk".to_owned(), values));
     }
     let count = inputs.len();
-    let all = |name: &str| named.iter().find(|(known, _)| known == name).map(|(_, values)| values.as_slice());
-    if let Some((name, _)) = named.iter().find(|(name, _)| !["na", "nb", "nc", "nd", "nf", "nk"].contains(&name.as_str())) {
-        return Err(options(format!("orders: there is no order {name}; expected na, nb, nc, nd, nf, nk")));
+    let all = |name: &str| {
+        named
+            .iter()
+            .find(|(known, _)| known == name)
+            .map(|(_, values)| values.as_slice())
+    };
+    if let Some((name, _)) = named
+        .iter()
+        .find(|(name, _)| !["na", "nb", "nc", "nd", "nf", "nk"].contains(&name.as_str()))
+    {
+        return Err(options(format!(
+            "orders: there is no order {name}; expected na, nb, nc, nd, nf, nk"
+        )));
     }
     let each = |name: &str, default: usize| match all(name) {
         None => Ok(vec![default; count]),
@@ -78,16 +97,32 @@ pub fn several_inputs(
     let one = |name: &str, default: usize| match all(name) {
         None => Ok(default),
         Some([one]) => Ok(*one),
-        Some(values) => Err(options(format!("orders: {name} has {} numbers, expected one", values.len()))),
+        Some(values) => Err(options(format!(
+            "orders: {name} has {} numbers, expected one",
+            values.len()
+        ))),
     };
     let default = structure.operator_orders(1);
-    let (nb, nf, nk) = (each("nb", default.nb)?, each("nf", default.nf)?, each("nk", default.nk)?);
+    let (nb, nf, nk) = (
+        each("nb", default.nb)?,
+        each("nf", default.nf)?,
+        each("nk", default.nk)?,
+    );
     let model = SeveralInputs {
         na: one("na", default.na)?,
         nc: one("nc", default.nc)?,
         nd: one("nd", default.nd)?,
         inputs: (inputs.iter().enumerate())
-            .map(|(i, name)| (name.clone(), InputOrders { nb: nb[i], nf: nf[i], nk: nk[i] }))
+            .map(|(i, name)| {
+                (
+                    name.clone(),
+                    InputOrders {
+                        nb: nb[i],
+                        nf: nf[i],
+                        nk: nk[i],
+                    },
+                )
+            })
             .collect(),
         ..SeveralInputs::new(structure)
     };
@@ -114,14 +149,22 @@ impl SeveralInputsResult {
         let fit = match model.fit(&data.records) {
             Err(IdentError::TooFewSamples { .. }) if data.len() > 1 => {
                 let longest = data.records.iter().map(hoid_model::Record::len).max().unwrap_or(0);
-                let records: Vec<_> = data.records.iter().filter(|r| 2 * r.len() >= longest).cloned().collect();
+                let records: Vec<_> = data
+                    .records
+                    .iter()
+                    .filter(|r| 2 * r.len() >= longest)
+                    .cloned()
+                    .collect();
                 model.fit(&records)?
             }
             other => other?,
         };
         let mut findings = Vec::new();
         if !fit.termination.converged() {
-            findings.push(Finding::doubt("not-converged", format!("the search did not converge: {}", fit.termination)));
+            findings.push(Finding::doubt(
+                "not-converged",
+                format!("the search did not converge: {}", fit.termination),
+            ));
         }
         if fit.covariance().is_none() {
             let message = "the data leave a combination of coefficients open: there are no error bars";
@@ -129,7 +172,10 @@ impl SeveralInputsResult {
         }
         for (name, _) in &model.inputs {
             let own = format!("[{name}]");
-            let gains = fit.parameters().into_iter().filter(|(p, _)| p.starts_with('b') && p.ends_with(&own));
+            let gains = fit
+                .parameters()
+                .into_iter()
+                .filter(|(p, _)| p.starts_with('b') && p.ends_with(&own));
             let open = |e: &hoid_model::uncertainty::Estimate| {
                 e.standard_error.is_some_and(|s| e.value.abs() < LEAST_ERRORS * s)
             };
@@ -149,7 +195,14 @@ impl SeveralInputsResult {
         let (fit, data) = (&self.fit, &self.data);
         let model = &fit.model;
         let settings = [Setting::new("structure", model.structure.name().to_owned())];
-        let mut map = envelope("polynomial", &data.names, &data.records, &data.accounts, &self.verdict, &settings);
+        let mut map = envelope(
+            "polynomial",
+            &data.names,
+            &data.records,
+            &data.accounts,
+            &self.verdict,
+            &settings,
+        );
         let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
         let of_inputs = |of: fn(&InputOrders) -> usize| model.inputs.iter().map(|(_, o)| of(o)).collect::<Vec<_>>();
         set("structure", json!(model.structure.name()));
@@ -161,15 +214,16 @@ impl SeveralInputsResult {
             }),
         );
         let parameters = fit.parameters();
-        let coefficient = |(name, e): &(String, hoid_model::uncertainty::Estimate)| {
-            json!({"name": name, "value": number(e.value), "standard_error": optional(e.standard_error)})
-        };
+        let coefficient = |(name, e): &(String, hoid_model::uncertainty::Estimate)| json!({"name": name, "value": number(e.value), "standard_error": optional(e.standard_error)});
         set("parameters", parameters.iter().map(coefficient).collect());
         set("loss", number(fit.loss));
         set("innovation_variance", number(fit.innovation_variance));
         set("residuals", json!(fit.residuals));
         set("termination", termination(&fit.termination));
-        set("fit", json!({"vaf_prediction": number(fit.vaf_prediction), "aic": number(fit.aic())}));
+        set(
+            "fit",
+            json!({"vaf_prediction": number(fit.vaf_prediction), "aic": number(fit.aic())}),
+        );
         let nyquist = fit.sample_time.nyquist_rad_s();
         let omega: Vec<f64> = RESPONSE_AT.iter().map(|share| share * nyquist).collect();
         let channel = |(k, (name, _)): (usize, &(String, InputOrders))| {
@@ -188,7 +242,9 @@ impl SeveralInputsResult {
             "covariance",
             fit.covariance().map_or(Value::Null, |c| {
                 let rows = c.chunks(parameters.len());
-                rows.map(|row| row.iter().map(|v| number(*v)).collect::<Vec<_>>()).collect::<Vec<_>>().into()
+                rows.map(|row| row.iter().map(|v| number(*v)).collect::<Vec<_>>())
+                    .collect::<Vec<_>>()
+                    .into()
             }),
         );
         map

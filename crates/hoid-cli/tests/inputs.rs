@@ -170,19 +170,43 @@ fn polynomials_with_two_inputs() {
     let runs = runs(at.path(), PURSUIT, 1);
     let run = runs[0].as_str();
     let orders = ["--orders", "na=2,nb=2,3", "--nk", "13,1"];
-    let arx = [&["identify", run, "--structure", "arx", "--input", "e", "--input", "f_t"][..], &orders].concat();
+    let arx = [
+        &["identify", run, "--structure", "arx", "--input", "e", "--input", "f_t"][..],
+        &orders,
+    ]
+    .concat();
     let found = json(at.path(), &[&arx[..], &["--json"]].concat());
     assert_eq!(found["orders"]["nb"], serde_json::json!([2, 3]));
     assert_eq!(found["orders"]["nk"], serde_json::json!([13, 1]));
-    let names: Vec<&str> = found["parameters"].as_array().unwrap().iter().map(|p| p["name"].as_str().unwrap()).collect();
+    let names: Vec<&str> = found["parameters"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|p| p["name"].as_str().unwrap())
+        .collect();
     assert_eq!(names, ["a1", "a2", "b0[e]", "b1[e]", "b0[f_t]", "b1[f_t]", "b2[f_t]"]);
     let channels = found["channels"].as_array().unwrap();
     assert_eq!((channels.len(), channels[1]["input"].as_str()), (2, Some("f_t")));
     assert_eq!(channels[1]["parameters"].as_array().unwrap().len(), 3);
     assert!(found["fit"]["vaf_prediction"].as_f64().unwrap() > 90.0);
     let text = good(at.path(), &arx);
-    assert!(text.contains("ARX with the inputs e, f_t") && text.contains("b2[f_t]"), "{text}");
-    let bj = ["identify", run, "--structure", "bj", "--input", "e", "--input", "f_t", "--nk", "12,1", "--json"];
+    assert!(
+        text.contains("ARX with the inputs e, f_t") && text.contains("b2[f_t]"),
+        "{text}"
+    );
+    let bj = [
+        "identify",
+        run,
+        "--structure",
+        "bj",
+        "--input",
+        "e",
+        "--input",
+        "f_t",
+        "--nk",
+        "12,1",
+        "--json",
+    ];
     let bj = json(at.path(), &[&bj[..], &["--orders", "nb=2,2,nf=2,2,nd=4"]].concat());
     assert_eq!(bj["parameters"].as_array().unwrap().len(), 12);
     for (options, expected) in [
@@ -192,7 +216,11 @@ fn polynomials_with_two_inputs() {
         (&["--stable"], "--stable does not belong"),
         (&["--figure", "x.svg"], "one input"),
     ] {
-        let call = [&["identify", run, "--structure", "arx", "--input", "e", "--input", "f_t"][..], options].concat();
+        let call = [
+            &["identify", run, "--structure", "arx", "--input", "e", "--input", "f_t"][..],
+            options,
+        ]
+        .concat();
         let (_, message) = bad(at.path(), &call);
         assert!(message.contains(expected), "{options:?}: {message}");
     }

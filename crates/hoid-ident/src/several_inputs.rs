@@ -41,10 +41,10 @@ use hoid_model::{
     uncertainty::{Estimate, variance_along},
 };
 
-pub use crate::criterion::further::InputOrders;
+pub use crate::criterion::further_input::InputOrders;
 use crate::{
     Estimator, IdentError, InitialState, Reason, ResponsePoint, SearchOptions, Termination,
-    criterion::{Criterion, Data, Workspace, further::FurtherInput},
+    criterion::{Criterion, Data, Workspace, further_input::FurtherInput},
     family::noise::{NoiseProducts, hannan_rissanen},
     informative_data::{check_degrees_of_freedom, common_sample_time},
     linalg::least_squares::{add_scaled, solve_symmetric},
@@ -125,7 +125,10 @@ impl SeveralInputs {
 
     /// The orders of A, C, D, and of the first input.
     fn orders(&self) -> Orders {
-        let first = self.inputs.first().map_or_else(InputOrders::default, |(_, orders)| *orders);
+        let first = self
+            .inputs
+            .first()
+            .map_or_else(InputOrders::default, |(_, orders)| *orders);
         Orders {
             na: self.na,
             nb: first.nb,
@@ -184,7 +187,8 @@ impl SeveralInputs {
             (self.refined(&criterion, &at.gram, &at.descent, &mut workspace)?, direct)
         } else {
             let start = self.start(records, &mut workspace)?;
-            let found = minimise(&criterion, start, &self.search, None, &mut workspace).ok_or(IdentError::NoFiniteLoss)?;
+            let found =
+                minimise(&criterion, start, &self.search, None, &mut workspace).ok_or(IdentError::NoFiniteLoss)?;
             (found.theta, found.termination)
         };
         let at = criterion.linearise(&theta, &mut workspace);
@@ -209,7 +213,11 @@ impl SeveralInputs {
             innovation_variance,
             residuals: n,
             termination,
-            vaf_prediction: if power > 0.0 { 100.0 * (1.0 - at.sum_of_squares / power).max(0.0) } else { 0.0 },
+            vaf_prediction: if power > 0.0 {
+                100.0 * (1.0 - at.sum_of_squares / power).max(0.0)
+            } else {
+                0.0
+            },
             theta,
             sample_time,
         })
@@ -267,13 +275,20 @@ impl SeveralInputs {
     ) -> Result<Criterion<'a>, IdentError> {
         let mut further = Vec::with_capacity(self.inputs.len());
         for input in self.inputs.iter().skip(1) {
-            let values = records.iter().map(|record| channel(record, &input.0)).collect::<Result<_, _>>()?;
+            let values = records
+                .iter()
+                .map(|record| channel(record, &input.0))
+                .collect::<Result<_, _>>()?;
             further.push(FurtherInput {
                 orders: of(input),
                 values,
             });
         }
-        let late = further.iter().map(|f| f.orders.first_regressed_sample()).max().unwrap_or(0);
+        let late = further
+            .iter()
+            .map(|f| f.orders.first_regressed_sample())
+            .max()
+            .unwrap_or(0);
         let level = self.level && self.initial_state != InitialState::Zero;
         let data = Data::of(records).into_iter().map(|d| Data { level, ..d });
         let criterion = Criterion {
@@ -342,7 +357,14 @@ impl SeveralInputs {
                 )?);
             }
             let (structure, alone) = if o.nf == 0 {
-                (Structure::Fir, Orders { nb: o.nb, nk: o.nk, ..Orders::default() })
+                (
+                    Structure::Fir,
+                    Orders {
+                        nb: o.nb,
+                        nk: o.nk,
+                        ..Orders::default()
+                    },
+                )
             } else {
                 let alone = Orders {
                     nb: o.nb,
@@ -427,13 +449,21 @@ fn channel<'r>(record: &'r Record, name: &str) -> Result<&'r [f64], IdentError> 
     record.channel(name).ok_or_else(|| IdentError::BadOption {
         option: "the inputs".to_owned(),
         found: format!("no channel {name} in {}", record.label()),
-        expected: record.channels().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", "),
+        expected: record
+            .channels()
+            .map(|c| c.name.as_str())
+            .collect::<Vec<_>>()
+            .join(", "),
     })
 }
 
 /// The first input is that of the record, whatever it is called.
 fn channel_or_input<'r>(record: &'r Record, name: &str, first: &str) -> Result<&'r [f64], IdentError> {
-    if name == first { Ok(record.input()) } else { channel(record, name) }
+    if name == first {
+        Ok(record.input())
+    } else {
+        channel(record, name)
+    }
 }
 
 impl SeveralInputsFit {
@@ -495,7 +525,9 @@ impl SeveralInputsFit {
             b.clone().for_each(|i| slopes[i] = back(nk + i - b.start) / of_b);
             let error = |part: fn(&Complex64) -> f64| {
                 let gradient: Vec<f64> = slopes.iter().map(part).collect();
-                self.covariance.as_ref().map(|c| variance_along(&gradient, c).max(0.0).sqrt())
+                self.covariance
+                    .as_ref()
+                    .map(|c| variance_along(&gradient, c).max(0.0).sqrt())
             };
             ResponsePoint {
                 omega_rad_s: omega,
@@ -542,10 +574,14 @@ mod tests {
             x[t] = 0.8 * at(&x, t, 1) + noise * (eps[t] + 0.4 * at(&eps, t, 1));
             u[t] = w[t] + v[t] + x[t] + 1.5;
         }
-        Record::new(SampleTime::HUNDREDTH, Channel::new("e", "", e), Channel::new("u", "", u))
-            .unwrap()
-            .with_channel(Channel::new("r", "", r))
-            .unwrap()
+        Record::new(
+            SampleTime::HUNDREDTH,
+            Channel::new("e", "", e),
+            Channel::new("u", "", u),
+        )
+        .unwrap()
+        .with_channel(Channel::new("r", "", r))
+        .unwrap()
     }
 
     fn box_jenkins() -> SeveralInputs {
@@ -579,8 +615,15 @@ mod tests {
 
     #[test]
     fn without_noise_the_coefficients_are_exact() {
-        let fit = SeveralInputs { nc: 0, nd: 0, ..box_jenkins() };
-        let fit = SeveralInputs { structure: Structure::OutputError, ..fit };
+        let fit = SeveralInputs {
+            nc: 0,
+            nd: 0,
+            ..box_jenkins()
+        };
+        let fit = SeveralInputs {
+            structure: Structure::OutputError,
+            ..fit
+        };
         let found = fit.fit(&[record(400, 0.0, 3)]).unwrap();
         for ((name, estimate), truth) in found.parameters().iter().zip([0.5, 0.2, -0.7, 0.3, -0.9]) {
             assert!((estimate.value - truth).abs() < 1e-8, "{name} {estimate}");
@@ -597,8 +640,20 @@ mod tests {
             (Structure::BoxJenkins, 0, 1, 2, 2),
             (Structure::OutputError, 0, 0, 0, 2),
         ] {
-            let orders = Orders { na, nb: 2, nc, nd, nf, nk: 2 };
-            let one = Estimator { level: true, ..Estimator::new(structure, orders) }.fit(std::slice::from_ref(&record)).unwrap();
+            let orders = Orders {
+                na,
+                nb: 2,
+                nc,
+                nd,
+                nf,
+                nk: 2,
+            };
+            let one = Estimator {
+                level: true,
+                ..Estimator::new(structure, orders)
+            }
+            .fit(std::slice::from_ref(&record))
+            .unwrap();
             let several = SeveralInputs {
                 na,
                 nc,
@@ -607,14 +662,29 @@ mod tests {
                 ..SeveralInputs::new(structure)
             };
             let several = several.fit(std::slice::from_ref(&record)).unwrap();
-            assert!((several.loss / one.loss() - 1.0).abs() < 1e-7, "{structure} {} {}", several.loss, one.loss());
+            assert!(
+                (several.loss / one.loss() - 1.0).abs() < 1e-7,
+                "{structure} {} {}",
+                several.loss,
+                one.loss()
+            );
             for ((name, a), (_, b)) in one.parameters().iter().zip(several.parameters()) {
                 let (s, t) = (a.standard_error.unwrap(), b.standard_error.unwrap());
-                assert!((a.value - b.value).abs() < 1e-3 * s && (s / t - 1.0).abs() < 1e-3, "{structure} {name} {a} {b}");
+                assert!(
+                    (a.value - b.value).abs() < 1e-3 * s && (s / t - 1.0).abs() < 1e-3,
+                    "{structure} {name} {a} {b}"
+                );
             }
             let omega = [1.0, 7.0, 40.0];
-            for (a, b) in one.frequency_response(&omega).iter().zip(several.frequency_response(0, &omega)) {
-                assert!((a.magnitude_db.value - b.magnitude_db.value).abs() < 1e-3, "{structure}");
+            for (a, b) in one
+                .frequency_response(&omega)
+                .iter()
+                .zip(several.frequency_response(0, &omega))
+            {
+                assert!(
+                    (a.magnitude_db.value - b.magnitude_db.value).abs() < 1e-3,
+                    "{structure}"
+                );
                 let (s, t) = (a.phase_deg.standard_error.unwrap(), b.phase_deg.standard_error.unwrap());
                 assert!((s / t - 1.0).abs() < 1e-2, "{structure} {s} {t}");
             }
@@ -625,21 +695,44 @@ mod tests {
     fn what_has_no_meaning_is_refused() {
         let data = [record(200, 0.1, 1)];
         let said = |how: SeveralInputs| how.fit(&data).unwrap_err().to_string();
-        let twice = SeveralInputs { inputs: vec![box_jenkins().inputs[0].clone(); 2], ..box_jenkins() };
+        let twice = SeveralInputs {
+            inputs: vec![box_jenkins().inputs[0].clone(); 2],
+            ..box_jenkins()
+        };
         assert!(said(twice).contains("e twice"));
-        let none = SeveralInputs { inputs: Vec::new(), ..box_jenkins() };
+        let none = SeveralInputs {
+            inputs: Vec::new(),
+            ..box_jenkins()
+        };
         assert!(said(none).contains("at least one"));
         let mut unknown = box_jenkins();
         unknown.inputs[1].0 = "q".to_owned();
         assert!(said(unknown).contains("no channel q"));
-        assert!(said(SeveralInputs { structure: Structure::Ar, ..box_jenkins() }).contains("one with inputs"));
+        assert!(
+            said(SeveralInputs {
+                structure: Structure::Ar,
+                ..box_jenkins()
+            })
+            .contains("one with inputs")
+        );
         let mut late = box_jenkins();
         late.inputs[1].1.nk = 400;
         assert!(!said(late).is_empty());
-        let same = data[0].clone().with_channel(Channel::new("copy", "", data[0].input().to_vec())).unwrap();
-        let mut alike = SeveralInputs { na: 1, nc: 0, nd: 0, ..box_jenkins() };
+        let same = data[0]
+            .clone()
+            .with_channel(Channel::new("copy", "", data[0].input().to_vec()))
+            .unwrap();
+        let mut alike = SeveralInputs {
+            na: 1,
+            nc: 0,
+            nd: 0,
+            ..box_jenkins()
+        };
         alike.structure = Structure::Arx;
-        alike.inputs = vec![("e".to_owned(), InputOrders { nb: 1, nf: 0, nk: 1 }), ("copy".to_owned(), InputOrders { nb: 1, nf: 0, nk: 1 })];
+        alike.inputs = vec![
+            ("e".to_owned(), InputOrders { nb: 1, nf: 0, nk: 1 }),
+            ("copy".to_owned(), InputOrders { nb: 1, nf: 0, nk: 1 }),
+        ];
         assert!(matches!(alike.fit(&[same]), Err(IdentError::SingularRegressors { .. })));
     }
 }

@@ -27,10 +27,14 @@ fn record() -> Record {
         u[k] = 1.2 * u[k - 1] - 0.4 * u[k - 2] + 0.5 * e[k - 3] - 0.2 * e[k - 4];
         u[k] += 0.3 * r[k - 1] + 0.1 * r[k - 2] - 0.25 * r[k - 3] + noise[k] + 0.3;
     }
-    Record::new(SampleTime::HUNDREDTH, Channel::new("e", "", e), Channel::new("u", "", u))
-        .unwrap()
-        .with_channel(Channel::new("r", "", r))
-        .unwrap()
+    Record::new(
+        SampleTime::HUNDREDTH,
+        Channel::new("e", "", e),
+        Channel::new("u", "", u),
+    )
+    .unwrap()
+    .with_channel(Channel::new("r", "", r))
+    .unwrap()
 }
 
 #[test]
@@ -47,7 +51,11 @@ fn arx_with_two_inputs_is_that_of_numpy() {
     assert!((fit.loss / LOSS - 1.0).abs() < 1e-10, "{}", fit.loss);
     for ((name, estimate), (expected, value, error)) in fit.parameters().iter().zip(NUMPY) {
         assert_eq!(name, expected);
-        assert!((estimate.value - value).abs() < 1e-10, "{name}: {} {value}", estimate.value);
+        assert!(
+            (estimate.value - value).abs() < 1e-10,
+            "{name}: {} {value}",
+            estimate.value
+        );
         let own = estimate.standard_error.unwrap();
         assert!((own / error - 1.0).abs() < 1e-8, "{name}: {own} {error}");
     }

@@ -12,6 +12,7 @@ pub struct ReadArgs {
     /// Column of the input (tracking error): a name, -name, or a difference such as r-y. Repeated: columns of
     /// what the person sees besides, as --input r-y --input r (see --role)
     #[arg(
+        id = "input",
         long = "input",
         value_name = "COLUMN",
         default_value = "e",
@@ -60,7 +61,6 @@ impl ReadArgs {
         }
     }
 }
-
 
 /// Treatment of a record before it is used, in this order.
 #[derive(Debug, Clone, Args)]

@@ -9,44 +9,10 @@ use std::{borrow::Cow, ops::Range};
 use hoid_core::filter::divide;
 
 use super::{
-    normal_equations::Column, polynomials::Polynomials, prediction_error::Criterion, whitening::whiten,
-    workspace::Workspace,
+    further_input::FurtherSignals, normal_equations::Column, polynomials::Polynomials, prediction_error::Criterion,
+    whitening::whiten, workspace::Workspace,
 };
 use crate::linalg::least_squares::add_scaled;
-
-/// Numbers of coefficients of B and F of one input, and its delay in samples.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
-pub struct InputOrders {
-    /// Coefficients `b0 ... b_{nb-1}` of B.
-    pub nb: usize,
-    /// Coefficients `f1 ... f_nf` of F.
-    pub nf: usize,
-    /// Delay of b0 in samples.
-    pub nk: usize,
-}
-
-impl InputOrders {
-    /// First sample at which its response needs nothing from before the record: `nk + nb - 1`.
-    pub fn first_regressed_sample(&self) -> usize {
-        self.nk.saturating_add(self.nb.saturating_sub(1))
-    }
-}
-
-/// A further input: its orders, and its values in each record.
-#[derive(Debug, Clone)]
-pub(crate) struct FurtherInput<'a> {
-    pub orders: InputOrders,
-    pub values: Vec<&'a [f64]>,
-}
-
-/// The signals of a further input at one theta, each with the zeros of the workspace in front.
-#[derive(Debug, Default)]
-pub(super) struct FurtherSignals {
-    s: Vec<f64>,
-    pub w: Vec<f64>,
-    of_b: Vec<f64>,
-    of_f: Vec<f64>,
-}
 
 impl Criterion<'_> {
     /// B and F of each further input.

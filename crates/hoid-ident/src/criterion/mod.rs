@@ -47,6 +47,7 @@
 //! | `prediction_error` | the criterion: records, orders, which residuals count |
 //! | `initial_state` | what is assumed about the time before a record |
 //! | `polynomials` | A, B, C, D and F as parts of theta |
+//! | `further_input` | a further input: orders, values, signals |
 //! | `further` | inputs beside e |
 //! | `signals`, `whitening` | the signals of a record at one theta |
 //! | `initial_state_responses` | what a record does not report about its past, eliminated exactly |
@@ -56,7 +57,8 @@
 //! | `linearisation` | what a search needs of the criterion |
 //! | `workspace` | the memory of the signals |
 
-pub(crate) mod further;
+mod further;
+pub(crate) mod further_input;
 mod initial_state;
 pub mod initial_state_responses;
 mod linearisation;

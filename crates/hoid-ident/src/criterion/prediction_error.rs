@@ -2,7 +2,7 @@
 
 use hoid_model::{Orders, Record};
 
-use super::{further::FurtherInput, initial_state::InitialState, polynomials::Polynomials};
+use super::{further_input::FurtherInput, initial_state::InitialState, polynomials::Polynomials};
 use crate::linalg::products::variance;
 
 /// Input and output of one record.

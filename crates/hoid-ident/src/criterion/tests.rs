@@ -2,7 +2,7 @@ use hoid_model::Orders;
 
 use super::{
     Criterion, Data, InitialState, Workspace, first_residual,
-    further::{FurtherInput, InputOrders},
+    further_input::{FurtherInput, InputOrders},
     initial_state_responses::{InitialHistory, InitialStateResponses},
     polynomials::{Block, Polynomials},
     signals::EliminatedStates,

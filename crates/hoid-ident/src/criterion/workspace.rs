@@ -7,7 +7,7 @@ use std::{
 
 use hoid_model::Orders;
 
-use super::further::{FurtherInput, FurtherSignals};
+use super::further_input::{FurtherInput, FurtherSignals};
 
 /// Signals of one record at one theta. Each has `pad` zeros in front, so that a shift needs no case
 /// distinction.

@@ -3,7 +3,7 @@
 //! A person who sees the target follows it also without an error: what a fit of one input finds is then neither their
 //! response to the error nor the loop that they close ([`crate::family::SeenChannel`]). Each channel with the name of a
 //! target is tried as a second input, in the forms of a gain and of its derivatives, beside the form of the fit; the
-//! doubt is raised where the best of them explains more than chance does in one of a thousand records.
+//! doubt is raised where the best of them explains far more than chance.
 
 use hoid_model::{Finding, Form, Record};
 
@@ -11,12 +11,13 @@ use crate::family::{ChannelRole, FamilyEstimator, FamilyFit, SeenChannel};
 
 /// Names of channels that hold what may be shown.
 const TARGETS: [&str; 4] = ["r", "f_t", "target", "reference"];
-/// Probability of the response by chance.
-const BY_CHANCE: f64 = 1e-3;
+/// Probability of the response by chance: where target and disturbance have lines of their own, and where the target alone
+/// excites the loop, so that what the form of the fit lacks looks like a response to the target.
+const BY_CHANCE: [f64; 2] = [1e-4, 1e-8];
 
 /// A doubt for each target that the person responds to.
 pub fn of_family(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[Record]) -> Vec<Finding> {
-    if fit.noise_free.is_some() || !estimator.channels.is_empty() {
+    if fit.little_noise || !estimator.channels.is_empty() {
         return Vec::new();
     }
     let (nc, nd) = fit.noise_orders;
@@ -39,8 +40,8 @@ pub fn of_family(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[Record
             ..SeenChannel::new(name, ChannelRole::Feedforward)
         };
         // What cannot be an input, as a channel that does not move, says nothing against the fit.
-        let found = again.responds_to(records, channel).ok()?;
-        (found.p_value < BY_CHANCE).then(|| {
+        let (found, apart) = again.responds_to(records, channel).ok()?;
+        (found.p_value < BY_CHANCE[usize::from(!apart)]).then(|| {
             Finding::doubt(
                 "other-input",
                 format!(

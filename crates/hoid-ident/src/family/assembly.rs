@@ -195,6 +195,7 @@ impl<'a> Chosen<'_, 'a> {
             course_is_known: self.prediction.course_is_known,
             lead_s: 0.0,
             noise_free,
+            little_noise: self.prediction.little_noise.is_some(),
             sample_time: layout.sample_time,
             verdict,
         })

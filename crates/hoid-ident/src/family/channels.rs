@@ -42,7 +42,7 @@ use crate::{
     IdentError, InitialState, ResponsePoint, SearchOptions,
     criterion::{
         Criterion, Data, Workspace,
-        further::{FurtherInput, InputOrders},
+        further_input::{FurtherInput, InputOrders},
     },
     grey_box::parametrisation::Parametrisation,
     linalg::least_squares::{add_scaled, dot, solve_symmetric},

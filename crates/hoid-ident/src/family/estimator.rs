@@ -8,7 +8,7 @@ use hoid_model::{Detrend, Form, Record, Structure};
 use super::{
     arx_response::ArxResponse,
     assembly::{AtLines, Chosen, OtherForm},
-    channel_lines::{AtChannelLines, ChannelLines, InForm},
+    channel_lines::{AtChannelLines, ChannelLines, InForm, tells_apart},
     channels::{ChannelFit, Seen, SeenChannel},
     comparison::{Comparison, Tried},
     coordinates::Grid,
@@ -162,11 +162,13 @@ impl FamilyEstimator {
         chosen.result(&mut workspace)
     }
 
-    /// Whether u responds to a channel besides the error, by the forms of this estimator.
+    /// Whether u responds to a channel besides the error, by the forms of this estimator; and whether target
+    /// and error are excited on lines of their own.
     ///
     /// # Errors
     /// As [`FamilyEstimator::fit`].
-    pub fn responds_to(&self, records: &[Record], channel: SeenChannel) -> Result<ChannelFit, IdentError> {
+    pub fn responds_to(&self, records: &[Record], channel: SeenChannel) -> Result<(ChannelFit, bool), IdentError> {
+        let names = [channel.name.clone()];
         let with_channel = Self {
             channels: vec![channel],
             ..self.clone()
@@ -174,7 +176,9 @@ impl FamilyEstimator {
         let (records, seen) = with_channel.prepared(records)?;
         let mut workspace = Workspace::of_thread();
         let mut begun = with_channel.begin(&records, &seen, None, &mut workspace)?;
-        begun.channels.pop().ok_or(IdentError::NoFiniteLoss)
+        let apart = tells_apart(begun.channel_lines.as_deref(), &names);
+        let found = begun.channels.pop().ok_or(IdentError::NoFiniteLoss)?;
+        Ok((found, apart))
     }
 
     /// The records without what is taken out of e and u, and what is seen besides.

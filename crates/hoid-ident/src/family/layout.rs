@@ -15,7 +15,7 @@ use hoid_model::{
 
 use super::intersample::Intersample;
 use crate::{
-    criterion::further::InputOrders,
+    criterion::further_input::InputOrders,
     grey_box::parametrisation::{HeldSamples, Mapped, Parametrisation},
 };
 

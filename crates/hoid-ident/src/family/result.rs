@@ -143,6 +143,9 @@ pub struct FamilyFit {
     /// Share of the power of u that the operator leaves, where that is not noise.
     #[serde(default)]
     pub noise_free: Option<f64>,
+    /// Whether there is so little noise that errors of the model would exceed it.
+    #[serde(default)]
+    pub little_noise: bool,
     /// Time between two samples.
     pub sample_time: SampleTime,
     /// Verdict on the result.

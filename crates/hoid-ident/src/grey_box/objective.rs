@@ -11,7 +11,7 @@ use crate::{
     IdentError, InitialState,
     criterion::{
         Criterion, Data, Workspace,
-        further::{FurtherInput, InputOrders},
+        further_input::{FurtherInput, InputOrders},
     },
     linalg::least_squares::dot,
     optimize::Linearisation,

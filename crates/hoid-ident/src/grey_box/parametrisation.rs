@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use hoid_model::{ModelError, Orders, SampleTime};
 
-use crate::criterion::further::InputOrders;
+use crate::criterion::further_input::InputOrders;
 
 /// Orders and theta of one record at one eta, and the derivatives of theta: a column for each slot
 /// of the record.

@@ -38,13 +38,20 @@ pub fn run(args: &IdentifyArgs, structure: Structure) -> Result<(), CliError> {
         return Err(CliError::Usage(format!("{option} belongs to a model with one input")));
     }
     let text = |name: &str| args.options.text(name);
-    let model = several_inputs(structure, text("orders").unwrap_or_default(), text("nk"), &args.read.inputs)
-        .map_err(CliError::of_options)?;
+    let model = several_inputs(
+        structure,
+        text("orders").unwrap_or_default(),
+        text("nk"),
+        &args.read.inputs,
+    )
+    .map_err(CliError::of_options)?;
     paper_table::check(&args.show)?;
     let first = args.read.with_one_input();
     let read: Recordings = reading::of(&first, Some(&args.mask), true)?.files(&args.records, reading::told)?;
     let rate = args.read.prepare.rate.decimate;
-    let found = output::watched("fitting", || SeveralInputsResult::of(&model, read, args.faults.faults, rate))?;
+    let found = output::watched("fitting", || {
+        SeveralInputsResult::of(&model, read, args.faults.faults, rate)
+    })?;
     paper_table::write(&args.show, || Ok(found.json()))?;
     if args.show.json {
         json::print(&Value::Object(found.json()))?;
@@ -58,10 +65,17 @@ fn page(found: &SeveralInputsResult) -> String {
     let fit = &found.fit;
     let mut page = text::verdict(&found.verdict);
     let inputs: Vec<&str> = fit.model.inputs.iter().map(|(name, _)| name.as_str()).collect();
-    page.push_str(&format!("{} with the inputs {}\n", fit.model.structure.label(), inputs.join(", ")));
+    page.push_str(&format!(
+        "{} with the inputs {}\n",
+        fit.model.structure.label(),
+        inputs.join(", ")
+    ));
     let rows = fit.parameters().into_iter().map(|(name, e)| (name, String::new(), e));
     let rows: Vec<_> = rows.collect();
-    let table = text::estimates("coefficient", rows.iter().map(|(name, unit, e)| (name.as_str(), unit.clone(), *e)));
+    let table = text::estimates(
+        "coefficient",
+        rows.iter().map(|(name, unit, e)| (name.as_str(), unit.clone(), *e)),
+    );
     page.push_str(&format!("{table}\n"));
     page.push_str(&format!(
         "Fit: VAF of the prediction {:.2} %, loss {}, {} residuals. Search: {}.\n",

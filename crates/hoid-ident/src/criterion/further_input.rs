@@ -1,0 +1,35 @@
+//! A further input: its orders, its values, its signals.
+
+/// Numbers of coefficients of B and F of one input, and its delay in samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+pub struct InputOrders {
+    /// Coefficients `b0 ... b_{nb-1}` of B.
+    pub nb: usize,
+    /// Coefficients `f1 ... f_nf` of F.
+    pub nf: usize,
+    /// Delay of b0 in samples.
+    pub nk: usize,
+}
+
+impl InputOrders {
+    /// First sample at which its response needs nothing from before the record: `nk + nb - 1`.
+    pub fn first_regressed_sample(&self) -> usize {
+        self.nk.saturating_add(self.nb.saturating_sub(1))
+    }
+}
+
+/// A further input: its orders, and its values in each record.
+#[derive(Debug, Clone)]
+pub(crate) struct FurtherInput<'a> {
+    pub orders: InputOrders,
+    pub values: Vec<&'a [f64]>,
+}
+
+/// The signals of a further input at one theta, each with the zeros of the workspace in front.
+#[derive(Debug, Default)]
+pub(super) struct FurtherSignals {
+    pub s: Vec<f64>,
+    pub w: Vec<f64>,
+    pub of_b: Vec<f64>,
+    pub of_f: Vec<f64>,
+}
