@@ -245,7 +245,7 @@ fn errors_say_what_to_do() {
     });
     assert!(between.contains("varies within people"), "{between}");
     for (text, word) in [
-        ("[1", "no JSON"),
+        ("[1", "not JSON"),
         ("{}", "no people"),
         ("{\"people\": [{}]}", "no subject"),
     ] {

@@ -290,7 +290,7 @@ mod tests {
             ("rpem", "{\"start\": {\"b0\": 1}, \"nk\": 29, \"nd\": 1}", "it lacks"),
             ("rpem", "{\"warm_up\": 0}", "one sample"),
             ("rpem", "{\"controlled_element\": \"9/\"}", "coefficients"),
-            ("multiple-model", "{\"smooth\": true}", "still to come"),
+            ("multiple-model", "{\"smooth\": true}", "no future samples"),
             ("adaptive", "{\"prior\": \"nowhere.json\"}", "nowhere.json"),
             (
                 "adaptive",

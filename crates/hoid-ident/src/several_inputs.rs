@@ -48,7 +48,7 @@ use crate::{
     family::noise::{NoiseProducts, hannan_rissanen},
     informative_data::{check_degrees_of_freedom, common_sample_time},
     linalg::least_squares::{add_scaled, solve_symmetric},
-    optimize::{Objective, minimise},
+    optimize::{Minimum, Objective, minimise},
 };
 
 /// Coefficients of A and of each B in the model of high order.
@@ -186,9 +186,17 @@ impl SeveralInputs {
             };
             (self.refined(&criterion, &at.gram, &at.descent, &mut workspace)?, direct)
         } else {
-            let start = self.start(records, &mut workspace)?;
-            let found =
-                minimise(&criterion, start, &self.search, None, &mut workspace).ok_or(IdentError::NoFiniteLoss)?;
+            let mut best: Option<Minimum> = None;
+            for start in self.starts(records, &mut workspace)? {
+                if let Some(found) = minimise(&criterion, start, &self.search, None, &mut workspace)
+                    && best
+                        .as_ref()
+                        .is_none_or(|known| found.at.sum_of_squares < known.at.sum_of_squares)
+                {
+                    best = Some(found);
+                }
+            }
+            let found = best.ok_or(IdentError::NoFiniteLoss)?;
             (found.theta, found.termination)
         };
         let at = criterion.linearise(&theta, &mut workspace);
@@ -312,8 +320,72 @@ impl SeveralInputs {
         }
     }
 
-    /// Theta to start from: B and F of each input by its response in an ARX model of high order, then the noise.
-    fn start(&self, records: &[Record], workspace: &mut Workspace) -> Result<Vec<f64>, IdentError> {
+    /// Values of theta to start from: B and F of each input by its response in an ARX model of high order, which is nearly
+    /// without noise, and by what the responses to the other inputs leave of u; then the noise.
+    fn starts(&self, records: &[Record], workspace: &mut Workspace) -> Result<Vec<Vec<f64>>, IdentError> {
+        if self.na > 0 && self.inputs.iter().all(|(_, o)| o.nf == 0) {
+            return Ok(vec![self.start_with_a(records, workspace)?]);
+        }
+        let responses = self.responses(records, workspace)?;
+        let [mut of_responses, mut of_rest] = [Vec::new(), Vec::new()];
+        for (k, (name, o)) in self.inputs.iter().enumerate() {
+            let structure = if o.nf == 0 {
+                Structure::Fir
+            } else {
+                Structure::OutputError
+            };
+            let alone = Orders {
+                nb: o.nb,
+                nf: o.nf,
+                nk: o.nk,
+                ..Orders::default()
+            };
+            let fitted = |output: &dyn Fn(usize) -> Vec<f64>| -> Result<(Vec<f64>, Vec<f64>), IdentError> {
+                let mut pairs = Vec::with_capacity(records.len());
+                for (i, record) in records.iter().enumerate() {
+                    let x = channel_or_input(record, name, &self.inputs[0].0)?.to_vec();
+                    let (x, w) = (Channel::new("x", "", x), Channel::new("w", "", output(i)));
+                    pairs.push(Record::new(record.sample_time(), x, w)?);
+                }
+                let estimator = Estimator {
+                    level: self.level,
+                    ..Estimator::new(structure, alone)
+                };
+                let fit = estimator.fit(&pairs)?;
+                let (b, f) = fit.model().theta().split_at(o.nb);
+                Ok((b.to_vec(), f.to_vec()))
+            };
+            of_responses.push(fitted(&|i| responses[k][i].clone())?);
+            of_rest.push(fitted(&|i| {
+                let mut left = records[i].output().to_vec();
+                let others = responses.iter().enumerate().filter(|(other, _)| *other != k);
+                others.for_each(|(_, response)| add_scaled(&mut left, -1.0, &response[i]));
+                left
+            })?);
+        }
+        let mut starts = Vec::new();
+        for systems in [of_responses, of_rest] {
+            let mut left = Vec::with_capacity(records.len());
+            for record in records {
+                let mut series = record.output().to_vec();
+                for ((name, o), (b, f)) in self.inputs.iter().zip(&systems) {
+                    let x = channel_or_input(record, name, &self.inputs[0].0)?;
+                    let mut w = vec![0.0; x.len()];
+                    fir(b, o.nk, x, &mut w);
+                    divide_in_place(f, &mut w);
+                    add_scaled(&mut series, -1.0, &w);
+                }
+                let mean = series.iter().sum::<f64>() / series.len() as f64;
+                series.iter_mut().for_each(|v| *v -= mean);
+                left.push(series);
+            }
+            starts.push(self.theta_of(&vec![0.0; self.na], &systems, &self.noise(&left)));
+        }
+        Ok(starts)
+    }
+
+    /// The response to each input in each record, by an ARX model of high order.
+    fn responses(&self, records: &[Record], workspace: &mut Workspace) -> Result<Vec<Vec<Vec<f64>>>, IdentError> {
         let shortest = records.iter().map(Record::len).min().unwrap_or(0);
         let high = HIGH_ORDER.min(shortest / (4 * (self.inputs.len() + 1))).max(2);
         let own = |(_, o): &(String, InputOrders)| InputOrders {
@@ -336,60 +408,22 @@ impl SeveralInputs {
         (0..p).for_each(|i| at.gram[i * p + i] *= 1.0 + RIDGE);
         let theta = solve_symmetric(&at.gram, &at.descent).ok_or(IdentError::NoFiniteLoss)?;
         let a = polynomial::reflected_inside(&theta[..orders.na]).ok_or(IdentError::NoFiniteLoss)?;
-        if self.na > 0 && self.inputs.iter().all(|(_, o)| o.nf == 0) {
-            return self.start_with_a(records, workspace);
-        }
         let mut from = orders.na;
-        let (mut systems, mut left) = (Vec::new(), outputs(records));
+        let mut all = Vec::with_capacity(self.inputs.len());
         for ((name, o), count) in self.inputs.iter().zip(counts) {
             let b = &theta[from..from + count];
             from += count;
-            let mut clean = Vec::with_capacity(records.len());
+            let mut each = Vec::with_capacity(records.len());
             for record in records {
                 let x = channel_or_input(record, name, &self.inputs[0].0)?;
                 let mut w = vec![0.0; x.len()];
                 fir(b, o.nk, x, &mut w);
                 divide_in_place(&a, &mut w);
-                clean.push(Record::new(
-                    record.sample_time(),
-                    Channel::new("x", "", x.to_vec()),
-                    Channel::new("w", "", w),
-                )?);
+                each.push(w);
             }
-            let (structure, alone) = if o.nf == 0 {
-                (
-                    Structure::Fir,
-                    Orders {
-                        nb: o.nb,
-                        nk: o.nk,
-                        ..Orders::default()
-                    },
-                )
-            } else {
-                let alone = Orders {
-                    nb: o.nb,
-                    nf: o.nf,
-                    nk: o.nk,
-                    ..Orders::default()
-                };
-                (Structure::OutputError, alone)
-            };
-            let fit = Estimator::new(structure, alone).fit(&clean)?;
-            let (b, f) = fit.model().theta().split_at(o.nb);
-            for (record, left) in clean.iter().zip(&mut left) {
-                let mut w = vec![0.0; left.len()];
-                fir(b, o.nk, record.input(), &mut w);
-                divide_in_place(f, &mut w);
-                add_scaled(left, -1.0, &w);
-            }
-            systems.push((b.to_vec(), f.to_vec()));
+            all.push(each);
         }
-        for series in &mut left {
-            let mean = series.iter().sum::<f64>() / series.len() as f64;
-            series.iter_mut().for_each(|v| *v -= mean);
-        }
-        let noise = self.noise(&left);
-        Ok(self.theta_of(&vec![0.0; self.na], &systems, &noise))
+        Ok(all)
     }
 
     /// The same where A takes the place of the F: an ARX model, and no noise model yet.
@@ -439,10 +473,6 @@ impl SeveralInputs {
 fn spread(values: &[f64]) -> f64 {
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
     values.iter().map(|v| (v - mean) * (v - mean)).sum()
-}
-
-fn outputs(records: &[Record]) -> Vec<Vec<f64>> {
-    records.iter().map(|record| record.output().to_vec()).collect()
 }
 
 fn channel<'r>(record: &'r Record, name: &str) -> Result<&'r [f64], IdentError> {

@@ -456,7 +456,7 @@ fn what_is_no_parquet_says_so() {
         assert!(record.contains("run.parquet"), "{record}");
         record
     };
-    assert!(message(b"").contains("no Parquet file: it is empty"));
+    assert!(message(b"").contains("not a Parquet file: it is empty"));
     let csv = message(b"t,e,u\n0,1,2\n0.01,3,4\n");
     assert!(
         csv.contains("it starts with \"t,e,u\\n0,1,2") && csv.contains(".csv"),

@@ -196,6 +196,8 @@ class BatchSettings(TypedDict, total=False):
             "lead2-lag",
             "quadratic-integral",
             "lead-droop",
+            "derivative",
+            "derivative-lead",
         ]
         | None
     )
@@ -220,6 +222,11 @@ class BatchSettings(TypedDict, total=False):
     # What a person's gain varies by from run to run, as a part of it: in the error bars of
     # fewer than five records. For operator.
     run_to_run: float | None
+
+    # Inputs beside the error, and what they are to the person: r=feedforward (a target that is
+    # seen; r=feedforward:0.5 with 0.5 s of its future), motion, output; one form alone as
+    # r=feedforward/derivative. For operator.
+    role: Sequence[str] | None
 
     # Parameters that each record has for itself, as K,T_L. For operator, noise="remnant".
     individual: Sequence[str] | None
@@ -403,7 +410,7 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
         change : Literal['none', 'sigmoid']
             Whether the operator changes: not at all, or its gains once, by a sigmoid. For
             operators.
-        form : Literal['auto', 'gain', 'lead', 'lead2', 'lag', 'lead-lag', 'lead2-lag', 'quadratic-integral', 'lead-droop']
+        form : Literal['auto', 'gain', 'lead', 'lead2', 'lag', 'lead-lag', 'lead2-lag', 'quadratic-integral', 'lead-droop', 'derivative', 'derivative-lead']
             Form of the operator; auto: estimates are averaged over the forms that the data
             leave, of one that changes lead. For operator, change="sigmoid".
         neuromuscular : Literal['yes', 'no']
@@ -422,6 +429,10 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
         run_to_run : float
             What a person's gain varies by from run to run, as a part of it: in the error bars
             of fewer than five records. For operator.
+        role : Sequence[str]
+            Inputs beside the error, and what they are to the person: r=feedforward (a target
+            that is seen; r=feedforward:0.5 with 0.5 s of its future), motion, output; one form
+            alone as r=feedforward/derivative. For operator.
         individual : Sequence[str]
             Parameters that each record has for itself, as K,T_L. For operator, noise="remnant".
         initial_state : Literal['auto', 'zero', 'estimate', 'backcast']

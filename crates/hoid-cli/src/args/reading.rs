@@ -9,8 +9,7 @@ use super::choices::choice_of;
 /// How record files are read.
 #[derive(Debug, Clone, Args)]
 pub struct ReadArgs {
-    /// Column of the input (tracking error): a name, -name, or a difference such as r-y. Repeated: columns of
-    /// what the person sees besides, as --input r-y --input r (see --role)
+    /// Column of the input (tracking error): a name, -name, or a difference such as r-y; repeat it for more inputs
     #[arg(
         id = "input",
         long = "input",

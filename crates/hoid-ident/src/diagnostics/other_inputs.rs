@@ -13,7 +13,7 @@ use crate::family::{ChannelRole, FamilyEstimator, FamilyFit, SeenChannel};
 const TARGETS: [&str; 4] = ["r", "f_t", "target", "reference"];
 /// Probability of the response by chance: where target and disturbance have lines of their own, and where the target alone
 /// excites the loop, so that what the form of the fit lacks looks like a response to the target.
-const BY_CHANCE: [f64; 2] = [1e-4, 1e-8];
+const BY_CHANCE: [f64; 2] = [1e-2, 1e-7];
 
 /// A doubt for each target that the person responds to.
 pub fn of_family(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[Record]) -> Vec<Finding> {

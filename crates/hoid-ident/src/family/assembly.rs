@@ -10,8 +10,9 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
     agreement::{Agreement, AgreementMethod, Side, agreement, with_level},
+    channel::ChannelFit,
     channel_lines::{AtChannelLines, InForm, tells_apart},
-    channels::{ChannelFit, with_responses},
+    channels::with_responses,
     choice::FormFigures,
     covariances::response_errors,
     diagnostics::{DiagnosticInputs, LARGEST_RESPONSE_ERROR, findings},

@@ -17,29 +17,28 @@
 //! **A future that is shown** makes delays that are negative: x is taken from as many samples ahead as are shown, and what
 //! is fitted is the delay to that.
 
-use std::{fmt, str::FromStr, sync::Arc};
+use std::sync::Arc;
 
 use hoid_core::filter::{divide_in_place, fir};
-use hoid_model::{
-    Complex64, Detrend, FamilyOperator, Form, Record, SampleTime, operator_family::Coordinate, uncertainty::Estimate,
-};
+use hoid_model::{Complex64, Detrend, Form, Record, SampleTime, operator_family::Coordinate};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
+    channel::{Channel, ChannelFit, ChannelForm, ChannelResponse, SeenChannel, lead},
     channel_lines::{AtChannelLines, ChannelLines, ChannelMinimum, InForm, own_places},
     coordinates::{self, Grid},
     covariances::Covariances,
     estimated::Errors,
     intersample::Intersample,
-    layout::ChannelInLayout,
     parameter::{CoordinateEstimate, Parameter},
     prediction::{NoiseOrders, Prediction},
     prediction_fit::PredictionFit,
     prior::OperatorPrior,
     response_fit::{MeasuredResponse, ResponseCriterion},
+    result::FamilyFit,
 };
 use crate::{
-    IdentError, InitialState, ResponsePoint, SearchOptions,
+    IdentError, InitialState, SearchOptions,
     criterion::{
         Criterion, Data, Workspace,
         further_input::{FurtherInput, InputOrders},
@@ -51,6 +50,8 @@ use crate::{
 
 /// Probability of a response where there is none.
 const BY_CHANCE: f64 = 0.01;
+/// Cost of a parameter of a form, in units of chi^2.
+const EACH_MORE: f64 = 4.0;
 /// Part of an input that the others must leave of it.
 const LEAST_OWN_PART: f64 = 1e-9;
 /// Order of A of the regression, and the fewest coefficients before it is given up.
@@ -67,196 +68,10 @@ const POINTS: usize = 24;
 /// Longest delay of a channel, s, behind what is shown first.
 const LONGEST_DELAY_S: f64 = 0.8;
 
-/// Role of a further input for the person.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ChannelRole {
-    /// A target that they see.
-    #[default]
-    Feedforward,
-    /// Motion of the machine that they feel.
-    Motion,
-    /// The output of the machine, which they see in addition to the error.
-    Output,
-}
-
-hoid_model::named_choice!(ChannelRole, "role of a channel", 3, {
-    Feedforward => "feedforward",
-    Motion => "motion",
-    Output => "output",
-});
-
-/// A further input, as requested.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SeenChannel {
-    /// Name of the channel in the records.
-    pub name: String,
-    /// What it is to the person.
-    pub role: ChannelRole,
-    /// How much of its future is shown, s.
-    pub preview_s: f64,
-    /// The forms to choose from; no response at all is always one of them unless there is one form alone.
-    pub forms: Vec<Form>,
-}
-
-impl SeenChannel {
-    /// A channel of which nothing else is known.
-    pub fn new(name: impl Into<String>, role: ChannelRole) -> Self {
-        Self {
-            name: name.into(),
-            role,
-            preview_s: 0.0,
-            forms: Form::OF_TARGET.to_vec(),
-        }
-    }
-}
-
-impl fmt::Display for SeenChannel {
-    /// As it is typed: `r=feedforward:0.5`.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}={}", self.name, self.role)?;
-        if self.preview_s > 0.0 {
-            write!(f, ":{}", self.preview_s)?;
-        }
-        match self.forms.as_slice() {
-            [only] => write!(f, "/{only}"),
-            _ => Ok(()),
-        }
-    }
-}
-
-impl FromStr for SeenChannel {
-    type Err = String;
-
-    /// `NAME`, `NAME=ROLE`, `NAME=ROLE:PREVIEW`, each with `/FORM` behind it.
-    fn from_str(text: &str) -> Result<Self, String> {
-        let expected = || "NAME=ROLE, as r=feedforward, r=feedforward:0.5 or r=feedforward/derivative".to_owned();
-        let (text, form) = match text.split_once('/') {
-            Some((head, form)) => (head, Some(form)),
-            None => (text, None),
-        };
-        let (name, role) = text.split_once('=').unwrap_or((text, ChannelRole::default().name()));
-        let (role, shown) = match role.split_once(':') {
-            Some((role, shown)) => (role, Some(shown)),
-            None => (role, None),
-        };
-        if name.trim().is_empty() {
-            return Err(expected());
-        }
-        let role = role.trim().parse::<ChannelRole>().map_err(|error| error.to_string())?;
-        let mut channel = Self::new(name.trim(), role);
-        if let Some(shown) = shown {
-            let seconds = shown.trim().trim_end_matches('s').parse::<f64>();
-            channel.preview_s = seconds
-                .ok()
-                .filter(|s| *s >= 0.0 && s.is_finite())
-                .ok_or_else(expected)?;
-        }
-        if let Some(form) = form {
-            channel.forms = vec![form.trim().parse::<Form>().map_err(|error| error.to_string())?];
-        }
-        Ok(channel)
-    }
-}
-
-/// Results of a further input.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct ChannelFit {
-    /// Name of the channel.
-    pub name: String,
-    /// What it is to the person.
-    pub role: ChannelRole,
-    /// How much of its future is shown, s.
-    pub preview_s: f64,
-    /// The forms that were compared, and the response that is none.
-    pub forms: Vec<ChannelForm>,
-    /// Probability of so large a likelihood ratio of the best form without a response, for all forms that were tried.
-    pub p_value: f64,
-    /// The response; `None` where none was found.
-    pub response: Option<ChannelResponse>,
-}
-
-/// A form of a channel, and what it leaves.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct ChannelForm {
-    /// The form; `None` is no response.
-    pub form: Option<Form>,
-    /// Loss of the prediction error fit, where there is one.
-    pub loss: Option<f64>,
-    /// Akaike's criterion in units of the inflation, less that of the best.
-    pub criterion: Option<f64>,
-}
-
-/// The response to a channel.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct ChannelResponse {
-    /// The operator; its delay is that to the end of what is shown.
-    pub operator: FamilyOperator,
-    /// Covariance of its coordinates by rows.
-    pub covariance: Option<Vec<f64>>,
-    /// Its parameters; the delay `tau_f` is that to what happens now, and negative where the person anticipates.
-    pub parameters: Vec<Parameter>,
-}
-
-impl ChannelFit {
-    /// Gain and phase of the response to the channel at frequencies in rad/s; `None` where there is none.
-    pub fn frequency_response(
-        &self,
-        omega_rad_s: &[f64],
-        (sample_time, intersample): (SampleTime, Intersample),
-    ) -> Option<Vec<ResponsePoint>> {
-        let of = self.response.as_ref()?;
-        let point = |&omega: &f64| {
-            let found = of.operator.response_and_gradient(omega);
-            let held = found.value
-                * intersample.response(omega, sample_time)
-                * Complex64::from_polar(1.0, omega * self.lead_s(sample_time));
-            let relative = of.covariance.as_deref().map(|c| found.relative_covariance(c));
-            let error = |part: usize| relative.map(|c| c[part][part].max(0.0).sqrt());
-            ResponsePoint {
-                omega_rad_s: omega,
-                magnitude_db: Estimate {
-                    value: 20.0 * held.norm().log10(),
-                    standard_error: error(0).map(|e| e * 20.0 / std::f64::consts::LN_10),
-                },
-                phase_deg: Estimate {
-                    value: held.arg().to_degrees(),
-                    standard_error: error(1).map(f64::to_degrees),
-                },
-            }
-        };
-        Some(omega_rad_s.iter().map(point).collect())
-    }
-
-    /// What is shown, in whole samples, s.
-    fn lead_s(&self, sample_time: SampleTime) -> f64 {
-        lead(self.preview_s, sample_time) as f64 * sample_time.s()
-    }
-}
-
-impl ChannelFit {
-    /// What was compared, its response not yet known.
-    fn compared(asked: &SeenChannel, forms: Vec<ChannelForm>, p_value: f64) -> Self {
-        Self {
-            name: asked.name.clone(),
-            role: asked.role,
-            preview_s: asked.preview_s,
-            forms,
-            p_value,
-            response: None,
-        }
-    }
-}
-
 /// Probability of a likelihood ratio as large for so many more parameters, in the best of so many forms.
 fn by_chance(ratio: f64, more: usize, forms: usize) -> f64 {
     let chance = ChiSquared::new(more as f64).map_or(1.0, |chi| chi.sf(ratio.max(0.0)));
     (chance * forms as f64).min(1.0)
-}
-
-/// Samples of the future that are shown.
-fn lead(preview_s: f64, sample_time: SampleTime) -> usize {
-    (preview_s / sample_time.s()).round() as usize
 }
 
 /// The channels of the records: their values without what was taken out of e and u.
@@ -495,7 +310,11 @@ impl<'s> Seen<'s> {
             let fits: Vec<(Form, Option<(Form, ChannelMinimum)>)> =
                 begun[k].iter().map(|c| (c.form, best_of(&with(c.form)))).collect();
             let found = fits.iter().filter_map(|(form, fit)| Some((*form, fit.as_ref()?)));
-            let found = found.min_by(|a, b| a.1.1.criterion().total_cmp(&b.1.1.criterion()));
+            // One more parameter has to explain more than chance does in one of twenty records.
+            let excess =
+                (fits.iter().filter_map(|(_, fit)| Some(fit.as_ref()?.1.excess()))).fold(f64::INFINITY, f64::min);
+            let cost = |fit: &ChannelMinimum| fit.chi_squared / excess + EACH_MORE * fit.coordinates.len() as f64;
+            let found = found.min_by(|a, b| cost(&a.1.1).total_cmp(&cost(&b.1.1)));
             let (form, fit) = found.ok_or(IdentError::NoFiniteLoss)?;
             let p_value = without.as_ref().map_or(0.0, |(_, without)| {
                 let ratio = (without.chi_squared - fit.1.chi_squared) / fit.1.excess();
@@ -738,9 +557,10 @@ impl<'s> Seen<'s> {
             let value = |fit: &PredictionFit<'a>| {
                 fit.residuals as f64 * fit.loss.ln() / inflation + 2.0 * fit.parameters() as f64
             };
+            let cost = |fit: &PredictionFit<'a>| value(fit) + (EACH_MORE - 2.0) * fit.parameters() as f64;
             let best = (fits.iter())
                 .filter_map(|(channel, fit)| Some((channel, fit.as_ref()?)))
-                .min_by(|a, b| value(a.1).total_cmp(&value(b.1)));
+                .min_by(|a, b| cost(a.1).total_cmp(&cost(b.1)));
             let (best, fit) = best.ok_or(IdentError::NoFiniteLoss)?;
             let p_value = without.as_ref().map_or(0.0, |without| {
                 let ratio = fit.residuals as f64 * (without.loss / fit.loss).ln() / inflation;
@@ -770,30 +590,6 @@ impl<'s> Seen<'s> {
             prediction.channels.sort_by_key(|channel| channel.index);
         }
         Ok(compared)
-    }
-}
-
-/// A further input in one form, for a prediction.
-#[derive(Debug, Clone)]
-pub(super) struct Channel<'a> {
-    /// Which of the channels that were asked for.
-    pub index: usize,
-    pub form: Form,
-    /// Bounds and start of its own coordinates.
-    pub limits: Vec<(f64, f64)>,
-    pub start: Vec<f64>,
-    /// Its values in each record.
-    pub values: Vec<&'a [f64]>,
-}
-
-impl Channel<'_> {
-    pub fn in_layout(&self) -> ChannelInLayout {
-        ChannelInLayout {
-            form: self.form,
-            limits: self.limits.clone(),
-            start: self.start.clone(),
-            place: 0,
-        }
     }
 }
 
@@ -856,56 +652,57 @@ pub(super) fn with_responses(
     Ok(compared)
 }
 
-/// u of a record without the responses to the further inputs, from rest.
-///
-/// # Errors
-/// [`IdentError`] for a record without one of them.
-pub(super) fn without_channels(
-    channels: &[ChannelFit],
-    record: &Record,
-    (detrend, intersample): (Detrend, Intersample),
-) -> Result<Record, IdentError> {
-    let asked: Vec<SeenChannel> = (channels.iter())
-        .map(|channel| SeenChannel {
-            preview_s: channel.preview_s,
-            ..SeenChannel::new(channel.name.clone(), channel.role)
-        })
-        .collect();
-    let label = record.label().to_owned();
-    let (mut cut, seen) = Seen::of(vec![record.clone()], &asked, detrend)?;
-    let Some(record) = cut.pop() else {
-        return Ok(record.clone());
-    };
-    let mut total = vec![0.0; record.len()];
-    for (channel, values) in channels.iter().zip(&seen.values) {
-        let Some(found) = &channel.response else { continue };
-        let held = intersample.discrete(&found.operator, None, record.sample_time())?;
-        let mut response = vec![0.0; record.len()];
-        fir(&held.b, held.nk, &values[0], &mut response);
-        divide_in_place(&held.f, &mut response);
-        add_scaled(&mut total, -1.0, &response);
-    }
-    let mut of_output = false;
-    let left = record.map_signals(|values| {
-        if std::mem::replace(&mut of_output, true) {
-            add_scaled(values, 1.0, &total);
+impl FamilyFit {
+    /// A record with u without the responses to the further inputs, from rest.
+    ///
+    /// # Errors
+    /// [`IdentError`] for a record without one of them.
+    pub fn without_channels(&self, record: &Record, detrend: Detrend) -> Result<Record, IdentError> {
+        let (channels, intersample) = (self.channels.as_slice(), self.intersample);
+        let asked: Vec<SeenChannel> = (channels.iter())
+            .map(|channel| SeenChannel {
+                preview_s: channel.preview_s,
+                ..SeenChannel::new(channel.name.clone(), channel.role)
+            })
+            .collect();
+        let label = record.label().to_owned();
+        let (mut cut, seen) = Seen::of(vec![record.clone()], &asked, detrend)?;
+        let Some(record) = cut.pop() else {
+            return Ok(record.clone());
+        };
+        let mut total = vec![0.0; record.len()];
+        for (channel, values) in channels.iter().zip(&seen.values) {
+            let Some(found) = &channel.response else { continue };
+            let held = intersample.discrete(&found.operator, None, record.sample_time())?;
+            let mut response = vec![0.0; record.len()];
+            fir(&held.b, held.nk, &values[0], &mut response);
+            divide_in_place(&held.f, &mut response);
+            add_scaled(&mut total, -1.0, &response);
         }
-    })?;
-    Ok(left.labelled(label))
+        let mut of_output = false;
+        let left = record.map_signals(|values| {
+            if std::mem::replace(&mut of_output, true) {
+                add_scaled(values, 1.0, &total);
+            }
+        })?;
+        Ok(left.labelled(label))
+    }
 }
-
 #[cfg(test)]
 mod tests {
     use std::f64::consts::TAU;
 
-    use hoid_model::Channel as Signal;
+    use hoid_model::{Channel as Signal, FamilyOperator};
     use rand_chacha::{
         ChaCha8Rng,
         rand_core::{Rng, SeedableRng},
     };
 
     use super::*;
-    use crate::{diagnostics::other_inputs, family::FamilyEstimator};
+    use crate::{
+        diagnostics::other_inputs,
+        family::{ChannelRole, FamilyEstimator},
+    };
 
     const TS: f64 = 0.02;
 

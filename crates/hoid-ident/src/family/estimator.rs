@@ -8,8 +8,9 @@ use hoid_model::{Detrend, Form, Record, Structure};
 use super::{
     arx_response::ArxResponse,
     assembly::{AtLines, Chosen, OtherForm},
+    channel::{ChannelFit, SeenChannel},
     channel_lines::{AtChannelLines, ChannelLines, InForm, tells_apart},
-    channels::{ChannelFit, Seen, SeenChannel},
+    channels::Seen,
     comparison::{Comparison, Tried},
     coordinates::Grid,
     intersample::Intersample,

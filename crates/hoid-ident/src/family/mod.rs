@@ -22,6 +22,7 @@
 //! |---|---|
 //! | `options` | [`FamilyEstimator`]: what may be chosen, by fields and by names |
 //! | `estimator` | the searches of all forms |
+//! | `channel` | a further input: as requested, in a form, its results |
 //! | `channels` | what a person sees besides the error |
 //! | `channel_lines` | the responses to all of it at the lines |
 //! | `comparison` | what each form is worth beside the others |
@@ -57,6 +58,7 @@
 mod agreement;
 mod arx_response;
 mod assembly;
+mod channel;
 mod channel_lines;
 mod channels;
 mod choice;
@@ -92,7 +94,7 @@ mod result;
 mod sensitivity;
 
 pub use agreement::{Agreement, AgreementMethod, AgreementPair, AgreementRow};
-pub use channels::{ChannelFit, ChannelForm, ChannelResponse, ChannelRole, SeenChannel};
+pub use channel::{ChannelFit, ChannelForm, ChannelResponse, ChannelRole, SeenChannel};
 pub use choice::FormFigures;
 pub use clusters::ClusterKind;
 pub use instrumental::InstrumentalFit;

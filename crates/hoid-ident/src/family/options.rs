@@ -3,7 +3,7 @@
 
 use hoid_model::{Detrend, Form, operator_family::Coordinate};
 
-use super::{channels::SeenChannel, intersample::Intersample, prior::OperatorPrior};
+use super::{channel::SeenChannel, intersample::Intersample, prior::OperatorPrior};
 use crate::{
     IdentError, InitialState, SearchOptions,
     order_selection::{NamedOrders, written},

@@ -15,7 +15,7 @@ use hoid_model::{
 };
 
 use super::{
-    channels::Channel,
+    channel::Channel,
     clusters::Clusters,
     coordinates, covariances,
     intersample::Intersample,

@@ -3,13 +3,13 @@
 use std::f64::consts::{LN_10, PI};
 
 use hoid_model::{
-    ContinuousTransferFunction, Detrend, FamilyOperator, Finding, Form, Record, SampleTime, Verdict,
-    operator_family::Coordinate, uncertainty::Estimate,
+    ContinuousTransferFunction, FamilyOperator, Finding, Form, SampleTime, Verdict, operator_family::Coordinate,
+    uncertainty::Estimate,
 };
 
 use super::{
     agreement::Agreement,
-    channels::{ChannelFit, SeenChannel, without_channels},
+    channel::{ChannelFit, SeenChannel},
     choice::FormFigures,
     clusters::ClusterKind,
     instrumental::InstrumentalFit,
@@ -21,7 +21,7 @@ use super::{
     parameter::Parameter,
     prior::OperatorPrior,
 };
-use crate::{Fit, IdentError, ResponsePoint, Termination};
+use crate::{Fit, ResponsePoint, Termination};
 
 /// An operator of one or several records.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -179,14 +179,6 @@ impl FamilyFit {
             })
         };
         self.channels.iter().filter_map(of).collect()
-    }
-
-    /// A record with what u does beside the responses to channels other than the error.
-    ///
-    /// # Errors
-    /// [`IdentError`] for a record without one of them.
-    pub fn without_channels(&self, record: &Record, taken_out: Detrend) -> Result<Record, IdentError> {
-        without_channels(&self.channels, record, (taken_out, self.intersample))
     }
 
     /// The operator of a record; of records beyond them, the last.

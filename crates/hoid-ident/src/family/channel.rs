@@ -1,0 +1,218 @@
+//! A further input: as requested, in a form, and its results.
+
+use std::{fmt, str::FromStr};
+
+use hoid_model::{Complex64, FamilyOperator, Form, SampleTime, uncertainty::Estimate};
+
+use super::{intersample::Intersample, layout::ChannelInLayout, parameter::Parameter};
+use crate::ResponsePoint;
+
+/// Role of a further input for the person.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ChannelRole {
+    /// A target that they see.
+    #[default]
+    Feedforward,
+    /// Motion of the machine that they feel.
+    Motion,
+    /// The output of the machine, which they see in addition to the error.
+    Output,
+}
+
+hoid_model::named_choice!(ChannelRole, "role of a channel", 3, {
+    Feedforward => "feedforward",
+    Motion => "motion",
+    Output => "output",
+});
+
+/// A further input, as requested.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SeenChannel {
+    /// Name of the channel in the records.
+    pub name: String,
+    /// What it is to the person.
+    pub role: ChannelRole,
+    /// How much of its future is shown, s.
+    pub preview_s: f64,
+    /// The forms to choose from; no response at all is always one of them unless there is one form alone.
+    pub forms: Vec<Form>,
+}
+
+impl SeenChannel {
+    /// A channel of which nothing else is known.
+    pub fn new(name: impl Into<String>, role: ChannelRole) -> Self {
+        Self {
+            name: name.into(),
+            role,
+            preview_s: 0.0,
+            forms: Form::OF_TARGET.to_vec(),
+        }
+    }
+}
+
+impl fmt::Display for SeenChannel {
+    /// As it is typed: `r=feedforward:0.5`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}", self.name, self.role)?;
+        if self.preview_s > 0.0 {
+            write!(f, ":{}", self.preview_s)?;
+        }
+        match self.forms.as_slice() {
+            [only] => write!(f, "/{only}"),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl FromStr for SeenChannel {
+    type Err = String;
+
+    /// `NAME`, `NAME=ROLE`, `NAME=ROLE:PREVIEW`, each with `/FORM` behind it.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = || "NAME=ROLE, as r=feedforward, r=feedforward:0.5 or r=feedforward/derivative".to_owned();
+        let (text, form) = match text.split_once('/') {
+            Some((head, form)) => (head, Some(form)),
+            None => (text, None),
+        };
+        let (name, role) = text.split_once('=').unwrap_or((text, ChannelRole::default().name()));
+        let (role, shown) = match role.split_once(':') {
+            Some((role, shown)) => (role, Some(shown)),
+            None => (role, None),
+        };
+        if name.trim().is_empty() {
+            return Err(expected());
+        }
+        let role = role.trim().parse::<ChannelRole>().map_err(|error| error.to_string())?;
+        let mut channel = Self::new(name.trim(), role);
+        if let Some(shown) = shown {
+            let seconds = shown.trim().trim_end_matches('s').parse::<f64>();
+            channel.preview_s = seconds
+                .ok()
+                .filter(|s| *s >= 0.0 && s.is_finite())
+                .ok_or_else(expected)?;
+        }
+        if let Some(form) = form {
+            channel.forms = vec![form.trim().parse::<Form>().map_err(|error| error.to_string())?];
+        }
+        Ok(channel)
+    }
+}
+
+/// Results of a further input.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ChannelFit {
+    /// Name of the channel.
+    pub name: String,
+    /// What it is to the person.
+    pub role: ChannelRole,
+    /// How much of its future is shown, s.
+    pub preview_s: f64,
+    /// The forms that were compared, and the response that is none.
+    pub forms: Vec<ChannelForm>,
+    /// Probability of so large a likelihood ratio of the best form without a response, for all forms that were tried.
+    pub p_value: f64,
+    /// The response; `None` where none was found.
+    pub response: Option<ChannelResponse>,
+}
+
+/// A form of a channel, and what it leaves.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ChannelForm {
+    /// The form; `None` is no response.
+    pub form: Option<Form>,
+    /// Loss of the prediction error fit, where there is one.
+    pub loss: Option<f64>,
+    /// Akaike's criterion in units of the inflation, less that of the best.
+    pub criterion: Option<f64>,
+}
+
+/// The response to a channel.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ChannelResponse {
+    /// The operator; its delay is that to the end of what is shown.
+    pub operator: FamilyOperator,
+    /// Covariance of its coordinates by rows.
+    pub covariance: Option<Vec<f64>>,
+    /// Its parameters; the delay `tau_f` is that to what happens now, and negative where the person anticipates.
+    pub parameters: Vec<Parameter>,
+}
+
+impl ChannelFit {
+    /// Gain and phase of the response to the channel at frequencies in rad/s; `None` where there is none.
+    pub fn frequency_response(
+        &self,
+        omega_rad_s: &[f64],
+        (sample_time, intersample): (SampleTime, Intersample),
+    ) -> Option<Vec<ResponsePoint>> {
+        let of = self.response.as_ref()?;
+        let point = |&omega: &f64| {
+            let found = of.operator.response_and_gradient(omega);
+            let held = found.value
+                * intersample.response(omega, sample_time)
+                * Complex64::from_polar(1.0, omega * self.lead_s(sample_time));
+            let relative = of.covariance.as_deref().map(|c| found.relative_covariance(c));
+            let error = |part: usize| relative.map(|c| c[part][part].max(0.0).sqrt());
+            ResponsePoint {
+                omega_rad_s: omega,
+                magnitude_db: Estimate {
+                    value: 20.0 * held.norm().log10(),
+                    standard_error: error(0).map(|e| e * 20.0 / std::f64::consts::LN_10),
+                },
+                phase_deg: Estimate {
+                    value: held.arg().to_degrees(),
+                    standard_error: error(1).map(f64::to_degrees),
+                },
+            }
+        };
+        Some(omega_rad_s.iter().map(point).collect())
+    }
+
+    /// What is shown, in whole samples, s.
+    pub(super) fn lead_s(&self, sample_time: SampleTime) -> f64 {
+        lead(self.preview_s, sample_time) as f64 * sample_time.s()
+    }
+}
+
+impl ChannelFit {
+    /// What was compared, its response not yet known.
+    pub(super) fn compared(asked: &SeenChannel, forms: Vec<ChannelForm>, p_value: f64) -> Self {
+        Self {
+            name: asked.name.clone(),
+            role: asked.role,
+            preview_s: asked.preview_s,
+            forms,
+            p_value,
+            response: None,
+        }
+    }
+}
+
+/// Samples of the future that are shown.
+pub(super) fn lead(preview_s: f64, sample_time: SampleTime) -> usize {
+    (preview_s / sample_time.s()).round() as usize
+}
+
+/// A further input in one form, for a prediction.
+#[derive(Debug, Clone)]
+pub(super) struct Channel<'a> {
+    /// Which of the channels that were asked for.
+    pub index: usize,
+    pub form: Form,
+    /// Bounds and start of its own coordinates.
+    pub limits: Vec<(f64, f64)>,
+    pub start: Vec<f64>,
+    /// Its values in each record.
+    pub values: Vec<&'a [f64]>,
+}
+
+impl Channel<'_> {
+    pub fn in_layout(&self) -> ChannelInLayout {
+        ChannelInLayout {
+            form: self.form,
+            limits: self.limits.clone(),
+            start: self.start.clone(),
+            place: 0,
+        }
+    }
+}
