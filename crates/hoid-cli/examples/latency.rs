@@ -1,4 +1,4 @@
-//! How long `hoid stream` takes to answer a sample, and what happens when readers stop, either side begins again,
+//! How long `hoid stream` takes to answer a sample, and what happens when readers stop, either side starts again,
 //! clocks jump and datagrams are hostile. The numbers of `research/notes/latency.md`.
 //!
 //! `cargo xtask slow latency [--seconds N] [--seed N] [--program FILE] [--python FILE]`: each way and rate for 600 s,

@@ -71,7 +71,7 @@ fn both_responses_are_found_and_one_input_is_told_off() {
         let off = off(of(parameters, name), truth);
         assert!(off.abs() < 3.5, "{name} is off by {off} errors");
     }
-    // By hand: |2.2/omega| = 1 but for the neuromuscular system.
+    // By hand: |2.2/omega| = 1 except for the neuromuscular system.
     let crossover = &two["open_loop"]["crossover_rad_s"];
     assert!(off(crossover, 2.236).abs() < 3.5, "{crossover}");
 

@@ -3,8 +3,8 @@
 //! `cargo xtask slow challenge [--cases NAME,...] [--methods NAME,...] [--seeds open|sealed] [--runs N]
 //! [--part I/N] [--out DIRECTORY] [--page FILE --measured TEXT] [--list]`: 4 runs of every case, all
 //! contestants, the open seeds, and lines of JSON in `challenge-results/` by default. What is there is
-//! not computed again. A case is named by its name, its beginning (`none-`) or its theme. `--page`
-//! writes `research/notes/challenge.md`; `--list` tells the cases alone.
+//! not computed again. A case is named by its name, its start (`none-`) or its theme. `--page`
+//! writes `research/notes/challenge.md`; `--list` lists the cases alone.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 use std::{path::PathBuf, process::ExitCode};

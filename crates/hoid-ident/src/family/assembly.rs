@@ -67,7 +67,7 @@ pub(super) struct Chosen<'p, 'a> {
     /// All forms that were compared.
     pub forms: Vec<FormFigures>,
     pub prediction: &'p Prediction<'a>,
-    /// The channels beside the error, as they were compared.
+    /// The channels in addition to the error, as they were compared.
     pub channels: Vec<ChannelFit>,
     /// The records, detrended.
     pub records: &'p [Record],

@@ -32,7 +32,7 @@ pub fn asked(args: &IdentifyArgs) -> Result<ResolvedRequest, CliError> {
     }
 }
 
-/// The options by their names; every input beside the first has a role.
+/// The options by their names; every input in addition to the first has a role.
 fn options(args: &IdentifyArgs) -> Result<BTreeMap<String, String>, CliError> {
     let given = args.options.given();
     let mut all: BTreeMap<String, String> = given.map(|(name, text)| (name.to_owned(), text.to_owned())).collect();
