@@ -214,7 +214,7 @@ impl<'a> Chosen<'_, 'a> {
             return None;
         }
         let data = match (&self.lines.channels, self.lines.describing) {
-            (Some(at), _) => Lines::Channels(at.criterion(fit.layout().form, &self.lines.in_form)),
+            (Some(at), _) => Lines::Channels(Box::new(at.criterion(fit.layout().form, &self.lines.in_form))),
             (None, Some(describing)) => Lines::Response(LineData::new(describing)),
             (None, None) => return None,
         };

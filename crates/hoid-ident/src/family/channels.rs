@@ -85,6 +85,16 @@ pub(super) struct Seen<'s> {
     whole: Vec<Record>,
 }
 
+/// The forms of the further inputs at the lines.
+pub(super) struct Compared<'a> {
+    /// The forms that were compared.
+    pub fits: Vec<ChannelFit>,
+    /// The inputs with a response, with starts for the search.
+    pub channels: Vec<Channel<'a>>,
+    /// The same as fits at the lines have them.
+    pub in_form: Vec<InForm>,
+}
+
 impl<'s> Seen<'s> {
     /// The channels, and the records as far as all of them have samples.
     ///
@@ -286,7 +296,7 @@ impl<'s> Seen<'s> {
         at: &AtChannelLines<'_>,
         operators: &[Form],
         begun: Vec<Vec<Channel<'a>>>,
-    ) -> Result<(Vec<ChannelFit>, Vec<Channel<'a>>, Vec<InForm>), IdentError> {
+    ) -> Result<Compared<'a>, IdentError> {
         let best_of = |channels: &[InForm]| {
             let fits = operators
                 .iter()
@@ -354,7 +364,11 @@ impl<'s> Seen<'s> {
                 ..begun.clone()
             });
         }
-        Ok((compared, channels, in_use))
+        Ok(Compared {
+            fits: compared,
+            channels,
+            in_form: in_use,
+        })
     }
 
     /// The responses to e and to each channel, by one regression, without a form.
