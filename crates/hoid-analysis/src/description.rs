@@ -46,12 +46,12 @@ impl Excitation {
 }
 
 impl Recordings {
-    /// The describing function of the recordings as they are used. Where an offset has cost rows, so that less than
-    /// whole periods are left, they are read without it: it is a phase of what is periodic. `None` if no excitation is
+    /// Computes the describing function of the recordings. If an offset has cost rows, so that less than whole periods
+    /// are left, they are read again without it: it is a phase of a periodic signal. `None` if no excitation is
     /// wanted.
     ///
     /// # Errors
-    /// [`AnalysisError`], where there are no lines, or the files cannot be read again.
+    /// [`AnalysisError`] if there are no lines, or the files cannot be read again.
     pub fn described(
         &self,
         excitation: &Excitation,
