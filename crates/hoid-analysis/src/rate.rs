@@ -12,7 +12,6 @@ impl Recordings {
     ///
     /// # Errors
     /// The errors of the decimation.
-    /// The errors of the decimation.
     pub fn at_rate(mut self, decimation: Decimation, counts_samples: bool) -> Result<Self, AnalysisError> {
         if self.settles_the_rate() {
             return Ok(self);
