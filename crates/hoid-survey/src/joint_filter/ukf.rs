@@ -65,7 +65,7 @@ fn root(p: &Matrix) -> Matrix {
     let mut l = [[0.0; N]; N];
     for j in 0..N {
         let rest = p[j][j] - (0..j).map(|k| l[j][k] * l[j][k]).sum::<f64>();
-        // The share of rounding errors in the remainder of a variance.
+        // A remainder below this share of the variance is rounding error.
         if rest > 1e-14 * p[j][j] {
             l[j][j] = rest.sqrt();
             for i in j + 1..N {
