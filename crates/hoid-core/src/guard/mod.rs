@@ -1,8 +1,8 @@
-//! A guard in front of a recursion: samples that no tracking signal makes, and spans that are not tracking.
+//! A guard in front of a recursion: samples that no tracking signal contains, and spans that are not tracking.
 //!
-//! A wrong sample of e does not pass with its innovation. It enters `w = (B/F) q^-nk e` and the gradients of w only nk
-//! samples later, and stays in them for the time constants of F. To limit innovations is therefore not enough: the
-//! samples themselves are compared with what the signal predicts, before anything sees them.
+//! A wrong sample of e has more effect than its innovation. It enters `w = (B/F) q^-nk e` and the gradients of w only
+//! nk samples later, and stays in them for the time constants of F. Limiting innovations is therefore not enough: the
+//! samples themselves are compared with their prediction, before they are used.
 //!
 //! | file | contents |
 //! |---|---|
@@ -11,7 +11,7 @@
 //! | [`resting`] | a stick that rests, told from a channel that is frozen |
 //! | [`mod@reference`] | the model of the start next to the estimate: an estimate that has gone diverged |
 //!
-//! Such samples and spans are handled where the recursion is available, in the crate `hoid-track`.
+//! The treatment of such samples and spans is in the crate `hoid-track`.
 
 pub mod channel;
 pub mod profile;

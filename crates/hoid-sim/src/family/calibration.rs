@@ -1,9 +1,9 @@
 //! The gain of each part of the remnant that gives it its share of the variance of u.
 //!
 //! Part i with gain 1 contributes `V_i = sum over k of h_i(k)^2` to the variance of u, with h_i the response of u,
-//! through the closed loop, to one unit of w at sample 0. The sinusoids of target and disturbance contribute `V_0 =
-//! sum of A^2/2 |u/f|^2` at their frequencies, with the responses of the sampled loop. All parts are independent, so
-//! that with shares p_i
+//! through the closed loop, to one unit of w at sample 0. The sinusoids of target and disturbance contribute
+//! `V_0 = sum of A^2/2 |u/f|^2` at their frequencies, with the responses of the sampled loop. All parts are
+//! independent, so that with shares p_i
 //!
 //! `var u = (V_0 + sum of K_j^2 V_j of given gains) / (1 - sum of p_i)`, `K_i^2 = p_i var u / V_i`.
 //!

@@ -8,9 +8,9 @@
 //! `x(k) = A(w) x(k-1) + B(w) e(k - nk) + w_x`, `u = C(w) x`, `C = [K_e, K_e_dot, 1]`,
 //!
 //! A and B held exactly. The parameters `w = [K_e, K_e_dot, omega_nm, zeta_nm]` are a random walk. At each sample the
-//! parameters are predicted (they stay constant, P_w grows), the state is predicted with them, and the innovation `eps
-//! = u - C x` corrects both: the parameters along `h = d(C x)/dw`, the total derivative, which includes the dependence
-//! of the state,
+//! parameters are predicted (they stay constant, P_w grows), the state is predicted with them, and the innovation
+//! `eps = u - C x` corrects both: the parameters along `h = d(C x)/dw`, the total derivative, which includes the
+//! dependence of the state,
 //!
 //! `D(k|k-1) = A D(k-1|k-1) + (dA/dw) x + (dB/dw) e`, `h = C D(k|k-1) + (dC/dw) x`,
 //! `D(k|k) = D(k|k-1) - g h` with the gain g of the state filter (its own dependence on w left out).

@@ -1,7 +1,7 @@
 //! The unscented Kalman filter: 2 N points `X ± sqrt(N) L_i`, with `L L' = P`, of equal weight pass through transition
 //! and output, and give their means and covariances (S. J. Julier and J. K. Uhlmann, *Proceedings of the IEEE* 92
-//! (2004) 401-422, with kappa = 0). The points are drawn again after the noise of the transition has been added. `X <-
-//! X + c/s eps`, `P <- P - c c'/s`, with c the covariance of X with the output and s the variance of the output.
+//! (2004) 401-422, with kappa = 0). The points are drawn again after the noise of the transition has been added.
+//! `X <- X + c/s eps`, `P <- P - c c'/s`, with c the covariance of X with the output and s the variance of the output.
 
 use super::belief::{Belief, Matrix, Model, N};
 

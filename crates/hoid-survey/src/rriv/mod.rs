@@ -144,9 +144,8 @@ struct Work {
 }
 
 impl RefinedRecursion {
-    /// From a start, with a forgetting factor in (0, 1] for each parameter; `external` makes the
-    /// instruments of the external signal of each sample (where one is missing, the last one
-    /// holds).
+    /// Starts with a forgetting factor in (0, 1] for each parameter; `external` makes the instruments from the
+    /// external signal of each sample (if one is missing, the last one is kept).
     ///
     /// # Errors
     /// [`IdentError::BadOption`] for orders with A or C, or factors out of range;

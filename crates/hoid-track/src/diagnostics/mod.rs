@@ -4,6 +4,7 @@
 //! count, as doubts at most: the recursion may leave it. A change inside the start span is a note for methods that
 //! forget and a doubt for the others. Of the rows in which the estimate moves, at most [`ROWS`] are examined, at equal
 //! distances:
+//!
 //! | kind | observation |
 //! |---|---|
 //! | `start-explains-little` | VAF of the simulated start fit on its span below 20 % |
