@@ -89,7 +89,7 @@ mod tests {
         // When half of what is read is new, it is one of weight 1/4; when all is, of none.
         assert!((all.scatter(&about, 175, 150)[2][2] - 0.8).abs() < 1e-12);
         assert_eq!(all.scatter(&about, 250, 150)[2][2], 0.0);
-        // The same again, far behind.
+        // The same again, much less likely.
         all.put(0, other, 300.0, 200);
         assert!(all.scatter(&about, 200, 150)[2][2] < 1e-9);
         all.put(STARTS, other, 0.0, 200);
