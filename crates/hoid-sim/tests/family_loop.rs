@@ -279,7 +279,7 @@ fn the_describing_function_is_the_operator_behind_a_hold() {
                 polynomial::value(&held.b, backward) / polynomial::value(&f, backward) * backward.powu(held.nk as u32);
             let error = (found - exact).norm() / exact.norm();
             assert!(error < 1e-6, "{:?} {omega}: {error}", operator.form());
-            // In continuous time behind half a sample of delay, up to (omega Ts)^2.
+            // In continuous time with half a sample of delay, up to (omega Ts)^2.
             let near = operator.response(omega) * Complex64::from_polar(1.0, -omega * ts / 2.0);
             assert!((found - near).norm() / near.norm() < 2e-3 + (omega * ts).powi(2));
         }

@@ -105,7 +105,7 @@ fn is_stable(theta: &[f64; 5]) -> bool {
 fn rpem(record: &Record, start: &[f64]) -> Vec<Vec<f64>> {
     let mut theta = <[f64; 5]>::try_from(start).unwrap();
     let (mut p, u) = (Plain::new(), record.output());
-    // x, v, w and those behind D/F, of the last two samples.
+    // x, v, w and their versions filtered by D/F, of the last two samples.
     let (mut x_1, mut v_1, mut w, mut x_f, mut w_f) = (0.0, 0.0, [0.0; 2], [0.0; 2], [0.0; 2]);
     let step = |k: usize| {
         let x = delayed(record, k);

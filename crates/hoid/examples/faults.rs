@@ -1,5 +1,5 @@
-//! What does a fault of a recording do to a result, and does the result say so? The numbers of the
-//! page `research/notes/faults.md`.
+//! Effect of a fault of a recording on a result, and whether the result reports it. The numbers of the page
+//! `research/notes/faults.md`.
 //!
 //! `cargo xtask slow faults [--part N] [--clean N] [--only METHOD] [--rows FILE] [--program FILE] [--seed N]`: all
 //! faults in runs of C1, of C2 and of a virtual person, then clean runs (1000 in all by default, evaluated in batch and

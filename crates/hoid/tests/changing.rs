@@ -149,7 +149,7 @@ fn a_delay_that_changes_is_followed_and_named() {
             assert!(error.abs() < 4.0 * se && se < 0.02, "{t}: {tau:?}");
         }
     }
-    // A start outside the tracked range, an invalid range, and both-sided estimates.
+    // A start outside the tracked range, an invalid range, and two-sided estimates.
     let refused = |options: TrackOptions| {
         track(&run(Condition::C1, 1, 0.1, 0), &options, 8)
             .unwrap_err()

@@ -17,7 +17,7 @@ fn run(replication: u64) -> Record {
     simulator.run(run_seed, false).unwrap()
 }
 
-/// A record of e and u alone, the output `late` samples behind.
+/// A record of e and u alone, with the output `late` samples late.
 fn bare(record: &Record, late: usize) -> Record {
     let n = record.len();
     let channel = |name: &str, values: &[f64]| Channel::new(name, "", values.to_vec());
@@ -38,7 +38,7 @@ fn prepared(record: Record, change: impl FnOnce(&mut Preparation)) -> Record {
 #[test]
 fn an_offset_gives_the_fit_of_the_aligned_record() {
     let whole = run(1);
-    // u is constant three samples late in the file.
+    // u is recorded three samples late in the file.
     let late = bare(&whole, 3);
     let aligned = prepared(late, |p| {
         p.offset.insert("u".into(), Offset::Samples(3.0));

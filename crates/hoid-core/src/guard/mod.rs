@@ -8,7 +8,7 @@
 //! |---|---|
 //! | [`channel`] | one signal: the causal prediction of its next sample, the scale of its errors, samples that are held back |
 //! | [`profile`] | both signals over a second: sizes and smoothness against those of the past; idle, frozen and swapped channels, a model that predicts less than the past of u alone |
-//! | [`resting`] | a stick that rests, told from a channel that is frozen |
+//! | [`resting`] | a resting stick, distinguished from a frozen channel |
 //! | [`mod@reference`] | the model of the start next to the estimate: an estimate that has gone diverged |
 //!
 //! The treatment of such samples and spans is in the crate `hoid-track`.
