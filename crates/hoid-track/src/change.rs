@@ -1,9 +1,9 @@
-//! When a person changed, as a method reports it, and the published baseline.
+//! Change of a person as a method reports it, and the published baseline.
 //!
-//! The baseline looks at the loop from outside: an adaptation is taken to be needed while the
-//! tracking error or its rate is larger than k of its standard deviations before the change (R. A.
-//! Hess, *Journal of Guidance, Control, and Dynamics* 32 (2009): three; here either signal raises
-//! the alarm, the rate by the difference of neighbouring samples).
+//! The baseline uses only the signals of the loop: an adaptation is assumed to be needed while the tracking error or
+//! its rate is larger than k of its standard deviations before the change (R. A. Hess, *Journal of Guidance, Control,
+//! and Dynamics* 32 (2009): three; here either signal raises the alarm, and the rate is the difference of neighbouring
+//! samples).
 
 use hoid_model::{SampleTime, uncertainty::Estimate};
 use hoid_numerics::statistics::{mean, sample_variance};

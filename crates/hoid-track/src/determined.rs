@@ -1,4 +1,4 @@
-//! Which parameters of an operator the data determine.
+//! The parameters of an operator that the data determine.
 //!
 //! A parameter is determined if it is more than two standard errors from zero and, if the method has a prior of it, if
 //! the data have at least halved the prior variance: otherwise the value is that of the prior.

@@ -43,7 +43,7 @@ pub fn too_many(parameters: usize) -> IdentError {
 pub struct Plan<'a> {
     /// Structure, orders and options.
     pub setup: &'a Setup,
-    /// Where it starts.
+    /// Start of the recursion.
     pub from: &'a StartState,
     /// Time between samples.
     pub sample_time: SampleTime,

@@ -115,7 +115,7 @@ struct Channel {
 hoid_core::state!([] Channel { value, stands, same, last, steps, jumped, tolerance, first, largest, size, blocks });
 
 impl Channel {
-    /// Nothing is known.
+    /// A channel before the first sample.
     const NEW: Self = Self {
         value: f64::NAN,
         stands: 0,

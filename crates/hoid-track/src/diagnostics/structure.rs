@@ -125,7 +125,7 @@ mod tests {
         simulator.run(seed, false).unwrap()
     }
 
-    /// The same with another response to the error on its way: this share of K_e, so many samples later.
+    /// The same record with an additional response to the error: this share of K_e, this many samples later.
     fn with_echo(record: &Record, share: f64, later: usize) -> Record {
         let e = record.input();
         let echo = |k: usize| k.checked_sub(later).map_or(0.0, |k| share * 0.09 * e[k]);
@@ -156,7 +156,7 @@ mod tests {
         let record = run(0).span(0.0, 25.0).unwrap();
         let trace = track(&record, &TrackOptions::default_for(Method::adaptive(), 29), 50).unwrap();
         assert_eq!(trace.residual_response(&record), None);
-        // A method without this basis is not asked.
+        // A method without this basis is not tested.
         let record = run(0);
         let trace = track(&record, &TrackOptions::default_for(Method::rls(), 29), 50).unwrap();
         assert_eq!(trace.missed_structure(&record), None);

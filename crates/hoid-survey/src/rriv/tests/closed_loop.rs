@@ -80,8 +80,8 @@ fn in_a_closed_loop_the_bias_is_small() {
                 square.map(|x: f64| 100.0 * x.sqrt())
             );
             for (k, (mean, square)) in mean.into_iter().zip(square).enumerate() {
-                // 3.5 errors of the mean; with m0 = 2 the noise model is too small, which is worth
-                // some per cent of b.
+                // 3.5 errors of the mean; with m0 = 2 the order of the noise model is too low, which costs some per
+                // cent of b.
                 let share = if m0 == 1 { 0.0 } else { [0.03, 0.03, 0.002, 0.004][k] };
                 assert!(
                     mean.abs() < 3.5 * (square / runs as f64).sqrt() + share,
