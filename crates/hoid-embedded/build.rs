@@ -1,4 +1,4 @@
-//! The memory of the board for the linker, where there is a board.
+//! Passes the memory layout of the board to the linker, if there is a board.
 
 use std::{env, error::Error, fs, path::PathBuf};
 

@@ -1,10 +1,10 @@
 //! Reliability of each answer of a result: the response, crossover and phase margin, each parameter.
 //!
 //! A finding against the data or the fit counts against all answers. In addition, an answer can be undetermined by
-//! itself: a parameter that the data do not determine, a crossover whose interval holds zero. The level of the whole is
-//! that of the answers that were requested: a result whose delay is open is trustworthy in its report on the crossover,
-//! and not determined for a request for the delay. By default it is that of the response, and a loop that is open is a
-//! doubt.
+//! itself: a parameter that the data do not determine, a crossover whose interval contains zero. The level of the
+//! whole is that of the requested answers: a result whose delay is undetermined is trustworthy for a request for the
+//! crossover, and not determined for a request for the delay. By default it is that of the response, and an
+//! undetermined loop is a doubt.
 
 use hoid_ident::{Fit, GreyBoxFit, SigmoidFit, diagnostics::is_open, family::FamilyFit};
 use hoid_model::{ContinuousTransferFunction, Finding, Verdict, operator_family::PARAMETERS, uncertainty::Estimate};
@@ -17,7 +17,7 @@ pub const RESPONSE: &str = "response";
 pub const LOOP: [&str; 2] = ["crossover", "phase_margin"];
 /// Kind of the finding that makes a single answer undetermined.
 const OPEN: &str = "open-answer";
-/// Errors of the crossover, as a part of it, and of the margin in deg, beyond which they are open.
+/// Largest standard errors of a determined crossover, as a share of it, and of a determined margin, deg.
 const LARGEST_ERRORS: [f64; 2] = [0.5, 30.0];
 
 /// An answer, and the reason why it is undetermined.
@@ -25,17 +25,17 @@ const LARGEST_ERRORS: [f64; 2] = [0.5, 30.0];
 pub struct Answered {
     /// `response`, `crossover`, `phase_margin`, or the name of a parameter.
     pub name: String,
-    /// Why the data do not determine it, where they do not.
+    /// Reason why the data do not determine it, if they do not.
     pub open: Option<Finding>,
 }
 
-/// A fit that shows the prior knowledge of each of its answers.
+/// A fit that judges each of its answers.
 pub trait Answers {
-    /// All of them, with this controlled element.
+    /// Returns all answers, with this controlled element.
     fn answers(&self, element: Option<&ContinuousTransferFunction>) -> Vec<Answered>;
 }
 
-/// The names of answers that are requested.
+/// Returns the names of the requested answers.
 ///
 /// # Errors
 /// [`AnalysisError::Options`] for an unknown name.
@@ -60,7 +60,7 @@ pub fn asked_for(names: &[String]) -> Result<Vec<String>, AnalysisError> {
     names.iter().map(one).collect()
 }
 
-/// The verdict on the request, from the prior knowledge of the fit and what its answers show; by default of the
+/// Returns the verdict on the requested answers, from the findings of the fit and of its answers; by default on the
 /// response, with doubts of the loop.
 pub fn judged(verdict: Verdict, answers: &[Answered], asked: &[String]) -> Verdict {
     let of = |name: &str| answers.iter().find(|answer| answer.name == name);
@@ -79,8 +79,8 @@ pub fn judged(verdict: Verdict, answers: &[Answered], asked: &[String]) -> Verdi
     verdict.append(open)
 }
 
-/// The verdict on one answer: the prior knowledge of the fit as a whole, and the reason why this
-/// one is undetermined.
+/// Returns the verdict on one answer: the findings of the fit as a whole, and the reason why this answer is
+/// undetermined.
 pub fn of_answer(verdict: &Verdict, answer: &Answered) -> Verdict {
     let whole = verdict.findings().iter().filter(|finding| finding.kind != OPEN);
     Verdict::of(whole.chain(&answer.open).cloned().collect())
@@ -97,7 +97,7 @@ fn answered(name: &str, why: Option<String>) -> Answered {
     }
 }
 
-/// An estimate with its interval of 95 %.
+/// An estimate with its 95 % interval.
 type Measured = (Estimate, Option<(f64, f64)>);
 
 /// Crossover and margin, `None` for those that the loop does not have, with their intervals.

@@ -1,13 +1,13 @@
 //! Runs that are given twice.
 //!
-//! Errors come from the scatter between runs: a run that represents two has none, and the errors of a result would be
+//! Standard errors come from the scatter between runs: a copy adds no information, and the errors of a result would be
 //! too small by up to the square root of two.
 
 use hoid_model::Record;
 
 use crate::{AnalysisError, recordings::Recordings};
 
-/// Refuses recordings of which two hold the same samples.
+/// Refuses recordings of which two contain the same samples.
 pub(crate) fn refuse_copies(all: &Recordings) -> Result<(), AnalysisError> {
     for (i, record) in all.records.iter().enumerate() {
         let same = |other: &&Record| {

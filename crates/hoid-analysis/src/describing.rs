@@ -1,8 +1,8 @@
-//! From recordings to a describing function and its verdict: repaired, at their rate, over whole periods.
+//! From recordings to a describing function and its verdict: repaired, decimated, over whole periods.
 //!
-//! A channel that was recorded late is a phase of what is periodic: an offset is not taken out by moving rows,
-//! which would cost the last whole period, but given to the ratio at each line ([`without_offsets`]). So is what
-//! a decimation moved the input by for its hold: a ratio of samples knows no hold.
+//! The offset of a channel is a phase of a periodic signal: it is not removed by moving rows, which would cost the
+//! last whole period, but applied to the ratio at each line ([`without_offsets`]). The same holds for the shift of the
+//! input by which a decimation accounts for its hold: a ratio of samples has no hold.
 //!
 //! [`without_offsets`]: crate::without_offsets
 
@@ -16,12 +16,12 @@ use crate::{
     AnalysisError, offset::late_samples, quality::Of, reading::Reading, recordings::Recordings, settings::Setting,
 };
 
-/// How recordings are described.
+/// Options of a description of recordings.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Describing {
-    /// Excitation, lines, period, element, span. Its offset, in samples of the recordings, adds to the offsets.
+    /// Excitation, lines, period, element, span. Its offset, in samples of the recordings, is added to the offsets.
     pub options: DescriptionOptions,
-    /// Offsets of channels by their names, which were not taken out in reading.
+    /// Offsets of channels by their names, which were not removed in reading.
     pub offsets: BTreeMap<String, Offset>,
     /// Treatment of faults of the recordings.
     pub faults: FaultHandling,
@@ -32,19 +32,19 @@ pub struct Describing {
 /// The described response.
 #[derive(Debug, Clone)]
 pub struct Described {
-    /// The describing function; its verdict knows what was wrong with the recordings.
+    /// The describing function; its verdict includes the findings of the recordings.
     pub found: Description,
-    /// The recordings as they were described.
+    /// The recordings that were described.
     pub data: Recordings,
     /// The settings that were used.
     pub settings: Vec<Setting>,
 }
 
 impl Describing {
-    /// Repairs the recordings, brings them to their rate, describes them and forms the verdict.
+    /// Repairs the recordings, decimates them, describes them and forms the verdict.
     ///
     /// # Errors
-    /// [`AnalysisError`] where there is no result: no lines, no whole period, no such channel.
+    /// [`AnalysisError`] if there is no result: no lines, no whole period, no such channel.
     pub fn run(&self, recordings: Recordings) -> Result<Described, AnalysisError> {
         let read = recordings.repaired(self.faults, Of::Person)?;
         let first = read.records.first().ok_or(AnalysisError::NoRecordings)?;

@@ -1,4 +1,4 @@
-//! The describing function of recordings, next to a fit: at the lines of the excitation, over whole periods.
+//! The describing function of recordings that accompanies a fit: at the lines of the excitation, over whole periods.
 
 use hoid_ident::{
     IdentError,
@@ -14,7 +14,7 @@ use crate::{
     repair::repaired_alike,
 };
 
-/// Which channel holds the recorded disturbance or target.
+/// Channel with the recorded disturbance or target.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Excitation {
     /// The first of the common names whose power is in lines.
@@ -22,12 +22,12 @@ pub enum Excitation {
     Found,
     /// None: no fit at lines.
     Nothing,
-    /// This channel: where it has no lines the result reports it.
+    /// This channel: if it has no lines the result reports it.
     Named(String),
 }
 
 impl Excitation {
-    /// As users write it: a channel or `none`; found automatically if not specified.
+    /// Reads the user's text: a channel or `none`; found automatically if not specified.
     pub fn of_text(text: Option<&str>) -> Self {
         match text {
             None => Self::Found,
@@ -36,7 +36,7 @@ impl Excitation {
         }
     }
 
-    /// The channel that was named.
+    /// Returns the named channel.
     pub fn named(&self) -> Option<&str> {
         match self {
             Self::Named(name) => Some(name),
@@ -46,12 +46,12 @@ impl Excitation {
 }
 
 impl Recordings {
-    /// The describing function of the recordings as they are used. Where an offset has cost rows, so that less than
-    /// whole periods are left, they are read without it: it is a phase of what is periodic. `None` if no excitation is
+    /// Computes the describing function of the recordings. If an offset has cost rows, so that less than whole periods
+    /// are left, they are read again without it: it is a phase of a periodic signal. `None` if no excitation is
     /// wanted.
     ///
     /// # Errors
-    /// [`AnalysisError`], where there are no lines, or the files cannot be read again.
+    /// [`AnalysisError`] if there are no lines, or the files cannot be read again.
     pub fn described(
         &self,
         excitation: &Excitation,
@@ -65,7 +65,7 @@ impl Recordings {
             excitation: excitation.named().map(str::to_owned),
             period_s,
             offset_samples,
-            // It is part of reading.
+            // The offset is part of reading.
             detrend: Detrend::None,
             ..DescriptionOptions::default()
         };
@@ -83,7 +83,7 @@ impl Recordings {
         let again = repaired_alike(again.records, handling)?;
         let late = again.first().map_or(Ok(0.0), |r| late_samples(r, &offsets))?;
         let ts_s = again.first().map_or(1.0, |r| r.sample_time().s());
-        // At the rate of what is fitted next to it.
+        // At the rate of the fit.
         let used_s = self.records.first().map_or(ts_s, |r| r.sample_time().s());
         let factor = (used_s / ts_s).round().max(1.0) as usize;
         let unmoved = again
@@ -94,8 +94,7 @@ impl Recordings {
     }
 }
 
-/// The excitation for a fit that also uses the lines: a missing channel is an error if the user named it, and not
-/// otherwise.
+/// Returns the excitation for a fit that also uses the lines: a missing channel is an error only if the user named it.
 pub(crate) fn of_lines(
     described: &Result<Option<Description>, AnalysisError>,
     excitation: &Excitation,

@@ -1,4 +1,4 @@
-//! Why an analysis gives no result.
+//! Reasons why an analysis gives no result.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use crate::look::{OtherColumns, other_columns};
 
-/// Why an analysis gives no result.
+/// Reason why an analysis gives no result.
 #[derive(Debug, Error)]
 pub enum AnalysisError {
     /// A recording is given twice.
@@ -17,26 +17,26 @@ pub enum AnalysisError {
         "{first} and {second} hold the same samples of e and u; runs of one person must be different recordings: give each once"
     )]
     SameSamples {
-        /// The one.
+        /// Name of the one.
         first: String,
-        /// The other.
+        /// Name of the other.
         second: String,
     },
-    /// A file without the columns that were requested, in which they are found under other names.
+    /// A file without the requested columns, which contains them under other names.
     #[error(transparent)]
     OtherColumns(Box<OtherColumns>),
     /// An offset of a channel that does not exist.
     #[error("--offset: there is no channel {name:?}; the record has {known}, and e and u represent input and output")]
     NoSuchChannel {
-        /// The request.
+        /// The requested name.
         name: String,
-        /// The available items.
+        /// The names that exist.
         known: String,
     },
     /// Options that contradict each other or the model.
     #[error("{reason}")]
     Options {
-        /// The findings, the expected value, what to do.
+        /// What was found, what was expected, and the remedy.
         reason: String,
     },
     /// A text that is not a result.
@@ -44,15 +44,15 @@ pub enum AnalysisError {
         "this is not a result of a fit: {found}; expected what to_json of this version wrote, or identify --json printed"
     )]
     NotAResult {
-        /// The findings.
+        /// What was found.
         found: String,
     },
-    /// An option that does not fit the estimator, or has no such value.
+    /// An option that does not fit the estimator, or does not have this value.
     #[error("{name}: {reason}")]
     Option {
         /// Its name in the registry.
         name: &'static str,
-        /// The findings, the expected value, what to do.
+        /// What was found, what was expected, and the remedy.
         reason: String,
     },
     /// An option of other estimators.
@@ -62,13 +62,13 @@ pub enum AnalysisError {
         name: &'static str,
         /// The estimators that have it.
         of: Vec<&'static str>,
-        /// The alternative.
+        /// The option to use instead.
         instead: &'static str,
     },
     /// There is no recording.
     #[error("no recording was given; name at least one run")]
     NoRecordings,
-    /// An estimator refuses.
+    /// An error of an estimator.
     #[error(transparent)]
     Ident(IdentError),
     /// A file cannot be read.
@@ -89,7 +89,7 @@ impl From<IdentError> for AnalysisError {
 }
 
 impl AnalysisError {
-    /// Why a file is not read, with what to ask for where it has other columns than were requested.
+    /// Error for a file that cannot be read, with the columns to ask for if it has others than requested.
     pub fn of_reading(error: IoError, path: &Path, options: &ReadOptions) -> Self {
         match other_columns(&error, path, options) {
             Some(others) => Self::OtherColumns(Box::new(others)),

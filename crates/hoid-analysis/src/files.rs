@@ -1,4 +1,4 @@
-//! From files to recordings: columns, span, units, alignment, and what is left out.
+//! From files to recordings: columns, span, units, alignment, and masked parts.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ use crate::{
 };
 
 impl Reading {
-    /// Reads the files; each file that was read is reported, with what a user should know of it.
+    /// Reads the files; each file that was read is reported, with remarks for the user.
     ///
     /// # Errors
     /// The errors of reading; [`AnalysisError::OtherColumns`] for a file in which error and control have other names.
@@ -41,7 +41,7 @@ impl Reading {
         Ok(all)
     }
 
-    /// Reads one file: the record in it, or the records between the parts left out.
+    /// Reads one file: its record, or the records between the masked parts.
     ///
     /// # Errors
     /// As [`Reading::files`].
@@ -59,7 +59,7 @@ impl Reading {
             .map_err(|error| AnalysisError::of_reading(error, path, &self.options))
     }
 
-    /// Reads one file, of which nothing is left out.
+    /// Reads one file without masked parts.
     ///
     /// # Errors
     /// As [`Reading::files`].

@@ -1,5 +1,5 @@
-//! Findings in a recording, in one form: faults that were searched for, and trouble of channels and their time. JSON
-//! and Python show this list.
+//! Findings in a recording in a common form: faults that were searched for, and problems of channels and of the time.
+//! JSON and Python show this list.
 
 use hoid_io::QualityIssue;
 use hoid_model::Fault;
@@ -10,25 +10,25 @@ use crate::recordings::Account;
 /// Something that was found in a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FoundFault {
-    /// Its definition, by its name.
+    /// Name of its kind.
     pub kind: &'static str,
     /// The channel; empty for all channels and for the time.
     pub channel: String,
-    /// Time of its first sample, s; none if there is no time.
+    /// Time of its first sample, s; none without a time.
     #[serde(rename = "from")]
     pub from_s: Option<f64>,
     /// Time of the sample after its last, s.
     #[serde(rename = "to")]
     pub to_s: Option<f64>,
-    /// How many samples.
+    /// Number of samples.
     pub samples: usize,
-    /// How large, in the unit of its kind.
+    /// Size, in the unit of its kind.
     pub size: f64,
-    /// The size in robust standard deviations, where the kind has a statistic.
+    /// Size in robust standard deviations, for kinds with a statistic.
     pub deviations: Option<f64>,
-    /// The actions taken.
+    /// The action taken.
     pub action: &'static str,
-    /// A sentence without a full stop.
+    /// Description: a sentence without a full stop.
     pub words: String,
 }
 
@@ -49,7 +49,7 @@ impl From<&Fault> for FoundFault {
 }
 
 impl From<&QualityIssue> for FoundFault {
-    /// From its first place to its last.
+    /// The fault spans the issue from its first place to its last.
     fn from(issue: &QualityIssue) -> Self {
         Self {
             kind: issue.kind.name(),
@@ -66,7 +66,7 @@ impl From<&QualityIssue> for FoundFault {
 }
 
 impl Account {
-    /// All that was found in the recording.
+    /// Returns everything that was found in the recording.
     pub fn found(&self) -> Vec<FoundFault> {
         let faults = self.faults.iter().map(FoundFault::from);
         faults.chain(self.quality_issues.iter().map(FoundFault::from)).collect()

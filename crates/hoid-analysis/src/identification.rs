@@ -1,18 +1,18 @@
-//! How a model is identified from recordings.
+//! Options of the identification of a model from recordings.
 
 use hoid_ident::family::FamilyEstimator;
 use hoid_model::{ContinuousTransferFunction, Decimation, FaultHandling};
 
 use crate::description::Excitation;
 
-/// How a model is identified from recordings: by default the operator of a person.
+/// Options of the identification of a model from recordings: by default of the operator of a person.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identification<E = FamilyEstimator> {
-    /// The fitted model, and how. Its excitation and period are those below.
+    /// The estimator. Its excitation and period are those below.
     pub estimator: E,
     /// The channel of the recorded disturbance or target.
     pub excitation: Excitation,
-    /// Its period, s; found from its lines where it is not given.
+    /// Its period, s; found from its lines if it is not given.
     pub period_s: Option<f64>,
     /// Treatment of faults of the recordings.
     pub faults: FaultHandling,
@@ -20,7 +20,7 @@ pub struct Identification<E = FamilyEstimator> {
     pub rate: Decimation,
     /// The controlled element: adds the loop to the verdict.
     pub controlled_element: Option<ContinuousTransferFunction>,
-    /// Subject of the verdict ([`crate::Answers`]); by default the response and the loop.
+    /// The answers that the verdict is about ([`crate::Answers`]); by default the response and the loop.
     pub answers: Vec<String>,
 }
 
@@ -31,7 +31,7 @@ impl Default for Identification {
 }
 
 impl<E> Identification<E> {
-    /// By an estimator, everything else by default.
+    /// Returns the defaults with this estimator.
     pub fn of(estimator: E) -> Self {
         Self {
             estimator,

@@ -1,4 +1,4 @@
-//! From recordings to a result of any batch estimator: what is done, in its order, and the findings.
+//! From recordings to a result of any batch estimator: the steps in their order, and the findings.
 
 use std::fmt;
 
@@ -17,40 +17,40 @@ use crate::{
     settings::Setting,
 };
 
-/// The identified model.
+/// An identified model.
 #[derive(Debug, Clone)]
 pub struct Identified<F = FamilyFit> {
     /// The result.
     pub fit: F,
-    /// The verdict on it, of all that is known.
+    /// The final verdict on it.
     pub verdict: Verdict,
-    /// The recordings as they were fitted, without their means where these were taken out, and the processing of them.
+    /// The recordings that were fitted, without their means if these were removed, and their processing.
     pub data: Recordings,
-    /// The describing function that is next to the fit.
+    /// The describing function that accompanies the fit.
     pub described: Option<Description>,
     /// The settings that were used.
     pub settings: Vec<Setting>,
-    /// The controlled element, where it is known.
+    /// The controlled element, if it is known.
     pub controlled_element: Option<ContinuousTransferFunction>,
-    /// The channel of the excitation, where there is one.
+    /// The channel of the excitation, if there is one.
     pub excitation: Option<String>,
     pub(crate) rate: Decimation,
     pub(crate) counts_samples: bool,
     pub(crate) taken_out: Detrend,
-    /// The object that it was read from, where it was.
+    /// The object from which it was read, if it was.
     pub(crate) written: Option<Map<String, Value>>,
 }
 
-/// How well a model predicts a recording that it was not fitted to.
+/// Fit of a model to a recording that was not used in the estimation.
 #[derive(Debug, Clone)]
 pub struct Validated {
     /// The recording.
     pub name: String,
-    /// How well.
+    /// Goodness of fit.
     pub quality: GoodnessOfFit,
 }
 
-/// The operator of a person from their runs, by the defaults.
+/// Identifies the operator of a person from their runs, with the defaults.
 ///
 /// # Errors
 /// As [`Identification::run`].
@@ -59,10 +59,10 @@ pub fn identify(records: &[Record]) -> Result<Identified, AnalysisError> {
 }
 
 impl<E: BatchEstimator> Identification<E> {
-    /// Repairs the recordings, fits, asks for a second opinion, and forms the verdict.
+    /// Repairs the recordings, fits, makes a second fit as a check, and forms the verdict.
     ///
     /// # Errors
-    /// [`AnalysisError`] where there is no result. One that is doubtful is none: see [`Identified::verdict`].
+    /// [`AnalysisError`] if there is no result. A doubtful result is not an error: see [`Identified::verdict`].
     pub fn run(&self, recordings: Recordings) -> Result<Identified<E::Fit>, AnalysisError> {
         if recordings.is_empty() {
             return Err(AnalysisError::NoRecordings);
@@ -109,7 +109,7 @@ impl<E: BatchEstimator> Identification<E> {
 }
 
 impl<F: Answers> Identified<F> {
-    /// Reliability of each answer.
+    /// Returns the verdict on each answer.
     pub fn answers(&self) -> Vec<(String, Verdict)> {
         let all = self.fit.answers(self.controlled_element.as_ref());
         let one = |answer: Answered| (of_answer(&self.verdict, &answer), answer.name);
@@ -121,7 +121,7 @@ impl<F: Answers> Identified<F> {
 }
 
 impl Identified {
-    /// VAF and NRMSE over the recordings, each by its own operator.
+    /// Returns VAF and NRMSE over the recordings, each with its own operator.
     ///
     /// # Errors
     /// The errors of a prediction.
@@ -133,7 +133,7 @@ impl Identified {
     }
 }
 
-/// The settings that every kind of fit shares, defaults included.
+/// The settings that all fits share, defaults included.
 fn shared_settings<E: BatchEstimator>(how: &Identification<E>, reading: Option<&Reading>) -> Vec<Setting> {
     let (decimation, search) = (how.rate, how.estimator.search());
     let mut list = vec![Setting::new("initial state", how.estimator.initial_state())];
@@ -156,7 +156,7 @@ fn shared_settings<E: BatchEstimator>(how: &Identification<E>, reading: Option<&
 }
 
 impl fmt::Display for Identified {
-    /// The verdict, and the parameters of each operator.
+    /// Prints the verdict, and the parameters of each operator.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}\n\n{}", self.verdict, self.fit.title())?;
         for of in &self.fit.operators {
@@ -177,10 +177,11 @@ impl fmt::Display for Identified {
 }
 
 impl<F> Identified<F> {
-    /// How well a model of the fit predicts another recording of the person, prepared as those that were fitted.
+    /// Computes how well a model of the fit predicts another recording of the person, prepared as those that were
+    /// fitted.
     ///
     /// # Errors
-    /// [`AnalysisError`] where there is none, of another rate, or too short.
+    /// [`AnalysisError`] if there is none, or for one with another sample rate, or too short.
     pub fn validated(&self, model: &Fit, other: Recordings) -> Result<Validated, AnalysisError> {
         let name = other.names.first().cloned().ok_or(AnalysisError::NoRecordings)?;
         let other = other.at_rate(self.rate, self.counts_samples)?.records.into_iter();
@@ -189,7 +190,7 @@ impl<F> Identified<F> {
         Ok(Validated { name, quality })
     }
 
-    /// Whether the fit is one without the means of e and u, which leaves each record its level.
+    /// True if the fit was made without the means of e and u, which leaves each record its level.
     pub fn is_without_means(&self) -> bool {
         self.taken_out == Detrend::Mean
     }

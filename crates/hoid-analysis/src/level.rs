@@ -1,4 +1,4 @@
-//! The level of recorded data: one constant of u a record, estimated with the fit.
+//! The level of recorded data: one constant of u per record, estimated with the fit.
 
 use hoid_ident::{IdentError, level};
 use hoid_model::{Detrend, FaultHandling, Record, uncertainty::Estimate};
@@ -9,8 +9,8 @@ use crate::{
     settings::Setting,
 };
 
-/// True for recordings that a level is estimated of: not where the means have been taken out in reading, and
-/// not where the data are kept as they are.
+/// True for recordings whose level is estimated: not if the means were removed in reading, and not if the data are
+/// kept as they are.
 pub(crate) fn may_have_level(recordings: &Recordings, with_input: bool, handling: FaultHandling) -> bool {
     with_input
         && handling != FaultHandling::Keep
@@ -18,7 +18,7 @@ pub(crate) fn may_have_level(recordings: &Recordings, with_input: bool, handling
         && level::may_have_level(&recordings.records)
 }
 
-/// The level of each record as it was read, by its number, into its account.
+/// Writes the level of each record as read, by its number, into its account.
 pub(crate) fn levels_into(
     accounts: &mut [Account],
     as_read: &[Record],
@@ -31,14 +31,14 @@ pub(crate) fn levels_into(
 
 /// The level of records for a model that does not change, which is fitted without it.
 pub(crate) struct Level {
-    /// The records with it, where it was taken out.
+    /// The records with their level, if it was removed.
     as_read: Option<Vec<Record>>,
-    /// Findings about it next to the means.
+    /// Part of the level of each record in addition to its mean.
     separate_means: Vec<f64>,
 }
 
 impl Level {
-    /// Takes it out where there may be one.
+    /// Removes the level if there may be one.
     pub(crate) fn taken_out(data: &mut Recordings, with_input: bool, handling: FaultHandling) -> Self {
         let as_read = may_have_level(data, with_input, handling).then(|| {
             let without = level::without_level(&data.records);
@@ -50,17 +50,17 @@ impl Level {
         }
     }
 
-    /// Whether it is still in the records.
+    /// True if the level is still in the records.
     pub(crate) fn is_kept(&self) -> bool {
         self.as_read.is_none()
     }
 
-    /// The trend removed.
+    /// Returns the trend that was removed.
     pub(crate) fn detrend(&self) -> Detrend {
         if self.is_kept() { Detrend::None } else { Detrend::Mean }
     }
 
-    /// Takes out what a fit with the level as an unknown has found of it next to the means.
+    /// Removes the part of the level that a fit, with the level as an unknown, has found in addition to the means.
     pub(crate) fn refined(
         &mut self,
         data: &mut Recordings,
@@ -79,7 +79,7 @@ impl Level {
         Ok(())
     }
 
-    /// Writes it into the accounts, and reports it.
+    /// Writes the level into the accounts, and returns it as a setting.
     pub(crate) fn told(
         &self,
         data: &mut Recordings,
@@ -97,7 +97,7 @@ impl Level {
 }
 
 impl Recordings {
-    /// Whether a trend was taken out in reading.
+    /// True if a trend was removed in reading.
     pub(crate) fn were_detrended(&self) -> bool {
         let source = self.source.as_ref();
         source.is_some_and(|source| source.reading.preparation.detrend != Detrend::None)
@@ -105,7 +105,7 @@ impl Recordings {
 }
 
 impl Setting {
-    /// Statement of the settings about an estimated level.
+    /// The setting of an estimated level.
     pub(crate) fn level() -> Self {
         Self::new("level", "one constant of u a record, estimated")
     }

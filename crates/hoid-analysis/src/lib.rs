@@ -1,9 +1,9 @@
-//! From recordings to a result and its reliability, once for all who ask.
+//! From recordings to a result and its verdict, in one place for all callers.
 //!
-//! An estimator takes each sample at its word, and its error bars are those of its model. What a result is worth
-//! follows from more: what was wrong with the recording and the actions taken about it, what a second fit without
-//! suspicious samples shows, whether anyone could have held the loop. These rules are here and nowhere else; command
-//! line, groups and Python parse options and show results.
+//! An estimator takes each sample as correct, and its error bars are those of its model. The reliability of a result
+//! depends on more: on faults of the recording and their treatment, on a second fit without suspicious samples, on
+//! whether a person could have controlled the loop. These rules are only here; command line, groups and Python parse
+//! options and show results.
 //!
 //! ```text
 //! files -- Reading --> Recordings -- Identification { options }.run --> Identified { fit, verdict, data, settings }
@@ -25,7 +25,7 @@
 //! | a recursion over a recording, from it to the verdict | `tracking` |
 //! | the level of u, the settings that all share | `level`, `settings` |
 //!
-//! Options come as fields, or by their names from texts: `options`. What there is is in [`registry`].
+//! Options are set as fields, or by their names from texts: `options`. All of them are listed in [`registry`].
 //!
 //! ```
 //! use hoid_analysis::{Identification, Recordings};

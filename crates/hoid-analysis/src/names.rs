@@ -3,9 +3,9 @@
 
 /// The operator of a person.
 pub const OPERATOR: &str = "operator";
-/// The same with its remnant of order m as noise: a gain with a lead.
+/// The operator with its remnant of order m as noise: a gain with a lead.
 pub const REMNANT: &str = "operator noise=remnant";
-/// The same with gains that change once.
+/// The operator with gains that change once.
 pub const CHANGE: &str = "operator change=sigmoid";
 /// Polynomials by the prediction error method.
 pub const PEM: &str = "pem";

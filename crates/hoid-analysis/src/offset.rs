@@ -1,5 +1,5 @@
-//! A channel that was recorded late, in what is periodic: an offset of rows is a phase there, and cut rows
-//! would leave less than whole periods.
+//! A channel that was recorded late, for periodic signals: the offset is a phase, and cutting rows would leave less
+//! than whole periods.
 
 use std::collections::BTreeMap;
 
@@ -8,8 +8,8 @@ use hoid_model::Record;
 
 use crate::{AnalysisError, reading::Reading};
 
-/// How to read without moving rows, and the offsets. With another sampling frequency, which the offset comes
-/// before, it stays with the reading.
+/// Returns the reading without moving rows, and the offsets. If another sampling frequency is requested, which comes
+/// after the offset, the offset stays part of the reading.
 pub fn without_offsets(reading: &Reading) -> (Reading, BTreeMap<String, Offset>) {
     let mut reading = reading.clone();
     let offsets = match reading.preparation.rate {
@@ -19,8 +19,8 @@ pub fn without_offsets(reading: &Reading) -> (Reading, BTreeMap<String, Offset>)
     (reading, offsets)
 }
 
-/// Number of samples by which the output is later than the input. The offset of another channel turns its own phase
-/// alone, which no average depends on.
+/// Returns the number of samples by which the output is later than the input. The offset of another channel turns only
+/// its own phase, on which no average depends.
 ///
 /// # Errors
 /// [`AnalysisError::NoSuchChannel`].

@@ -1,9 +1,8 @@
-//! Options of an identification by their names in the [registry](crate::registry), from texts as users write
-//! them: the command line, plans and Python bring what they have into that form, and none of them has a list of
-//! its own.
+//! Options of an identification by their names in the [registry](crate::registry), from texts as users write them:
+//! command line, plans and Python convert their input to that form, and none of them has its own list.
 //!
-//! An estimator declares its options next to its fields. here are those of the analysis around it: the recorded
-//! excitation, the controlled element, what the verdict is about, and a prior that is in a file.
+//! An estimator declares its options next to its fields. This module has those of the analysis: the recorded
+//! excitation, the controlled element, the answers that the verdict is about, and a prior from a file.
 
 use hoid_ident::{
     family::OperatorPrior,
@@ -15,17 +14,17 @@ use crate::{
     AnalysisError, answers::asked_for, description::Excitation, identification::Identification, prior::prior_of_text,
 };
 
-/// An option of an estimator and of the analysis around it.
+/// An option of an estimator and of the analysis.
 pub type AnalysisOption<E> = BatchOption<Identification<E>, AnalysisError>;
 
-/// The options that an estimator declares.
+/// Returns the options that an estimator declares.
 pub(crate) fn own<E: BatchOptions>() -> Vec<AnalysisOption<E>> {
     let own = E::options().into_iter();
     own.map(|option| option.within(|how: &Identification<E>| &how.estimator, |how| &mut how.estimator))
         .collect()
 }
 
-/// The same with a prior that may be the result of another fit, as JSON or in a file.
+/// Returns the options of an estimator whose prior may be the result of another fit, as JSON or in a file.
 pub(crate) fn with_prior_of_fits<E: 'static>(
     options: Vec<AnalysisOption<E>>,
     field: Field<E, OperatorPrior>,
@@ -73,7 +72,7 @@ pub(crate) fn controlled_element<E: 'static>() -> AnalysisOption<E> {
     })
 }
 
-/// Subject of the verdict.
+/// The answers that the verdict is about.
 pub(crate) fn answers<E: 'static>() -> AnalysisOption<E> {
     let help =
         "What the verdict is about: response, crossover, phase_margin, parameters by their names, as crossover,tau_e";

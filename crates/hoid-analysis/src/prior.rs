@@ -7,7 +7,7 @@ use hoid_io::{IoError, is_fit_file, parse_fit, read_fit};
 
 use crate::AnalysisError;
 
-/// `population`, `none`, `NAME=CENTRE:SPREAD,...`, or another fit: its file, or its JSON.
+/// Reads `population`, `none`, `NAME=CENTRE:SPREAD,...`, or another fit: its file, or its JSON.
 ///
 /// # Errors
 /// [`AnalysisError::Option`], and for a file that cannot be read [`AnalysisError::Io`].

@@ -1,4 +1,4 @@
-//! Information of the quality of the channels about any result.
+//! Findings on the quality of the channels, for any result.
 //!
 //! | finding | where | why |
 //! |---|---|---|
@@ -7,7 +7,7 @@
 //! | `coarse` | e in steps of more than .05, u of more than .15 of its deviation | rounding is not a remnant: intervals and bands are too narrow |
 //! | `bridged` | a gap of more than .25 s on a straight line | the line counts as tracking |
 //!
-//! No error bar knows of these.
+//! Standard errors do not account for them.
 
 use hoid_ident::faults::Rest;
 use hoid_io::{QualityIssueKind, Step};
@@ -16,23 +16,23 @@ use hoid_numerics::statistics::standard_deviation;
 
 use crate::recordings::{Account, RESTING};
 
-/// Shares of the rows at the ends of the stick, and steps of e and u over their deviations, beyond which a
-/// result is doubtful: what is cut off or rounded is lost.
+/// Shares of the rows at the limits of the stick, and steps of e and u over their deviations, beyond which a result is
+/// doubtful: clipped or rounded information is lost.
 const AT_ENDS: f64 = 0.05;
 const COARSE: [f64; 2] = [0.05, 0.15];
 /// Longest gap that may be bridged by a straight line, s.
 const BRIDGED_S: f64 = 0.25;
 
-/// The person whose record is judged.
+/// Kind of system whose record is judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Of {
-    /// A person, who answers what they see.
+    /// A person, who responds to what they see.
     Person,
-    /// Any system: what is put into it may have two levels.
+    /// Any system: its input may have two levels.
     System,
 }
 
-/// Information of the quality of the channels about any result.
+/// Returns the findings on the quality of the channels.
 pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) -> Vec<Finding> {
     let mut all = Vec::new();
     let issues = |kind: QualityIssueKind| account.quality_issues.iter().filter(move |issue| issue.kind == kind);

@@ -1,5 +1,5 @@
-//! The rate at which recordings are used. Where orders and delays count samples a high rate stays, unless a
-//! factor is named.
+//! Sample rate at which recordings are used. If orders and delays count samples a high rate is kept, unless a factor
+//! is named.
 
 use hoid_io::Step;
 use hoid_model::{Decimation, SampleTime};
@@ -7,8 +7,8 @@ use hoid_model::{Decimation, SampleTime};
 use crate::{AnalysisError, recordings::Recordings};
 
 impl Recordings {
-    /// The recordings at the rate at which they are used, with the actions taken; for an estimator that counts samples
-    /// only where a factor was named, and not where the rate was named in reading.
+    /// Decimates the recordings and records it in their accounts; for an estimator that counts samples only if a
+    /// factor was named, and not if the rate was named in reading.
     ///
     /// # Errors
     /// The errors of the decimation.
@@ -29,13 +29,13 @@ impl Recordings {
         Ok(self)
     }
 
-    /// Whether the rate was named in reading, and is not to be lowered again.
+    /// True if the rate was named in reading, and is not to be lowered again.
     pub(crate) fn settles_the_rate(&self) -> bool {
         let source = self.source.as_ref();
         source.is_some_and(|source| source.reading.settles_the_rate())
     }
 
-    /// Amount by which e was moved with its rate, for a hold that is longer than the one it was recorded behind, s.
+    /// Time by which e was shifted in the decimation, for a hold that is longer than that of the recording, s.
     pub(crate) fn input_lead_s(&self) -> f64 {
         let mut steps = self.accounts.iter().flat_map(|account| &account.steps);
         let lead = steps.find_map(|step| match step {
@@ -45,7 +45,7 @@ impl Recordings {
         lead.unwrap_or(0.0)
     }
 
-    /// Message for the case that a high rate was kept because samples are counted.
+    /// Message for a high rate that was kept because samples are counted.
     pub fn kept_rate(&self, decimation: Decimation, counts_samples: bool) -> Option<String> {
         let settled = self.settles_the_rate();
         let record = self.records.first().filter(|_| !settled)?;
@@ -53,7 +53,7 @@ impl Recordings {
     }
 }
 
-/// Message for the case that a high rate is kept because samples are counted.
+/// Message for a high rate that is kept because samples are counted.
 pub fn kept_rate(sample_time: SampleTime, decimation: Decimation, counts_samples: bool) -> Option<String> {
     let factor = decimation.factor(sample_time);
     let kept = counts_samples && decimation == Decimation::Auto && factor > 1;

@@ -1,17 +1,17 @@
-//! How files are read, as a value that goes with the read data.
+//! Options of reading files, kept with the data.
 
 use std::path::PathBuf;
 
 use hoid_io::{NewRate, Preparation, QualityIssueKind, ReadOptions};
 
-/// How files are read.
+/// Options of reading files.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reading {
     /// Columns, sampling, span, repair.
     pub options: ReadOptions,
     /// Units, scale, offset, rate, run-in, detrend.
     pub preparation: Preparation,
-    /// The parts left out: the record is cut there.
+    /// Masked parts: the record is cut there.
     pub mask: Vec<QualityIssueKind>,
     /// Shortest segment between masked samples, s.
     pub shortest_s: f64,
@@ -28,7 +28,7 @@ impl Default for Reading {
     }
 }
 
-/// Files, and how they were read.
+/// Files, and the options with which they were read.
 #[derive(Debug, Clone)]
 pub(crate) struct Source {
     pub paths: Vec<PathBuf>,
@@ -36,7 +36,7 @@ pub(crate) struct Source {
 }
 
 impl Reading {
-    /// Whether the rate was named in Hz, and is not to be lowered again.
+    /// True if the rate was named in Hz, and is not to be lowered again.
     pub(crate) fn settles_the_rate(&self) -> bool {
         matches!(self.preparation.rate, NewRate::Hz(_))
     }

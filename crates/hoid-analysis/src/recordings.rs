@@ -1,23 +1,23 @@
-//! Recordings on their way to an estimator, with the account of the processing of them.
+//! Recordings on their way to an estimator, with the account of their processing.
 
 use hoid_io::{QualityIssue, Step, quality_of_record};
 use hoid_model::{Fault, Finding, Record, Verdict, uncertainty::Estimate};
 
 use crate::reading::Source;
 
-/// Kind of the note on a stick that rests.
+/// Kind of the note on a resting stick.
 pub(crate) const RESTING: &str = "resting-stick";
 
-/// Processing applied to a record, and the problems of the sampling of its file.
+/// Processing of a record, and the problems of the sampling of its file.
 #[derive(Debug, Clone, Default)]
 pub struct Account {
-    /// Processing applied to the numbers, in this order.
+    /// Processing steps, in this order.
     pub steps: Vec<Step>,
-    /// Problems with channels and their time as they were recorded.
+    /// Problems of channels and of the time, as recorded.
     pub quality_issues: Vec<QualityIssue>,
-    /// Faults that were searched for, and the actions taken about them.
+    /// Faults that were searched for, and their treatment.
     pub faults: Vec<Fault>,
-    /// The report about any result.
+    /// Findings for any result.
     pub findings: Vec<Finding>,
     /// The constant of u that was estimated with the fit.
     pub level: Option<Estimate>,
@@ -26,21 +26,21 @@ pub struct Account {
 /// Records with their names and accounts, in the same order; a file that is cut gives several.
 #[derive(Debug, Clone, Default)]
 pub struct Recordings {
-    /// Name of each: its file, and the span where it is a part of it.
+    /// Name of each: its file, and the span if it is a part of it.
     pub names: Vec<String>,
     /// The records.
     pub records: Vec<Record>,
-    /// Processing applied to each.
+    /// Processing of each.
     pub accounts: Vec<Account>,
-    /// Which of the recordings that were given each is a part of, counted from 0.
+    /// Index of the original recording of which each is a part, from 0.
     pub origins: Vec<usize>,
-    /// Where they are from, to read them another way.
+    /// Their source, to read them in another way.
     pub(crate) source: Option<Source>,
 }
 
 impl Recordings {
-    /// Records that were not read from files here, called by their labels, else by their number. Problems with their
-    /// channels is searched for in them.
+    /// Makes recordings of records that were not read from files here, named by their labels, or else by their number.
+    /// Problems of their channels are searched for.
     pub fn of_records(records: impl IntoIterator<Item = Record>) -> Self {
         let mut all = Self::default();
         for record in records {
@@ -57,13 +57,13 @@ impl Recordings {
         all
     }
 
-    /// One more.
+    /// Adds a recording.
     pub fn push(&mut self, name: String, record: Record, account: Account) {
         let origin = self.origins.last().map_or(0, |last| last + 1);
         self.push_part(origin, name, record, account);
     }
 
-    /// One more part of a recording.
+    /// Adds a part of a recording.
     pub(crate) fn push_part(&mut self, origin: usize, name: String, record: Record, account: Account) {
         self.origins.push(origin);
         self.names.push(name);
@@ -71,18 +71,18 @@ impl Recordings {
         self.accounts.push(account);
     }
 
-    /// How many there are.
+    /// Returns the number of recordings.
     pub fn len(&self) -> usize {
         self.records.len()
     }
 
-    /// Whether there is none.
+    /// True if there are none.
     pub fn is_empty(&self) -> bool {
         self.records.is_empty()
     }
 
-    /// Findings in all of them, for the verdict of a result of them. One person has one stick: that it rests is
-    /// reported once.
+    /// Returns the findings of all recordings, for the verdict on their result. A resting stick is reported once,
+    /// since all recordings are of one stick.
     pub fn findings(&self) -> Vec<Finding> {
         let several = self.names.len() > 1;
         let own = |account: &Account| account.findings.iter().filter(|f| f.kind == RESTING).count();
@@ -109,7 +109,7 @@ impl Recordings {
         all
     }
 
-    /// A verdict with what the recordings show: first, since a wrong recording is why a result is wrong.
+    /// Adds the findings of the recordings to a verdict: first, since a faulty recording explains a wrong result.
     pub fn judged(&self, verdict: Verdict) -> Verdict {
         let more = self.findings();
         if more.is_empty() {

@@ -15,7 +15,7 @@ pub use crate::names::{CHANGE, OPERATOR, PEM, REMNANT};
 
 use crate::estimators::{BatchEstimator, Polynomials};
 
-/// Known properties of each batch estimator.
+/// Returns the known properties of each batch estimator.
 pub fn estimators() -> Vec<MethodSpec> {
     [
         FamilyEstimator::specs(),
@@ -26,7 +26,7 @@ pub fn estimators() -> Vec<MethodSpec> {
     .concat()
 }
 
-/// An option of the registry by its name.
+/// Returns an option of the registry by its name.
 pub fn estimator_setting(name: &str) -> Option<Setting> {
     estimators()
         .into_iter()

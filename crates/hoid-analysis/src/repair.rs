@@ -1,4 +1,4 @@
-//! Faults of recordings, detected and repaired before anything else is done with them.
+//! Faults of recordings, detected and repaired before all other processing.
 
 use hoid_ident::faults::{SLOWEST_S, repair};
 use hoid_model::{FaultHandling, Finding, ModelError, Record};
@@ -12,12 +12,12 @@ use crate::{
 
 /// Shortest piece between two faults that is used, s: a few seconds determine no operator.
 const SHORTEST_PIECE_S: f64 = 4.0;
-/// Largest number of values of an input that steps.
+/// Largest number of levels of a step input.
 const MOST_LEVELS: usize = 16;
 
 impl Recordings {
-    /// The recordings without their faults; one that is cut gives several. Report of the findings and their effect on
-    /// any result is in the account of the first of them.
+    /// Repairs the faults of the recordings; a recording that is cut gives several. The account of its first part has
+    /// the findings and their consequences for any result.
     ///
     /// # Errors
     /// [`AnalysisError::SameSamples`] for runs that are given twice.
@@ -31,13 +31,13 @@ impl Recordings {
         for (((name, record), account), origin) in one.zip(self.origins) {
             let steps = of == Of::System && steps_from_level_to_level(&record);
             let handling = match handling {
-                // A system that settles after a step is not a fault of its sensor: reported, and nothing is cut.
+                // A system that settles after a step is not a sensor fault: it is reported, and nothing is cut.
                 FaultHandling::Bridge | FaultHandling::Cut if steps => FaultHandling::Report,
                 as_asked => as_asked,
             };
             let mut found = repair(&record, handling)?;
             if steps || (of == Of::System && record.sample_time().s() > SLOWEST_S) {
-                // No person's; of a furnace it is typical.
+                // For a system, such as a furnace, this is typical.
                 let note = |finding: Finding| Finding::note(finding.kind, finding.message);
                 found.findings = found.findings.into_iter().map(note).collect();
             }
@@ -75,7 +75,7 @@ impl Recordings {
                 } else {
                     (format!("{name}{span}"), segment.labelled(label))
                 };
-                // What was found is reported once.
+                // Each finding is reported once.
                 all.push_part(origin, name, segment, std::mem::take(&mut account));
             }
         }
@@ -83,7 +83,7 @@ impl Recordings {
     }
 }
 
-/// Whether the input steps between a few levels, as in a test of steps or a binary sequence.
+/// True if the input steps between a few levels, as in a step test or a binary sequence.
 pub(crate) fn steps_from_level_to_level(record: &Record) -> bool {
     let mut levels: Vec<f64> = Vec::new();
     for value in record.input() {
@@ -97,7 +97,7 @@ pub(crate) fn steps_from_level_to_level(record: &Record) -> bool {
     levels.len() > 1
 }
 
-/// The same records read another way, repaired alike.
+/// Repairs the same records, read in another way, alike.
 pub(crate) fn repaired_alike(records: Vec<Record>, handling: FaultHandling) -> Result<Vec<Record>, ModelError> {
     let mut all = Vec::with_capacity(records.len());
     for record in records {

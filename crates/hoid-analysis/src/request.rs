@@ -1,11 +1,11 @@
-//! Model to be identified, as users ask for it: a structure, a method, and options by their names.
+//! The model to be identified, as users request it: a structure, a method, and options by their names.
 //!
 //! | structure | estimator |
 //! |---|---|
 //! | none, `operator` | the operator of a person; with `noise=remnant` a gain with a lead and its remnant of order m, with `change=sigmoid` one whose gains change once |
 //! | `arx` ... `general` | polynomials, by `method` pem or instrumental variables |
 //!
-//! Without a structure options that polynomials alone have, as nk, ask for `bj`.
+//! Without a structure, options that only polynomials have, such as nk, select `bj`.
 
 use std::collections::BTreeMap;
 
@@ -19,12 +19,12 @@ use crate::{
     registry::{CHANGE, OPERATOR, PEM, REMNANT, estimators},
 };
 
-/// Model to be identified, by names and texts.
+/// The model to be identified, by names and texts.
 #[derive(Debug, Clone, Default)]
 pub struct Request {
-    /// The fitted model.
+    /// The structure.
     pub structure: Option<String>,
-    /// How: `pem`, or a method of instrumental variables.
+    /// The method: `pem`, or a method of instrumental variables.
     pub method: Option<String>,
     /// Options by their names in the registry.
     pub options: BTreeMap<String, String>,
@@ -47,7 +47,7 @@ pub enum ResolvedRequest {
     Polynomials(Identification<Polynomials>),
 }
 
-/// The same with each kind of identification.
+/// Applies an expression to each kind of identification.
 macro_rules! each {
     ($asked:expr, $how:ident => $what:expr) => {
         match $asked {
@@ -60,7 +60,7 @@ macro_rules! each {
 }
 
 impl ResolvedRequest {
-    /// The estimator of a name in the registry, with its defaults; `None` for another name.
+    /// Returns the estimator of a name in the registry, with its defaults; `None` for another name.
     pub fn of_estimator(name: &str, structure: Structure) -> Option<Self> {
         let polynomials = |structure: Structure, method: Option<IvMethod>| {
             Self::Polynomials(Identification::of(Polynomials {
@@ -80,7 +80,7 @@ impl ResolvedRequest {
         })
     }
 
-    /// Its estimator in the registry.
+    /// Returns the name of its estimator in the registry.
     pub fn estimator(&self) -> &'static str {
         match self {
             Self::Operator(_) => OPERATOR,
@@ -90,7 +90,7 @@ impl ResolvedRequest {
         }
     }
 
-    /// The structure of a polynomial model.
+    /// Returns the structure of a polynomial model.
     pub fn structure(&self) -> Option<Structure> {
         match self {
             Self::Polynomials(how) => Some(how.estimator.template.structure),
@@ -98,30 +98,30 @@ impl ResolvedRequest {
         }
     }
 
-    /// Whether orders and delay are numbers of samples.
+    /// True if orders and delay count samples.
     pub fn counts_samples(&self) -> bool {
         each!(self, how => how.estimator.counts_samples())
     }
 
-    /// Whether it looks for the response to an input.
+    /// True if it estimates the response to an input.
     pub fn has_input(&self) -> bool {
         self.structure().is_none_or(Structure::has_input)
     }
 
-    /// Sets an option by its name; false if it is none of its own.
+    /// Sets an option by its name; false if the estimator does not have it.
     ///
     /// # Errors
-    /// [`AnalysisError`] for a text that is not a value of it.
+    /// [`AnalysisError`] for a text that is not a valid value.
     pub fn set(&mut self, name: &str, text: &str) -> Result<bool, AnalysisError> {
         each!(self, how => how.set(name, text))
     }
 }
 
 impl Request {
-    /// The request, and remarks on earlier names and on what follows from an option.
+    /// Resolves the request; also returns remarks on earlier names and on consequences of an option.
     ///
     /// # Errors
-    /// [`AnalysisError`] for options that contradict each other or have no such value.
+    /// [`AnalysisError`] for options that contradict each other, or values that do not exist.
     pub fn resolve(&self) -> Result<(ResolvedRequest, Vec<String>), AnalysisError> {
         let mut notes = Vec::new();
         let mut asked = self.kind(&mut notes)?;
@@ -133,7 +133,7 @@ impl Request {
                 return Err(misplaced(name, &all));
             }
         }
-        // In the order of the registry: what an option makes of others comes before them.
+        // In the order of the registry: an option that affects others comes before them.
         for setting in own {
             if let Some(text) = self.options.get(setting.name) {
                 asked.set(setting.name, text)?;
@@ -159,7 +159,7 @@ impl Request {
         names.iter().any(|name| self.options.contains_key(*name))
     }
 
-    /// The fitted model, with its defaults.
+    /// Returns the requested kind of model, with its defaults.
     fn kind(&self, notes: &mut Vec<String>) -> Result<ResolvedRequest, AnalysisError> {
         let options = |reason: String| AnalysisError::Options { reason };
         let typed = self
@@ -200,7 +200,7 @@ impl Request {
             .ok_or_else(|| options(unknown_method(estimator)))
     }
 
-    /// True with an option that only a polynomial model has.
+    /// True if an option that only a polynomial model has is given.
     fn is_polynomial(&self) -> bool {
         let asks_for_operator = self.has(&["noise", "change", "remnant_order"]);
         let of_polynomials = |text: &String| {
@@ -222,7 +222,7 @@ impl Request {
                 ]))
     }
 
-    /// Which of the operators.
+    /// Returns which of the operator estimators is requested.
     fn operator(&self, typed: Option<&str>, notes: &mut Vec<String>) -> Result<&'static str, AnalysisError> {
         let said = |name: &str| self.options.get(name).map(String::as_str);
         let was = match typed {
@@ -260,7 +260,7 @@ impl Request {
     }
 }
 
-/// An option of other estimators, with those that have it and what to give in its place.
+/// Error for an option of other estimators, with those that have it and the option to use instead.
 fn misplaced(name: &str, all: &[MethodSpec]) -> AnalysisError {
     let has = |spec: &&MethodSpec| spec.settings.iter().any(|setting| setting.name == name);
     let of: Vec<&'static str> = all.iter().filter(has).map(|spec| spec.name).collect();

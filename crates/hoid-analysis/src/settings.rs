@@ -1,4 +1,4 @@
-//! The settings that were used, as they are printed: the values that the numerics received.
+//! The settings that were used, as printed: the values that the numerics received.
 
 use hoid_io::QualityIssueKind;
 use hoid_model::Decimation;
@@ -11,14 +11,14 @@ use crate::reading::Reading;
 pub struct Setting {
     /// Its name.
     pub name: String,
-    /// The value that was used.
+    /// The value in use.
     pub value: String,
-    /// True if it is another than the default, so that someone gave it.
+    /// True if it differs from the default, and was therefore given.
     pub given: bool,
 }
 
 impl Setting {
-    /// A setting by default.
+    /// A setting with its default.
     pub fn new(name: impl Into<String>, value: impl Into<String>) -> Self {
         Self {
             name: name.into(),
@@ -27,7 +27,7 @@ impl Setting {
         }
     }
 
-    /// The same as it was given, or not.
+    /// Sets whether it was given.
     #[must_use]
     pub fn given(self, given: bool) -> Self {
         Self { given, ..self }
@@ -50,7 +50,7 @@ impl Setting {
 }
 
 impl Reading {
-    /// How records are read, defaults included.
+    /// Returns how records are read, defaults included.
     pub fn settings(&self, decimation: Decimation) -> Vec<Setting> {
         Setting::against(self.rows(decimation), &Self::default().rows(Decimation::default()))
     }
@@ -91,7 +91,7 @@ impl Reading {
         list
     }
 
-    /// The parts left out.
+    /// Returns the masked parts.
     pub(crate) fn masked(&self) -> Option<Setting> {
         let kinds: Vec<&str> = self.mask.iter().map(|kind: &QualityIssueKind| kind.name()).collect();
         (!kinds.is_empty()).then(|| {

@@ -1,6 +1,6 @@
 //! Polynomial models with several inputs: from texts and recordings to a result and its verdict.
 //!
-//! Orders have one number for all inputs (`nb=2`), or one for each (`nb=2,3`), as nk has.
+//! Orders are one number for all inputs (`nb=2`), or one for each (`nb=2,3`), as is nk.
 
 use hoid_ident::{
     IdentError,
@@ -19,7 +19,7 @@ use crate::{
 
 /// Frequencies of the responses, as a share of the Nyquist frequency.
 const RESPONSE_AT: [f64; 12] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.035, 0.05, 0.1, 0.2, 0.35, 0.5, 0.9];
-/// Standard errors from zero of a coefficient that is determined.
+/// Least distance of a determined coefficient from zero, in standard errors.
 const LEAST_ERRORS: f64 = 2.0;
 
 /// A fit with several inputs, and its verdict.
@@ -29,14 +29,14 @@ pub struct SeveralInputsResult {
     pub fit: SeveralInputsFit,
     /// Its verdict.
     pub verdict: Verdict,
-    /// The recordings as they were fitted.
+    /// The recordings that were fitted.
     pub data: Recordings,
 }
 
-/// The model of a structure with these orders, `na=2,nb=2,3`, and delays, `29,12`, for these inputs.
+/// Builds the model of a structure with these orders, `na=2,nb=2,3`, and delays, `29,12`, for these inputs.
 ///
 /// # Errors
-/// [`AnalysisError::Options`] for orders without meaning.
+/// [`AnalysisError::Options`] for invalid orders.
 pub fn several_inputs(
     structure: Structure,
     orders: &str,
@@ -134,7 +134,7 @@ impl SeveralInputsResult {
     /// Repairs the recordings, fits, and forms the verdict.
     ///
     /// # Errors
-    /// [`AnalysisError`] where there is no result.
+    /// [`AnalysisError`] if there is no result.
     pub fn of(
         model: &SeveralInputs,
         recordings: Recordings,
@@ -145,7 +145,7 @@ impl SeveralInputsResult {
             return Err(AnalysisError::NoRecordings);
         }
         let data = recordings.repaired(faults, Of::System)?.at_rate(rate, true)?;
-        // A piece of a recording that a fault has cut short determines nothing, and does not stop the fit.
+        // A piece of a recording shortened by a fault determines nothing, and does not stop the fit.
         let fit = match model.fit(&data.records) {
             Err(IdentError::TooFewSamples { .. }) if data.len() > 1 => {
                 let longest = data.records.iter().map(hoid_model::Record::len).max().unwrap_or(0);
@@ -190,7 +190,7 @@ impl SeveralInputsResult {
         Ok(Self { fit, verdict, data })
     }
 
-    /// The result as a JSON object.
+    /// Returns the result as a JSON object.
     pub fn json(&self) -> Map<String, Value> {
         let (fit, data) = (&self.fit, &self.data);
         let model = &fit.model;

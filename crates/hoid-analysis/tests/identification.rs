@@ -1,5 +1,4 @@
-//! From recordings to a verdict: each rule with a recording that trips it, next to one that does
-//! not.
+//! From recordings to a verdict: each rule with a recording that triggers it, and one that does not.
 #![allow(clippy::unwrap_used)]
 
 use std::{collections::BTreeMap, fs, path::Path};
@@ -16,7 +15,7 @@ use hoid_model::{
 };
 use hoid_sim::{RunSeed, Simulator};
 
-/// A run as it is recorded: e and u alone.
+/// A run as recorded: e and u alone.
 fn recorded(seed: u64, change: impl Fn(f64, f64) -> (f64, f64)) -> Record {
     let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
     let run = RunSeed {
@@ -39,7 +38,7 @@ fn clipped(seed: u64) -> Record {
     recorded(seed, |e, u| (e, u.clamp(-0.086, 0.086)))
 }
 
-/// One form and few orders of the noise: what is tested here is not the choice.
+/// One form and few orders of the noise: the choice is not tested here.
 fn quick() -> Identification {
     Identification {
         estimator: FamilyEstimator {
@@ -319,7 +318,7 @@ fn every_estimator_hears_of_the_recordings() {
     );
 }
 
-/// A furnace sampled every 9 s, its input of two levels: nothing of a person's rules speaks against it.
+/// A furnace sampled every 9 s, with a two-level input: no rule for people applies.
 #[test]
 fn polynomials_are_judged_as_any_system() {
     let noise = |seed: u64| {
@@ -357,7 +356,7 @@ fn polynomials_are_judged_as_any_system() {
     }
 }
 
-/// e of one person and noise for u: nothing is trustworthy, and who asks for an answer hears of that answer.
+/// e of one person and noise for u: nothing is trustworthy, and the verdict is about the requested answer.
 #[test]
 fn a_verdict_is_about_what_was_asked() {
     let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();

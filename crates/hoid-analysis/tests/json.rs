@@ -22,7 +22,7 @@ fn run(seed: u64) -> Record {
     simulator.run(run, false).unwrap().span(0.0, 50.0).unwrap()
 }
 
-/// What is written comes back equal, and as the result that it was.
+/// The restored result equals the original.
 fn back<E: BatchEstimator>(with: Identification<E>) -> (Identified<E::Fit>, Identified<E::Fit>)
 where
     E::Fit: BatchAnswer,
@@ -35,7 +35,7 @@ where
     assert_eq!(again.verdict, found.verdict);
     assert_eq!(again.settings, found.settings);
     assert!(again.data.records.is_empty());
-    // The text that is printed is one of JSON numbers: no state is lost by a program that writes it again.
+    // The printed text contains only JSON numbers: no state is lost by a program that writes it again.
     let value: Value = serde_json::from_str(&text).unwrap();
     assert!(Identified::<E::Fit>::from_json(&value.to_string()).unwrap() == found);
     let other = Identified::<E::Fit>::from_json(&text.replacen("\"state\": \"", "\"state\": \"0", 1));

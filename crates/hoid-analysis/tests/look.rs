@@ -1,4 +1,4 @@
-//! One look at a file, and what a reader is reported by it.
+//! Examination of a file, and its report.
 #![allow(clippy::unwrap_used)]
 
 use std::{f64::consts::TAU, fs, path::PathBuf};
@@ -54,7 +54,7 @@ fn a_file_is_seen_as_a_whole() {
         "hoid identify 'my run.csv' --input Target-y --output 'Stick [V]' --from 2 --to 22 --offset u=1 \
          --excitation Target --controlled-element 1/s"
     );
-    // What is known is not searched for.
+    // Known values are not searched for.
     let known = LookOptions {
         excitation: Some("none".to_owned()),
         from_s: Some(5.0),
@@ -106,7 +106,7 @@ fn a_reader_is_told_the_columns() {
         others.command(["track", "run.csv", "--input=e", "--output", "u", "--out", "t.csv"].map(str::to_owned)),
         "hoid track run.csv --out t.csv --input r-y --output u"
     );
-    // A name that was typed is meant.
+    // A typed name is kept.
     let mut typed = Reading::default();
     typed.options.output = "stick".parse().unwrap();
     assert!(matches!(refused(&typed), AnalysisError::Io(_)));

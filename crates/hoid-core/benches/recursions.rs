@@ -112,8 +112,7 @@ fn rpem<S: Shape, const N: usize, const K: usize>(
     }
 }
 
-/// As a user without error bars would have it, for the comparison with peers that have none: no
-/// guard, no limit on outliers.
+/// As used without error bars, for the comparison with peers that have none: no guard, no limit on outliers.
 fn bare_rls(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
     history.clear();
     let adaptation = Covariance::new(UdCovariance::diagonal([0.1; 4]), scalar(), [f64::INFINITY; 4]);

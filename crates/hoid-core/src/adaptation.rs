@@ -3,8 +3,7 @@
 //! A recursion with the negative gradient psi and the innovation eps moves by `g eps`. The gain is
 //! that of the prediction-error method, `g = P psi/(1 + psi' P psi)`, `P <- P - g psi' P` (eq.
 //! 5.26, 31; L. Ljung and T. Söderström, *Theory and Practice of Recursive Identification*, 1983,
-//! section 3.4), with P in units of the innovation variance. Before that, P grows by what is
-//! forgotten:
+//! section 3.4), with P in units of the innovation variance. Before that, P grows by forgetting:
 //!
 //! | way of forgetting | P | source |
 //! |---|---|---|
@@ -14,17 +13,15 @@
 //! | [`Forgetting::Directional`] | along psi only: measurement with `R = 1/beta`, `beta = lambda - (1 - lambda)/(psi' P psi)` | R. Kulhavý, *Automatica* 23 (1987) 589-600 |
 //! | [`Forgetting::Gradient`] | none: `g = gamma psi/(c + psi' psi)`, c a hundredth of the largest mean power of psi so far | Ljung and Söderström, section 3.5 |
 //!
-//! [`crate::covariance`] carries out these rules; a rectangular window is an adaptation of its own,
-//! [`crate::window`]. The uncertainty of an estimate that was made with such a gain:
-//! [`crate::error_bars`].
+//! [`crate::covariance`] implements these rules; a rectangular window is a separate adaptation,
+//! [`crate::window`]. The uncertainty of an estimate with such a gain is in [`crate::error_bars`].
 
 use crate::error_bars::{ErrorBars, ErrorPropagation};
 
-/// How the weight of old information decays.
+/// Rule by which the weight of old information decays.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Forgetting<const N: usize> {
-    /// A factor `0 < lambda_i <= 1` for each parameter; all equal for the scalar factor, all 1 for
-    /// an infinite memory.
+    /// A factor `0 < lambda_i <= 1` for each parameter; all equal for the scalar factor, all 1 for an infinite memory.
     Exponential {
         /// The factors.
         lambda: [f64; N],
@@ -34,9 +31,9 @@ pub enum Forgetting<const N: usize> {
         /// Diagonal of Q.
         drift: [f64; N],
     },
-    /// A scalar factor that falls where the innovations are larger than their variance explains.
+    /// A scalar factor that falls if the innovations are larger than expected from their variance.
     Variable {
-        /// Memory N_0 in samples while the innovations are as large as their variance reports.
+        /// Memory N_0 in samples while the innovations have the expected variance.
         memory: f64,
         /// Smallest factor.
         smallest: f64,
@@ -63,33 +60,32 @@ pub struct ParameterStep<const N: usize> {
 }
 
 impl<const N: usize> ParameterStep<N> {
-    /// The estimate stays.
+    /// No step: the estimate stays constant.
     pub(crate) const NONE: Self = Self {
         step: [0.0; N],
         gain: [0.0; N],
     };
 }
 
-/// An adaptation, which turns gradients into steps: [`crate::covariance::Covariance`] and
+/// An adaptation, which converts gradients into steps: [`crate::covariance::Covariance`] and
 /// [`crate::window::Window`].
 pub trait Adaptation<const N: usize> {
-    /// The step for psi and the innovation eps at theta. `variance` is sigma^2, zero if it is not
-    /// known.
+    /// Returns the step for psi and the innovation eps at theta. `variance` is sigma^2, zero if it is not known.
     fn update(&mut self, psi: &[f64; N], eps: f64, theta: &[f64; N], variance: f64) -> ParameterStep<N>;
-    /// Covariance of theta over sigma^2, for an adaptation that knows it without [`ErrorBars`].
+    /// Returns the covariance of theta over sigma^2, for an adaptation that computes it without [`ErrorBars`].
     fn own_covariance(&self) -> Option<[[f64; N]; N]> {
         None
     }
-    /// Adds to the error bars the drift of the parameters in a sample.
+    /// Adds the drift of the parameters in a sample to the error bars.
     fn add_drift_to<const K: usize, B: ErrorPropagation<N, K>>(&self, _bars: &mut B) {}
-    /// True when the step depends on sigma^2.
+    /// True if the step depends on sigma^2.
     fn needs_innovation_variance(&self) -> bool {
         false
     }
-    /// Covariance of theta over sigma^2.
+    /// Returns the covariance of theta over sigma^2.
     fn normalised_covariance<const K: usize>(&self, bars: &ErrorBars<N, K>) -> [[f64; N]; N] {
         self.own_covariance().unwrap_or_else(|| bars.normalised_covariance())
     }
-    /// True when all numbers are finite.
+    /// True if all numbers are finite.
     fn is_valid(&self) -> bool;
 }

@@ -1,6 +1,6 @@
 //! A number within its bounds.
 
-/// The value between two bounds. One of them that is not a number does not bind, and the upper one wins where they are
+/// Limits a value to two bounds. A bound that is not a number has no effect, and the upper one wins if they are
 /// reversed, as in the numbers of a damaged save: [`f64::clamp`] panics there.
 #[inline]
 pub fn within(value: f64, [low, high]: [f64; 2]) -> f64 {

@@ -2,10 +2,10 @@
 //!
 //! The equations are in [`crate::adaptation`].
 //!
-//! **Windup.** Where nothing excites a direction, forgetting alone would let P grow without limit.
-//! In turn each parameter gets a pseudo-measurement of the value that it has: the estimate stays,
-//! and `P^{-1} >= diag(1/bound_i)` up to the forgetting of one round. Its information is the part
-//! of `1/bound_i` that was forgotten since the last turn of that parameter.
+//! **Windup.** If nothing excites a direction, forgetting alone would let P grow without limit. Each parameter in turn
+//! therefore gets a pseudo-measurement of its current value: the estimate stays constant, and
+//! `P^{-1} >= diag(1/bound_i)` up to the forgetting of one round. Its information is the part of `1/bound_i` that was
+//! forgotten since the last turn of that parameter.
 
 use crate::{
     adaptation::{Adaptation, Forgetting, ParameterStep},
@@ -13,8 +13,8 @@ use crate::{
     ud_covariance::UdCovariance,
 };
 
-/// Rounds of the guard within the shortest memory, as far as N allows: between two of its turns a
-/// variance grows by e^{1/4} at most.
+/// Number of rounds of the guard within the shortest memory, as far as N allows: between two of its turns a variance
+/// grows by e^{1/4} at most.
 const ROUNDS_PER_MEMORY: f64 = 4.0;
 /// `psi' P psi` below which nothing is measured.
 const NO_EXCITATION: f64 = 1e-100;
@@ -42,18 +42,16 @@ pub struct Covariance<const N: usize> {
     bound: [f64; N],
     /// Information of the pseudo-measurement of each parameter, per unit of what is forgotten.
     guard: [f64; N],
-    /// Accumulated forgetting since the start, now and at the last pseudo-measurement of each
-    /// parameter.
+    /// Accumulated forgetting since the start, now and at the last pseudo-measurement of each parameter.
     forgotten: f64,
     forgotten_at_turn: [f64; N],
-    /// Additional forgetting of an early sample, and the factor by which that decays from sample to
-    /// sample.
+    /// Additional forgetting of an early sample, and the factor by which it decays from sample to sample.
     early: f64,
     early_decay: f64,
     /// Mean power of psi, and the largest so far, for the gradient.
     power: f64,
     largest_power: f64,
-    /// Samples between two turns of the guard, those left until the next, and whose turn it is.
+    /// Number of samples between two turns of the guard, number until the next, and index of the next parameter.
     period: u32,
     until_turn: u32,
     turn: usize,
@@ -70,7 +68,7 @@ impl<const N: usize> Covariance<N> {
         self.turn = self.turn.min(N.saturating_sub(1));
     }
 
-    /// `factors` is P at the start. `bound` is the largest variance of each parameter, in the units
+    /// Builds the gain. `factors` is P at the start. `bound` is the largest variance of each parameter, in the units
     /// of P; infinite for none.
     pub fn new(factors: UdCovariance<N>, forgetting: Forgetting<N>, bound: [f64; N]) -> Self {
         let mut scales = [[1.0; N]; 2];
@@ -118,9 +116,9 @@ impl<const N: usize> Covariance<N> {
         }
     }
 
-    /// With a memory that grows at the start, for a recursion that starts far from the truth:
-    /// before the t-th sample all of P grows by `1/(1 - early decay^t)` in addition (Ljung and
-    /// Söderström, eq. 5.77). The gradients of the first estimates are then forgotten.
+    /// Adds a memory that grows at the start, for a recursion that starts far from the truth: before the t-th sample P
+    /// grows additionally by `1/(1 - early decay^t)` (Ljung and Söderström, eq. 5.77). The gradients of the first
+    /// estimates are then forgotten.
     #[must_use]
     pub fn with_growing_memory(mut self, early: f64, decay: f64) -> Self {
         self.early = early;
@@ -128,18 +126,17 @@ impl<const N: usize> Covariance<N> {
         self
     }
 
-    /// P times a factor, so that the estimate moves less until it has forgotten, or more.
+    /// Multiplies P by a factor: below one the estimate moves less until it has forgotten, above one more.
     pub fn scale(&mut self, factor: f64) {
         self.factors.scale_all(factor);
     }
 
-    /// P itself.
+    /// Returns P.
     pub fn matrix(&self) -> [[f64; N]; N] {
         self.factors.matrix()
     }
 
-    /// The step by every rule and at every time; [`Adaptation::update`] has the typical case next
-    /// to it.
+    /// Returns the step by any rule and at any time; [`Adaptation::update`] handles the typical case.
     #[inline(never)]
     fn update_by_rule(&mut self, psi: &[f64; N], eps: f64, variance: f64) -> ParameterStep<N> {
         if self.early > NO_EARLY_FORGETTING {
@@ -178,7 +175,7 @@ impl<const N: usize> Covariance<N> {
         scaled(self.factors.inflate_and_update(growth, psi, 1.0), eps)
     }
 
-    /// `sum_of_squares` is N_0 sigma^2.
+    /// Returns the step by the variable factor; `sum_of_squares` is N_0 sigma^2.
     fn update_variable(&mut self, psi: &[f64; N], eps: f64, sum_of_squares: f64, smallest: f64) -> ParameterStep<N> {
         // 1 + psi' P psi is the variance of the innovation over sigma^2. An innovation larger than this explains
         // shortens the memory.
@@ -217,8 +214,7 @@ impl<const N: usize> Covariance<N> {
         scaled(psi.map(|p| scale * p), eps)
     }
 
-    /// Counts what this sample forgets, and at the end of a period guards the parameter whose turn
-    /// it is.
+    /// Accumulates the forgetting of this sample, and at the end of a period guards the parameter whose turn it is.
     #[inline]
     fn count_forgotten(&mut self, forgotten: f64) {
         self.forgotten += forgotten;
@@ -234,7 +230,7 @@ impl<const N: usize> Covariance<N> {
     fn guard_next(&mut self) {
         self.until_turn = self.period;
         if !self.factors.is_valid() {
-            // After an overflow P starts again.
+            // After an overflow P restarts.
             self.factors.clone_from(&self.initial);
         }
         let turn = self.turn;

@@ -17,13 +17,13 @@ impl<M: AsMut<[f64]>> crate::state::State for DelayLine<M> {
 }
 
 impl<M: AsMut<[f64]>> DelayLine<M> {
-    /// At rest: the memory is filled with zeros.
+    /// Builds the delay line at rest: the memory is filled with zeros.
     pub fn new(mut memory: M) -> Self {
         memory.as_mut().fill(0.0);
         Self { memory, oldest: 0 }
     }
 
-    /// Puts `x(t)` in and returns `x(t - n)`, with `n` the length of the memory.
+    /// Takes `x(t)` and returns `x(t - n)`, with `n` the length of the memory.
     #[inline]
     pub fn step(&mut self, x: f64) -> f64 {
         let memory = self.memory.as_mut();

@@ -6,8 +6,8 @@
 //! `Phi_j = sum over k of h_k/(k+j)!`: `Phi_1 = exp[z1, z2]`, `Phi_2 = exp[0, z1, z2]`, and
 //! `Phi_j = 1/j! + s Phi_{j+1} - q Phi_{j+2}`.
 //!
-//! All are entire in (s, q): complex, real and double poles and poles at the origin of s are the
-//! same functions, only evaluated in different ways so that nothing cancels:
+//! All are entire in (s, q): complex, real and double poles and poles at the origin of s are cases of the same
+//! functions, evaluated in different ways to avoid cancellation:
 //!
 //! - small poles: the relation between the Phi_j downwards from `Phi_j = 1/j!` (Clenshaw's
 //!   summation), next to it the same for the slopes `D_j = dPhi_j/ds`,
@@ -20,8 +20,7 @@
 //! Sources: N. J. Higham, *Functions of Matrices*, 2008, sections 2.4 and B.16; C. W. Clenshaw,
 //! *Mathematical Tables and Other Aids to Computation* 9, 1955, 118-120.
 
-/// Divided differences of the exponential at one pair of poles; all NaN when the pair is not
-/// finite.
+/// Divided differences of the exponential at one pair of poles; all NaN if the pair is not finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DividedDifferences {
     /// `s = z1 + z2`.
@@ -54,7 +53,7 @@ const fn reciprocal_factorials() -> [f64; 24] {
 }
 
 impl DividedDifferences {
-    /// At the poles with this sum and this product.
+    /// Evaluates them at the poles with this sum and product.
     pub fn at(sum: f64, product: f64) -> Self {
         let half = sum / 2.0;
         let x = half * half - product;

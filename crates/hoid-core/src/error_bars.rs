@@ -1,4 +1,4 @@
-//! The covariance of a recursive estimate, whatever the gain.
+//! The covariance of a recursive estimate, for any gain.
 //!
 //! Let `theta~ = theta - theta^` be the error of the estimate of a constant theta. To first order
 //! the a-priori innovation is `eps^ = eps + h' X`, where X holds theta~ and the errors that past
@@ -8,27 +8,25 @@
 //! - `dv = v^ - v = dw - a~' u`,
 //! - `de = eps^ - eps = D^ dv - d~' v^ + c~' eps^ - (C^ - 1) de`,
 //!
-//! (signals that stand with a `~` are past ones, x includes the present one; all follow from eq.
+//! (signals with a `~` are past ones, x includes the present one; all follow from eq.
 //! 5.4 by subtraction). So `h` is the pseudo-linear regressor for theta~, `D^ - F^` for the past
 //! dw, `-(C^ - 1)` for the past de; and with the step `theta^ <- theta^ + g eps^`
 //!
 //! `theta~ <- theta~ - g (eps + h' X)`,  `Sigma <- (I - g h') Sigma (I - g h')' + g g'`
 //!
-//! (the Joseph form, in units of sigma^2), after which the new dw, dv and de take their layout in
-//! X. With `z = Sigma h` and `k = z - (1 + h' z)/2 g` the update is `Sigma - g k' - k g'`, and for
-//! the row a of a new error, which differs from h in few layout, `Sigma a = z - Sigma (h - a)`: two
-//! thirds of the products are shared. No assumption is made about g: the error bars hold for a
-//! scalar factor, where they tend to `P/(1 + lambda)` for ARX (L. Ljung and T. Söderström, *Theory
-//! and Practice of Recursive Identification*, 1983, eq. 4.136), for a forgetting matrix, a
-//! shortened step, or a gradient. Without forgetting `Sigma` becomes P. The default `h = psi` is
-//! the same for an estimate that does not move within the memory of the filters. Where the memory
-//! of the estimate is not much longer than that of 1/F, its variances are up to a third too small;
-//! a step costs half. K = 0 (no errors of filters) chooses it.
+//! (the Joseph form, in units of sigma^2), after which the new dw, dv and de take their places in X. With
+//! `z = Sigma h` and `k = z - (1 + h' z)/2 g` the update is `Sigma - g k' - k g'`, and for the row a of a new error,
+//! which differs from h in few places, `Sigma a = z - Sigma (h - a)`: two thirds of the products are shared. No
+//! assumption is made about g: the error bars are valid for a scalar factor, where they tend to `P/(1 + lambda)` for
+//! ARX (L. Ljung and T. Söderström, *Theory and Practice of Recursive Identification*, 1983, eq. 4.136), for a
+//! forgetting matrix, a shortened step, or a gradient. Without forgetting `Sigma` becomes P. The default `h = psi`
+//! gives the same result for an estimate that does not move within the memory of the filters. If the memory of the
+//! estimate is not much longer than that of 1/F, its variances are up to a third too small, but a step costs half. It
+//! is selected by K = 0 (no errors of filters).
 //!
-//! **Outliers.** An innovation beyond a few sigma moves the estimate as if it were at that limit
-//! (P. J. Huber, *Robust Statistics*, 1981, section 7.3; the gain in the equations above is then
-//! the smaller one that was used). The innovation variance takes it unclipped, so that a lasting
-//! change of the noise is followed.
+//! **Outliers.** An innovation beyond a few sigma moves the estimate as if it were at that limit (P. J. Huber, *Robust
+//! Statistics*, 1981, section 7.3; the gain in the equations above is then the smaller one that was used). The
+//! innovation variance uses the unclipped innovation, so that a lasting change of the noise is followed.
 //!
 //! The innovation variance sigma^2 is the mean of `eps^2/(1 + h' Sigma h)`, each term of which has
 //! the expectation sigma^2.
@@ -39,9 +37,9 @@ use crate::{
     state::State,
 };
 
-/// Largest variance of a parameter relative to that at the start: beyond it nothing is known.
+/// Largest variance of a parameter relative to that at the start; a parameter with this variance is unknown.
 pub const LARGEST_GROWTH: f64 = 1e6;
-/// Samples between two checks of the variances.
+/// Number of samples between two checks of the variances.
 const CHECK_PERIOD: u32 = 64;
 
 /// Sigma over sigma^2, and sigma^2. N is the capacity for parameters, K that for the errors of the
@@ -59,7 +57,7 @@ pub struct ErrorBars<const N: usize, const K: usize> {
     innovation_variance: InnovationVariance,
     /// Multiple of sigma at which innovations are clipped.
     limit: f64,
-    /// Samples until the next check of the variances.
+    /// Number of samples until the next check of the variances.
     until_check: u32,
 }
 
@@ -67,24 +65,24 @@ crate::state!([const N: usize, const K: usize] ErrorBars<N, K> {
     theta, cross, filters, initial_variances, innovation_variance, limit, until_check,
 }, bounded);
 
-/// Follows the error of an estimate through its recursion: [`ErrorBars`], or [`NoErrorBars`] where
-/// they are not wanted.
+/// Propagates the error of an estimate through its recursion: [`ErrorBars`], or [`NoErrorBars`] if they are not
+/// wanted.
 pub trait ErrorPropagation<const N: usize, const K: usize>: State {
-    /// The innovation, clipped at the limit for outliers.
+    /// Returns the innovation, clipped at the limit for outliers.
     fn clip(&self, eps: f64) -> f64;
-    /// The update by a step of the estimate: its gain, its innovation, and the errors that it
-    /// leaves in the filters.
+    /// Updates the covariance by a step of the estimate: its gain, its innovation, and the errors that it leaves in
+    /// the filters.
     fn update(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>, gain: &[f64; N], eps: f64);
-    /// The errors that a sample leaves in the filters, when the estimate stays.
+    /// Adds the errors that a sample leaves in the filters if the estimate stays constant.
     fn propagate(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>);
     /// Adds the variance by which parameter i drifts in a sample, up to `bound`.
     fn add_drift(&mut self, i: usize, variance: f64, bound: f64);
-    /// Innovation variance sigma^2; `None` if it is not estimated.
+    /// Returns the innovation variance sigma^2; `None` if it is not estimated.
     fn variance(&self) -> Option<f64>;
 }
 
-/// No error bars, no innovation variance and no limit on outliers: the recursion is its estimate
-/// alone, without further cost.
+/// No error bars, no innovation variance and no limit on outliers: only the estimate is computed, without further
+/// cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct NoErrorBars;
 
@@ -118,9 +116,8 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         self.until_check = self.until_check.clamp(1, CHECK_PERIOD);
     }
 
-    /// From the covariance of theta at the start over the innovation variance, with filters whose
-    /// past is right. Innovations move the estimate as if they were no larger than `limit` times
-    /// sigma; infinite for no limit.
+    /// Starts from the covariance of theta over the innovation variance, with correct past signals in the filters.
+    /// Innovations move the estimate as if they were no larger than `limit` times sigma; infinite for no limit.
     pub fn new(start: &[[f64; N]; N], innovation_variance: InnovationVariance, limit: f64) -> Self {
         Self {
             theta: *start,
@@ -158,7 +155,7 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         (theta, filters)
     }
 
-    /// Puts the new dw, dv and de in front of those of their kind, from `Sigma h`.
+    /// Inserts the new dw, dv and de before those of their kind, from `Sigma h`.
     #[inline(always)]
     fn insert(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>, z: [f64; N], z_filters: [f64; K]) {
         let (with_theta, with_filters) = self.covariances_of_new(layout, rows, z, z_filters);
@@ -187,8 +184,8 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         }
     }
 
-    /// `Sigma a` for the rows a of the new dw, dv and de, from `Sigma h`: with theta, and with the
-    /// past errors of the filters.
+    /// `Sigma a` for the rows a of the new dw, dv and de, from `Sigma h`: with theta, and with the past errors of the
+    /// filters.
     #[inline(always)]
     fn covariances_of_new(
         &self,
@@ -231,7 +228,7 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         (with_theta, with_filters)
     }
 
-    /// Covariances of the new dw, dv and de among one another.
+    /// Covariances between the new dw, dv and de.
     #[inline(always)]
     fn covariances_among_new(
         layout: &ErrorLayout,
@@ -260,7 +257,7 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         among
     }
 
-    /// Moves the past errors on by one sample; the oldest of each kind is dropped.
+    /// Shifts the past errors by one sample; the oldest of each kind is dropped.
     #[inline(always)]
     fn shift(&mut self, layout: &ErrorLayout) {
         let kinds = [layout.w, layout.v, layout.e];
@@ -279,9 +276,8 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         }
     }
 
-    /// Keeps the variances below [`LARGEST_GROWTH`] times those at the start. The equations of
-    /// first order can be unstable for large gains where the recursion is not. After an overflow
-    /// all start again from there.
+    /// Limits the variances to [`LARGEST_GROWTH`] times those at the start. The first-order equations can be unstable
+    /// for large gains where the recursion is stable. After an overflow all variances restart from there.
     #[cold]
     fn bound_variances(&mut self) {
         if !self.is_valid() {
@@ -307,18 +303,18 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         }
     }
 
-    /// Covariance of theta over sigma^2.
+    /// Returns the covariance of theta over sigma^2.
     pub fn normalised_covariance(&self) -> [[f64; N]; N] {
         self.theta
     }
 
-    /// Innovation variance sigma^2.
+    /// Returns the innovation variance sigma^2.
     #[inline(always)]
     pub fn innovation_variance(&self) -> f64 {
         self.innovation_variance.variance()
     }
 
-    /// True when all numbers are finite.
+    /// True if all numbers are finite.
     pub fn is_valid(&self) -> bool {
         let all = self.theta.iter().chain(&self.cross).flatten();
         let mut all = all.chain(self.filters.iter().flatten());

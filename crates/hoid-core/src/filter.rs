@@ -4,7 +4,7 @@
 //! `[d_1, ..., d_n]`; the leading one is never stored. All filters start at rest (zeros before the
 //! first sample).
 
-/// All-pole filter into another slice: `y = x / D(q^-1)`.
+/// Applies an all-pole filter: `y = x / D(q^-1)`.
 ///
 /// # Panics
 /// If `x` and `y` differ in length.
@@ -17,14 +17,14 @@ pub fn divide(d: &[f64], x: &[f64], y: &mut [f64]) {
     divide_in_place(d, y);
 }
 
-/// All-pole filter in place: `x <- x / D(q^-1)`, that is
+/// Applies an all-pole filter in place: `x <- x / D(q^-1)`, that is
 /// `y(t) = x(t) - d_1 y(t-1) - ... - d_n y(t-n)`.
 pub fn divide_in_place(d: &[f64], x: &mut [f64]) {
     divide_from(d, x, 0);
 }
 
-/// As [`divide_in_place`] from index `from` on; the values before it are the past output of the
-/// filter, with zeros before the first.
+/// As [`divide_in_place`] from index `from` on; the values before it are the past output of the filter, with zeros
+/// before the first.
 pub fn divide_from(d: &[f64], x: &mut [f64], from: usize) {
     let before = |lag: usize, x: &[f64]| from.checked_sub(lag).map_or(0.0, |t| x[t]);
     match *d {
@@ -58,9 +58,9 @@ pub fn divide_from(d: &[f64], x: &mut [f64], from: usize) {
 
 /// `y = x / (1 + d_1 q^-1 + d_2 q^-2)` from rest, four samples at a time.
 ///
-/// Sample by sample each value waits for the one before it. Written out over four samples with the
-/// impulse response h, `y(t+k) = sum_{i<=k} h_i x(t+k-i) + h_{k+1} y(t-1) - d_2 h_k y(t-2)`, all
-/// four wait for y(t-1) and y(t-2) alone, and only for a product and two sums.
+/// Computed sample by sample each value waits for the one before it. Written out for four samples with the
+/// impulse response h, `y(t+k) = sum_{i<=k} h_i x(t+k-i) + h_{k+1} y(t-1) - d_2 h_k y(t-2)`, all four wait only for
+/// y(t-1) and y(t-2), and only for a product and two sums.
 #[derive(Debug, Clone, Copy)]
 pub struct SecondOrder {
     /// h_1 to h_4; h_0 is one.
@@ -72,7 +72,7 @@ pub struct SecondOrder {
 }
 
 impl SecondOrder {
-    /// At rest.
+    /// Builds the filter at rest.
     pub fn new(d1: f64, d2: f64) -> Self {
         let h1 = -d1;
         let h2 = -d1 * h1 - d2;
@@ -86,7 +86,7 @@ impl SecondOrder {
         }
     }
 
-    /// Four samples.
+    /// Filters four samples.
     #[inline(always)]
     pub fn four(&mut self, [x0, x1, x2, x3]: [f64; 4]) -> [f64; 4] {
         let Self { h, g, y1, y2 } = *self;
@@ -101,7 +101,7 @@ impl SecondOrder {
         y
     }
 
-    /// One sample.
+    /// Filters one sample.
     #[inline(always)]
     pub fn one(&mut self, x: f64) -> f64 {
         let y = (x + self.g[0] * self.y2) + self.h[0] * self.y1;
@@ -132,7 +132,7 @@ fn divide_by_second_order_in_place(mut filter: SecondOrder, x: &mut [f64]) {
     }
 }
 
-/// Monic FIR filter: `y = D(q^-1) x`, that is `y(t) = x(t) + d_1 x(t-1) + ... + d_n x(t-n)`.
+/// Applies a monic FIR filter: `y = D(q^-1) x`, that is `y(t) = x(t) + d_1 x(t-1) + ... + d_n x(t-n)`.
 ///
 /// # Panics
 /// If `x` and `y` differ in length.
@@ -150,7 +150,7 @@ pub fn multiply(d: &[f64], x: &[f64], y: &mut [f64]) {
     }
 }
 
-/// FIR filter with all its coefficients: `y = B(q^-1) q^-nk x`, `b = [b_0, ..., b_{nb-1}]`.
+/// Applies an FIR filter with all its coefficients: `y = B(q^-1) q^-nk x`, `b = [b_0, ..., b_{nb-1}]`.
 ///
 /// # Panics
 /// If `x` and `y` differ in length.
@@ -204,7 +204,7 @@ mod tests {
         for n in 0..=d.len() {
             let mut whole = wave(200);
             divide_in_place(&d[..n], &mut whole);
-            // A cut after one sample, too: what the filter has not seen is zero.
+            // Also for a cut after one sample: the missing input of the filter is zero.
             for cut in [1, 3, 64] {
                 let mut parts = wave(200);
                 divide_in_place(&d[..n], &mut parts[..cut]);
@@ -221,7 +221,7 @@ mod tests {
         let mut y = [0.0; 5];
         fir(&[2.0, 3.0], 1, &[1.0, 10.0, 0.0, 0.0, 0.0], &mut y);
         assert_eq!(y, [0.0, 2.0, 23.0, 30.0, 0.0]);
-        // A delay longer than the record leaves nothing, and does not panic.
+        // A delay longer than the record leaves zeros, and does not panic.
         fir(&[2.0], 9, &[1.0; 5], &mut y);
         assert_eq!(y, [0.0; 5]);
     }

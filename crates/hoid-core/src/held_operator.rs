@@ -26,18 +26,17 @@
 //! - `df1/domega = 2 Ts (omega Ts Phi_1 + zeta Phi_0)`, `df1/dzeta = 2 omega Ts Phi_0`, and for the
 //!   sum `Phi_0 - f2 = -q dchi/ds`.
 //!
-//! Nothing cancels when omega Ts is small. delta = 0 gives b2 = 0 and the hold of eq. 11. The
-//! response is continuous in tau and has a kink where tau is a whole number of samples, because the
-//! step response starts with the slope `omega^2 K_e_dot`: derivatives by tau at delta = 0 and delta
-//! = Ts are those from inside the sample.
+//! Nothing cancels if omega Ts is small. delta = 0 gives b2 = 0 and the hold of eq. 11. The response is continuous in
+//! tau and has a kink where tau is a whole number of samples, because the step response starts with the slope
+//! `omega^2 K_e_dot`: derivatives with respect to tau at delta = 0 and delta = Ts are those from inside the sample.
 //!
-//! Nothing is checked here: parameters that are not finite, or poles so fast that an exponential
-//! overflows, give coefficients that are not finite.
+//! Nothing is checked here: parameters that are not finite, or poles so fast that an exponential overflows, give
+//! coefficients that are not finite.
 
 use crate::divided_differences::DividedDifferences;
 
-/// `[b0, b1, f1, f2]` of `[K_e, K_e_dot, omega_nm, zeta_nm]` (deg/deg, s, rad/s, 1) for a delay of
-/// whole samples, and their Jacobian (rows: coefficients, columns: parameters). Ts in s.
+/// Returns `[b0, b1, f1, f2]` of `[K_e, K_e_dot, omega_nm, zeta_nm]` (deg/deg, s, rad/s, 1) for a delay of whole
+/// samples, and their Jacobian (rows: coefficients, columns: parameters). Ts in s.
 pub fn held_operator(parameters: [f64; 4], ts: f64) -> ([f64; 4], [[f64; 4]; 4]) {
     let [k_e, k_e_dot, omega, zeta] = parameters;
     let at_ts = DividedDifferences::at(-2.0 * zeta * omega * ts, omega * omega * ts * ts);
@@ -61,9 +60,8 @@ pub fn held_operator(parameters: [f64; 4], ts: f64) -> ([f64; 4], [[f64; 4]; 4])
     )
 }
 
-/// `[b0, b1, b2, f1, f2]` for a delay of whole samples and delta, `0 <= delta <= Ts`, and their
-/// Jacobian with respect to `[K_e, K_e_dot, omega_nm, zeta_nm, tau]`, the whole samples held. delta
-/// and Ts in s.
+/// Returns `[b0, b1, b2, f1, f2]` for a delay of whole samples and delta, `0 <= delta <= Ts`, and their Jacobian with
+/// respect to `[K_e, K_e_dot, omega_nm, zeta_nm, tau]`, for constant whole samples. delta and Ts in s.
 pub fn held_operator_delayed(parameters: [f64; 4], delta: f64, ts: f64) -> ([f64; 5], [[f64; 5]; 5]) {
     let [k_e, k_e_dot, omega, zeta] = parameters;
     let at = |t: f64| DividedDifferences::at(-2.0 * zeta * omega * t, omega * omega * t * t);
@@ -159,8 +157,8 @@ impl Gains {
         k_e * self.step + k_e_dot * self.rate
     }
 
-    /// Derivatives of the step response with respect to K_e, K_e_dot, omega, zeta and tau; t falls
-    /// as tau grows.
+    /// Derivatives of the step response with respect to K_e, K_e_dot, omega, zeta and tau; t decreases as tau
+    /// increases.
     fn row(&self, k_e: f64, k_e_dot: f64) -> [f64; 5] {
         [
             self.step,

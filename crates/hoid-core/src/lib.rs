@@ -1,8 +1,9 @@
-//! Recursive identification of a human operator in real time: what runs once per sample, next to a control loop.
+//! Recursive identification of a human operator in real time: the part that runs once per sample, in or next to a
+//! control loop.
 //!
-//! A person steers a machine by the tracking error e and gives the control output u. Their dynamics
-//! change as they learn, tire or adapt to the machine. The recursions of this crate estimate a
-//! model of them from each new sample, with the uncertainty of the estimate.
+//! A person controls a machine, with the tracking error e and the control output u. Their dynamics change as they
+//! learn, tire or adapt to the machine. The recursions of this crate estimate a model of them from each new sample,
+//! with the uncertainty of the estimate.
 //!
 //! **Mathematics.** For the model `A u = (B/F) q^-nk e + (C/D) eps` with the coefficients theta of
 //! its polynomials, the one-step prediction error and its negative gradient are `eps(t)` and
@@ -14,14 +15,14 @@
 //! - gain: `g = P psi/(1 + psi' P psi)`;
 //! - update: `theta <- theta + g eps`, `P <- P - g psi' P`.
 //!
-//! P is kept in factors `U D U'`, which rounding cannot make indefinite. A step that would make the
-//! predictor unstable is halved until it does not. The error bars follow the error of the estimate
-//! through the recursion, whatever the gain, in units of the innovation variance sigma^2.
+//! P is kept in factors `U D U'`, which rounding cannot make indefinite. A step that would make the predictor unstable
+//! is halved until it does not. The error bars follow the error of the estimate through the recursion, for any gain,
+//! in units of the innovation variance sigma^2.
 //!
-//! **Real time.** `no_std`, no allocation, no dependency but small systems of equations (`hoid-numerics`) and
+//! **Real time.** `no_std`, no allocation, no dependencies except small systems of equations (`hoid-numerics`) and
 //! elementary functions (`libm`). Every routine works in memory that the caller owns and has a bounded number of
 //! operations. The numbers of a recursion can be saved and restored ([`mod@state`]). Batch estimators and simulator of
-//! hoid are on the same filters, so that a recursion and its batch counterpart cannot differ in them.
+//! hoid use the same filters, so that a recursion and its batch counterpart cannot differ in them.
 //!
 //! ```
 //! use hoid_core::{

@@ -14,21 +14,19 @@
 //! | `d_j` | `-(1/C) v(t-j)` |
 //! | `f_j` | `-(D/(C F)) w(t-j)` |
 //!
-//! Each filter works with the coefficients of its time; for a theta that stays, eps and psi are
-//! those of the batch criterion started at rest. `D/(C F)` is **one filter in direct form**, `y(t) =
-//! x(t) + sum d_j x(t-j) - sum g_j y(t-j)` with `G = C F`. A cascade, first `1/F` and then `D/C`, is
-//! the same filter only while theta stays: time-varying filters do not commute. Its inner signal
-//! `x/F` remembers the F of earlier estimates until its poles have forgotten them, and D of today no
-//! longer cancels what it should; near the unit circle psi is then wrong for as long as theta moves
+//! Each filter uses the coefficients of its time; for a constant theta, eps and psi are those of the batch criterion
+//! started at rest. `D/(C F)` is **one filter in direct form**, `y(t) = x(t) + sum d_j x(t-j) - sum g_j y(t-j)` with
+//! `G = C F`. A cascade, first `1/F` and then `D/C`, is the same filter only for a constant theta: time-varying
+//! filters do not commute. Its inner signal `x/F` depends on the F of earlier estimates until its poles have forgotten
+//! them, and the current D no longer cancels it; near the unit circle psi is then wrong for as long as theta moves
 //! ([`Regressor::Cascade`], for comparison).
 //!
-//! After the estimate has moved, w, v and eps of the
-//! sample are computed again with it ([`Predictor::correct`]): the a-posteriori residuals, with
-//! which the recursion converges faster (L. Ljung and T. Söderström, *Theory and Practice of
-//! Recursive Identification*, 1983, section 3.7.3 and eq. 3.151).
+//! After the estimate has moved, w, v and eps of the sample are computed again with it ([`Predictor::correct`]): the
+//! a-posteriori residuals, with which the recursion converges faster (L. Ljung and T. Söderström, *Theory and Practice
+//! of Recursive Identification*, 1983, section 3.7.3 and eq. 3.151).
 //!
-//! The input is kept over L samples, so that B may start at any `offset` within them: a delay can be
-//! changed without a transient. N is the capacity for parameters.
+//! The input is kept over L samples, so that B may start at any `offset` within them: a delay can be changed without a
+//! transient. N is the capacity for parameters.
 
 use core::hint::black_box;
 
@@ -39,14 +37,14 @@ use crate::{
     shape::Shape,
 };
 
-/// The signals of which psi is made.
+/// The signals from which psi is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Regressor {
     /// The gradient: prediction-error method.
     #[default]
     Gradient,
-    /// The gradient with `D/(C F)` as a cascade, `1/F` before `D/C`: the same while theta stays, and
-    /// slower to converge while it moves. For comparison.
+    /// The gradient with `D/(C F)` as a cascade, `1/F` before `D/C`: the same for a constant theta, and slower to
+    /// converge while it moves. For comparison.
     Cascade,
     /// The signals without their filters: pseudo-linear regression, also called extended least
     /// squares (Ljung and Söderström, section 3.7.4). Fewer operations; it converges where 1/C (1/F
@@ -84,7 +82,7 @@ crate::state!([S, const N: usize, const L: usize] Predictor<S, N, L> {
 });
 
 impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
-    /// All filters at rest. `None` when the shape does not fit in N and L, or has no parameter.
+    /// Builds all filters at rest. `None` if the shape exceeds N or L, or has no parameter.
     pub fn new(shape: S, regressor: Regressor) -> Option<Self> {
         let inputs = shape.nb().max(shape.nd() + 1).max(shape.nc() + shape.nf());
         let fits = (1..=N).contains(&shape.parameters()) && (shape.nb() == 0 || inputs <= L);
@@ -108,18 +106,18 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         })
     }
 
-    /// Orders.
+    /// Returns the orders.
     pub fn shape(&self) -> S {
         self.shape
     }
 
-    /// Lets B start `offset` samples before the newest input, as far as the kept input reaches; B
-    /// can shift where L is larger than N.
+    /// Lets B start `offset` samples before the newest input, within the kept input; B can shift if L is larger than
+    /// N.
     pub fn set_offset(&mut self, offset: usize) {
         self.offset = offset.min(L - self.shape.nb().min(L));
     }
 
-    /// Brings all filters to rest; the offset of B stays.
+    /// Resets all filters; the offset of B is unchanged.
     #[cold]
     #[inline(never)]
     pub fn reset(&mut self) {
@@ -130,19 +128,19 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         }
     }
 
-    /// Where B starts. Where it cannot shift, this is a constant that the compiler knows.
+    /// The start of B. If it cannot shift, this is a constant at compile time.
     #[inline(always)]
     fn offset(&self) -> usize {
         if L > N { self.offset } else { 0 }
     }
 
-    /// psi, and the a-priori innovation of the sample `x(t) = e(t - nk)`, `u(t)`.
+    /// Returns psi, and the a-priori innovation of the sample `x(t) = e(t - nk)`, `u(t)`.
     #[inline(always)]
     pub fn predict(&mut self, theta: &[f64; N], x: f64, u: f64) -> ([f64; N], f64) {
         let shape = self.shape;
         let [_, _, c, d, f] = shape.split(theta);
         let offset = self.offset();
-        // Where B cannot shift, only the inputs under the coefficients of B and D are kept.
+        // If B cannot shift, only the inputs of the coefficients of B and D are kept.
         let (input, output) = if L > N {
             (L, L)
         } else {
@@ -186,8 +184,7 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         [w, v, v + dot(d, &self.v) - dot(c, &self.eps)]
     }
 
-    /// Moves the filters on by the predicted sample, with the estimate after it. Returns the
-    /// a-posteriori residual.
+    /// Advances the filters by the predicted sample, with the updated estimate. Returns the a-posteriori residual.
     #[inline(always)]
     pub fn correct(&mut self, theta: &[f64; N]) -> f64 {
         let shape = self.shape;
@@ -239,14 +236,14 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
         eps
     }
 
-    /// Puts the one-step prediction in the place of the pending output, which is missing.
+    /// Replaces the missing output of the pending sample by the one-step prediction.
     pub fn bridge(&mut self, theta: &[f64; N]) {
         self.pending[0] = 0.0;
         // eps is the output less its prediction.
         self.pending[0] = -self.residual(theta)[2];
     }
 
-    /// The sensitivities of dw, dv and de of the pending sample to the errors X of
+    /// Returns the sensitivities of dw, dv and de of the pending sample to the errors X of
     /// [`crate::error_bars`].
     #[inline(always)]
     pub fn sensitivities<const K: usize>(&self, theta: &[f64; N], layout: &ErrorLayout) -> Sensitivities<N, K> {
@@ -282,11 +279,10 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
     }
 }
 
-/// The product of coefficients and a history that the sample before has pushed into number by number.
+/// Product of coefficients and a history whose numbers were stored one by one just before.
 ///
-/// Each number is read by itself: one wide load of what was stored narrowly just before would wait
-/// until all of it has reached the memory, so that no two samples could overlap. The compiler likes
-/// to make such loads.
+/// Each number is read separately: a wide load of narrow stores from just before would wait until all of them have
+/// reached the memory, so that no two samples could overlap. The compiler tends to generate such loads.
 #[inline(always)]
 fn dot_of_fresh(coefficients: &[f64], history: &[f64]) -> f64 {
     let mut pairs = coefficients.iter().zip(history);
@@ -314,7 +310,7 @@ fn product<const N: usize>(c: &[f64], f: &[f64]) -> [f64; N] {
     g
 }
 
-/// Puts a value in front of the n newest ones.
+/// Inserts a value before the n newest ones.
 #[inline(always)]
 fn push(history: &mut [f64], n: usize, value: f64) {
     if n > 0 {

@@ -1,32 +1,32 @@
-//! The outcome of a step, and steps that are shortened until they keep the predictor stable.
+//! Outcome of a step, and steps that are shortened until the predictor is stable.
 
 use crate::{shape::Shape, stability::roots_inside};
 
-/// The outcome of a step.
+/// Outcome of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
     /// A-priori innovation eps.
     pub innovation: f64,
-    /// True when stability or a bound made the step of the estimate shorter.
+    /// True if stability or a bound shortened the step of the estimate.
     pub shortened: bool,
 }
 
-/// Polynomials whose roots a recursion keeps inside the unit circle. Without C and F there the
-/// predictor and its gradient diverge.
+/// Polynomials whose roots a recursion keeps inside the unit circle. With unstable C and F the predictor and its
+/// gradient diverge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Stable {
     /// C and F.
     #[default]
     Predictor,
-    /// C, D and F: a noise model that is stationary too, as the thesis has it.
+    /// C, D and F: with a stationary noise model, as in the thesis.
     PredictorAndNoise,
 }
 
-/// Largest number of halvings of a step; after them the estimate stays.
+/// Largest number of halvings of a step; after them the estimate stays constant.
 const HALVINGS: u32 = 12;
 
 impl Stable {
-    /// True for a theta that may be used.
+    /// True if theta is stable.
     #[inline]
     pub fn holds<S: Shape>(self, shape: &S, theta: &[f64]) -> bool {
         let [_, _, c, d, f] = shape.split(theta);
@@ -34,22 +34,21 @@ impl Stable {
     }
 }
 
-/// `part/whole`; 1 where the two are equal, so also where both are zero.
+/// Returns `part/whole`; 1 if the two are equal, also if both are zero.
 #[inline(always)]
 pub fn ratio(part: f64, whole: f64) -> f64 {
     if part == whole { 1.0 } else { part / whole }
 }
 
-/// True when every number is finite; in floating-point registers and without a branch for each
-/// number.
+/// True if every number is finite; computed in floating-point registers and without a branch for each number.
 #[inline(always)]
 pub(crate) fn all_finite<const N: usize>(values: &[f64; N]) -> bool {
     // Zero times infinity or NaN is NaN.
     values.iter().fold(0.0, |sum, v| sum + 0.0 * v) == 0.0
 }
 
-/// The largest of the fractions 1, 1/2, 1/4 ... of a step that is allowed, and theta after it; 0
-/// and theta when none is.
+/// Returns the largest of the fractions 1, 1/2, 1/4 ... of a step that is allowed, and theta after it; 0 and theta if
+/// none is.
 #[inline]
 pub fn backtrack<const N: usize>(
     theta: &[f64; N],

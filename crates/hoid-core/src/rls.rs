@@ -30,9 +30,9 @@ pub struct Rls<S, const N: usize, A, B = ErrorBars<N, 0>> {
 crate::state!([S, const N: usize, A: crate::state::State, B: crate::state::State] Rls<S, N, A, B> { theta, psi, adaptation, bars, restarts });
 
 impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<S, N, A, B> {
-    /// Starts from theta `[a.., b..]` with zeros before the first sample. `None` when there is no
-    /// parameter, more than N, or one of C, D or F; or when the rule of forgetting needs the
-    /// innovation variance and `bars` do not estimate it.
+    /// Starts from theta `[a.., b..]` with zeros before the first sample. `None` if there is no parameter, more than
+    /// N, or one of C, D or F; or if the rule of forgetting needs the innovation variance and `bars` do not estimate
+    /// it.
     pub fn new(shape: S, theta: [f64; N], adaptation: A, bars: B) -> Option<Self> {
         let linear = (shape.nc(), shape.nd(), shape.nf()) == (0, 0, 0);
         let known = bars.variance().is_some() || !adaptation.needs_innovation_variance();
@@ -46,13 +46,13 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         })
     }
 
-    /// The step by a sample `x(t) = e(t - nk)`, `u(t)`. Both must be finite.
+    /// Takes a sample `x(t) = e(t - nk)`, `u(t)`. Both must be finite.
     #[inline]
     pub fn step(&mut self, x: f64, u: f64) -> Step {
-        // State is read once, worked on in locals and written once.
+        // The state is read once, processed in local variables and written once.
         let theta = self.theta;
         let (psi, innovation) = self.innovation(&theta, x, u);
-        // A limited innovation bounds the step of an outlier.
+        // The clipped innovation bounds the step of an outlier.
         let limited = self.bars.clip(innovation);
         let moved = self
             .adaptation
@@ -83,7 +83,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         }
     }
 
-    /// As [`Rls::step`], but the estimate stays: only the regressor moves on.
+    /// As [`Rls::step`], but the estimate stays constant: only the regressor moves on.
     pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
         let (psi, innovation) = self.innovation(&self.theta, x, u);
         self.shift(psi, u);
@@ -93,20 +93,19 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         }
     }
 
-    /// As [`Rls::step_without_update`] where the output is missing: the one-step prediction takes
-    /// its place.
+    /// As [`Rls::step_without_update`] for a missing output, which the one-step prediction replaces.
     pub fn bridge(&mut self, x: f64) {
         let (psi, innovation) = self.innovation(&self.theta, x, 0.0);
         // With u = 0 the innovation is minus the one-step prediction, which replaces the missing output.
         self.shift(psi, -innovation);
     }
 
-    /// psi with x and the innovation.
+    /// psi with x, and the innovation.
     #[inline(always)]
     fn innovation(&self, theta: &[f64; N], x: f64, u: f64) -> ([f64; N], f64) {
         let (na, nb) = (self.shape.na(), self.shape.nb());
-        // Each number is read by itself: a wide load right after the narrow stores of the sample
-        // before would wait for memory.
+        // Each number is read separately: a wide load right after the narrow stores of the sample before would wait
+        // for the memory.
         let mut psi = self.psi.map(core::hint::black_box);
         for j in (1..nb).rev() {
             psi[na + j] = psi[na + j - 1];
@@ -115,7 +114,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
             psi[na] = x;
         }
         let w = dot(&theta[na..na + nb], &psi[na..]);
-        // The same bits as the predictor of the general model has, which keeps u itself.
+        // The same bits as the predictor of the general model, which keeps u itself.
         (psi, u - dot(&theta[..na], &psi) - w)
     }
 
@@ -131,34 +130,34 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         self.psi = psi;
     }
 
-    /// The estimate theta.
+    /// Returns the estimate theta.
     pub fn theta(&self) -> &[f64; N] {
         &self.theta
     }
 
-    /// The adaptation with its covariance.
+    /// Returns the adaptation with its covariance.
     pub fn adaptation(&self) -> &A {
         &self.adaptation
     }
 
-    /// The adaptation, to be changed from outside.
+    /// Returns the adaptation for changes from outside.
     pub fn adaptation_mut(&mut self) -> &mut A {
         &mut self.adaptation
     }
 
-    /// How often a step was not finite and the regressor was brought to rest.
+    /// Returns the number of steps that were not finite, after which the regressor was reset.
     pub fn restarts(&self) -> u64 {
         self.restarts
     }
 }
 
 impl<S: Shape, const N: usize, A: Adaptation<N>> Rls<S, N, A> {
-    /// Covariance of theta over sigma^2.
+    /// Returns the covariance of theta over sigma^2.
     pub fn normalised_covariance(&self) -> [[f64; N]; N] {
         self.adaptation.normalised_covariance(&self.bars)
     }
 
-    /// Innovation variance sigma^2.
+    /// Returns the innovation variance sigma^2.
     pub fn innovation_variance(&self) -> f64 {
         self.bars.innovation_variance()
     }

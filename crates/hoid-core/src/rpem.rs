@@ -36,9 +36,8 @@ crate::state!([S, const N: usize, const K: usize, A: crate::state::State, B: cra
 });
 
 impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropagation<N, K>> Rpem<S, N, K, A, B> {
-    /// Starts from `theta = [a.. b.. c.. d.. f..]` with filters at rest. `None` when the shape does
-    /// not fit in N and K, theta is not stable, or the rule of forgetting needs the innovation
-    /// variance and `bars` do not estimate it.
+    /// Starts from `theta = [a.. b.. c.. d.. f..]` with filters at rest. `None` if the shape exceeds N or K, theta is
+    /// not stable, or the rule of forgetting needs the innovation variance and `bars` do not estimate it.
     pub fn new(
         shape: S,
         regressor: Regressor,
@@ -62,11 +61,11 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         })
     }
 
-    /// The step by a sample `x(t) = e(t - nk)`, `u(t)`. Both must be finite.
+    /// Takes a sample `x(t) = e(t - nk)`, `u(t)`. Both must be finite.
     #[inline]
     pub fn step(&mut self, x: f64, u: f64) -> Step {
         let shape = self.predictor.shape();
-        // State is read once, worked on in locals and written once.
+        // The state is read once, processed in local variables and written once.
         let theta = self.theta;
         let (psi, innovation) = self.predictor.predict(&theta, x, u);
         let (layout, rows) = self.sensitivities(&theta, &psi);
@@ -76,13 +75,13 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
             .adaptation
             .update(&psi, limited, &theta, self.bars.variance().unwrap_or(0.0));
         let stable = self.stable;
-        // eps and psi are outputs of filters with the poles of C and F: outside of the stable region they diverge, and
+        // eps and psi are outputs of filters with the poles of C and F: outside the stable region they diverge, and
         // with them the estimate (Ljung and Söderström 1983, section 3.7.3).
         let (allowed, theta) = backtrack(&theta, &moved.step, |theta| stable.holds(&shape, theta));
         // The filters continue with the a-posteriori residuals of the new theta (Ljung and Söderström 1983, eq. 3.151).
         self.correct(&theta);
         (self.theta, self.psi) = (theta, psi);
-        // The error bars follow the step that was made: shortened by `allowed`, limited by `used`.
+        // The error bars follow the actual step: shortened by `allowed`, limited by `used`.
         let gain = moved.gain.map(|g| allowed * used * g);
         self.bars.update(&layout, &rows, &gain, innovation);
         self.adaptation.add_drift_to(&mut self.bars);
@@ -92,7 +91,7 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         }
     }
 
-    /// As [`Rpem::step`], but the estimate stays: only the filters move on.
+    /// As [`Rpem::step`], but the estimate stays constant: only the filters move on.
     pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
         let theta = self.theta;
         let (psi, innovation) = self.predictor.predict(&theta, x, u);
@@ -105,8 +104,7 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         }
     }
 
-    /// As [`Rpem::step_without_update`] where the output is missing: the one-step prediction takes
-    /// its place.
+    /// As [`Rpem::step_without_update`] for a missing output, which the one-step prediction replaces.
     pub fn bridge(&mut self, x: f64) {
         let theta = self.theta;
         (self.psi, _) = self.predictor.predict(&theta, x, 0.0);
@@ -139,39 +137,39 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         }
     }
 
-    /// The estimate theta.
+    /// Returns the estimate theta.
     pub fn theta(&self) -> &[f64; N] {
         &self.theta
     }
 
-    /// psi of the last sample.
+    /// Returns psi of the last sample.
     pub fn psi(&self) -> &[f64; N] {
         &self.psi
     }
 
-    /// The adaptation with its covariance.
+    /// Returns the adaptation with its covariance.
     pub fn adaptation(&self) -> &A {
         &self.adaptation
     }
 
-    /// The adaptation, to be changed from outside.
+    /// Returns the adaptation for changes from outside.
     pub fn adaptation_mut(&mut self) -> &mut A {
         &mut self.adaptation
     }
 
-    /// How often a signal overflowed and the filters were brought to rest.
+    /// Returns the number of overflows after which the filters were reset.
     pub fn restarts(&self) -> u64 {
         self.restarts
     }
 }
 
 impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>> Rpem<S, N, K, A> {
-    /// Covariance of theta over sigma^2.
+    /// Returns the covariance of theta over sigma^2.
     pub fn normalised_covariance(&self) -> [[f64; N]; N] {
         self.adaptation.normalised_covariance(&self.bars)
     }
 
-    /// Innovation variance sigma^2.
+    /// Returns the innovation variance sigma^2.
     pub fn innovation_variance(&self) -> f64 {
         self.bars.innovation_variance()
     }

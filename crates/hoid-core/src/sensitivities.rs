@@ -1,29 +1,28 @@
-//! How the errors in the filters of the predictor follow from those of the parameters.
+//! Dependence of the errors in the filters of the predictor on those of the parameters.
 //!
-//! An estimate that was wrong has left errors in what the filters of the [`crate::predictor`]
-//! remember. With theta~ and the past errors in a vector X, the new ones are linear functions of X;
+//! A wrong estimate leaves errors in the memory of the filters of the [`crate::predictor`]. With theta~ and the past
+//! errors in a vector X, the new ones are linear functions of X;
 //! [`crate::error_bars`] has the equations.
 
 use crate::shape::Shape;
 
-/// The layout of X: which parameters belong to A, which to C and D, and how many past errors of the
-/// filters are kept.
+/// The layout of X: the parameters that belong to A, and to C and D, and the number of past errors of the filters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ErrorLayout {
     /// Number of coefficients of A, which come first.
     pub na: usize,
-    /// First coefficient of C and D and their number.
+    /// Index of the first coefficient of C and D, and their number.
     pub noise: (usize, usize),
-    /// First dw and their number, among the errors of the filters.
+    /// Index of the first dw among the errors of the filters, and their number.
     pub w: (usize, usize),
-    /// First dv and their number; none without A, where dv is dw.
+    /// Index of the first dv, and their number; none without A, for which dv is dw.
     pub v: (usize, usize),
-    /// First de and their number.
+    /// Index of the first de, and their number.
     pub e: (usize, usize),
 }
 
 impl ErrorLayout {
-    /// The layout for a shape, with the parameters in the order of theta.
+    /// Returns the layout for a shape, with the parameters in the order of theta.
     #[inline(always)]
     pub fn of<S: Shape>(shape: &S) -> Self {
         let w = if shape.na() == 0 {
@@ -50,13 +49,13 @@ impl ErrorLayout {
         e: (0, 0),
     };
 
-    /// The layout for a shape, or [`ErrorLayout::NONE`] for K = 0.
+    /// Returns the layout for a shape, or [`ErrorLayout::NONE`] for K = 0.
     #[inline(always)]
     pub fn for_capacity<S: Shape, const K: usize>(shape: &S) -> Self {
         if K == 0 { Self::NONE } else { Self::of(shape) }
     }
 
-    /// Number of past errors of the filters.
+    /// Returns the number of past errors of the filters.
     #[inline(always)]
     pub fn filter_errors(&self) -> usize {
         self.e.0 + self.e.1
@@ -72,7 +71,7 @@ pub struct LinearForm<const N: usize, const K: usize> {
     pub filters: [f64; K],
 }
 
-/// How the new dw, dv and de follow from X; the last is the sensitivity h of the innovation too.
+/// Dependence of the new dw, dv and de on X; the last is also the sensitivity h of the innovation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sensitivities<const N: usize, const K: usize> {
     /// Of dw.
@@ -84,8 +83,8 @@ pub struct Sensitivities<const N: usize, const K: usize> {
 }
 
 impl<const N: usize, const K: usize> Sensitivities<N, K> {
-    /// The entries of an estimate that does not move within the memory of its filters: `h = psi`,
-    /// and no errors in the filters.
+    /// Returns the sensitivities of an estimate that does not move within the memory of its filters: `h = psi`, and no
+    /// errors in the filters.
     #[inline(always)]
     pub fn from_gradient(psi: &[f64; N]) -> Self {
         let form = LinearForm {

@@ -1,32 +1,32 @@
 //! Orders of the general model, as numbers or in the type.
 //!
 //! The parameters of `A u = (B/F) q^-nk e + (C/D) eps` are in one vector,
-//! `theta = [a.. b.. c.. d.. f..]`. A [`Shape`] states how many there are of each kind, and so the
-//! position of each polynomial.
+//! `theta = [a.. b.. c.. d.. f..]`. A [`Shape`] has the number of each kind, and therefore the position of each
+//! polynomial.
 
 /// Numbers of coefficients of A, B, C, D and F.
 ///
-/// [`AnyShape`] holds them as numbers. [`FixedShape`] has them in its type, so that the compiler
-/// unrolls every loop over coefficients: the same operations in the same order, in half the time.
+/// [`AnyShape`] has them as numbers. [`FixedShape`] has them in its type, so that the compiler unrolls every loop over
+/// coefficients: the same operations in the same order, in half the time.
 pub trait Shape: Copy {
-    /// Coefficients `a_1 ...`.
+    /// Number of coefficients `a_1 ...`.
     fn na(&self) -> usize;
-    /// Coefficients `b_0 ...`.
+    /// Number of coefficients `b_0 ...`.
     fn nb(&self) -> usize;
-    /// Coefficients `c_1 ...`.
+    /// Number of coefficients `c_1 ...`.
     fn nc(&self) -> usize;
-    /// Coefficients `d_1 ...`.
+    /// Number of coefficients `d_1 ...`.
     fn nd(&self) -> usize;
-    /// Coefficients `f_1 ...`.
+    /// Number of coefficients `f_1 ...`.
     fn nf(&self) -> usize;
 
-    /// Length of `theta = [a.. b.. c.. d.. f..]`.
+    /// Returns the length of `theta = [a.. b.. c.. d.. f..]`.
     #[inline]
     fn parameters(&self) -> usize {
         self.na() + self.nb() + self.nc() + self.nd() + self.nf()
     }
 
-    /// `[a, b, c, d, f]` of theta.
+    /// Splits theta into `[a, b, c, d, f]`.
     #[inline]
     fn split<'t, R>(&self, theta: &'t [R]) -> [&'t [R]; 5] {
         let (a, rest) = theta.split_at(self.na());
@@ -40,15 +40,15 @@ pub trait Shape: Copy {
 /// Orders as numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct AnyShape {
-    /// Coefficients `a_1 ...`.
+    /// Number of coefficients `a_1 ...`.
     pub na: usize,
-    /// Coefficients `b_0 ...`.
+    /// Number of coefficients `b_0 ...`.
     pub nb: usize,
-    /// Coefficients `c_1 ...`.
+    /// Number of coefficients `c_1 ...`.
     pub nc: usize,
-    /// Coefficients `d_1 ...`.
+    /// Number of coefficients `d_1 ...`.
     pub nd: usize,
-    /// Coefficients `f_1 ...`.
+    /// Number of coefficients `f_1 ...`.
     pub nf: usize,
 }
 

@@ -1,4 +1,4 @@
-//! Are all roots of a monic polynomial inside a circle?
+//! Test whether all roots of a monic polynomial lie inside a circle.
 //!
 //! Schur-Cohn test by the step-down (Levinson) recursion: with `k = d_n`, the polynomial of degree
 //! n has its roots inside the unit circle if and only if `|k| < 1` and the polynomial of degree n -
@@ -6,14 +6,13 @@
 //! `d_i / r^i`. Source: E. I. Jury, *Theory and Application of the z-Transform Method*, 1964; S.
 //! Kay, *Modern Spectral Estimation*, 1988, eq. 6.51.
 
-/// Longest polynomial that [`roots_inside`] tests, so that its work space can live on the stack.
+/// Highest order that [`roots_inside`] tests; its work space is on the stack.
 pub const MAX_ORDER: usize = 64;
 
-/// True when all roots of `z^n + d_1 z^{n-1} + ... + d_n` lie strictly inside the circle of the
-/// given radius.
+/// True if all roots of `z^n + d_1 z^{n-1} + ... + d_n` lie strictly inside the circle of the given radius.
 ///
-/// Coefficients that are not finite give `false`, and so does an order above [`MAX_ORDER`]: no
-/// claim of stability without proof.
+/// Coefficients that are not finite give `false`, and so does an order above [`MAX_ORDER`]: stability is never
+/// reported without proof.
 #[inline]
 pub fn roots_inside(d: &[f64], radius: f64) -> bool {
     // Most polynomials of an operator are short, and a recursion tests them at every sample.

@@ -1,14 +1,13 @@
-//! The numbers that change while a recursion runs, so that it can be saved and continue elsewhere.
+//! The numbers that change while a recursion runs, so that it can be saved and continued elsewhere.
 //!
-//! One function visits them in both directions: to read them is to save, to write them is to
-//! restore, and the two cannot differ in order. A restored recursion continues with the same
-//! digits. Counters are numbers as well; those of a recursion stay below `2^53`, up to which f64
-//! holds them exactly. Shape and options are not part of the state: restore it into a recursion
-//! that was made with the same ones.
+//! One function visits them in both directions: reading them saves the recursion, writing them restores it, and the
+//! two cannot differ in order. A restored recursion continues with the same digits. Counters are numbers as well;
+//! those of a recursion stay below `2^53`, up to which f64 represents them exactly. Shape and options are not part of
+//! the state: restore it into a recursion that was made with the same ones.
 
 /// A part of a recursion with numbers to be saved.
 pub trait State {
-    /// Shows every number to `each`, which may change it.
+    /// Passes every number to `each`, which may change it.
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64));
 }
 
@@ -33,8 +32,8 @@ impl State for bool {
     }
 }
 
-/// Counters of 64 and 32 bits stay as far below what they hold as no run counts: one more is never too many,
-/// whatever was restored.
+/// Limit of restored counters of 64 and 32 bits, which no run reaches: counting further never overflows, whatever was
+/// restored.
 const MOST: f64 = 9_007_199_254_740_992.0;
 const MOST_OF_32: f64 = 2_147_483_648.0;
 const MOST_OF_USIZE: f64 = if usize::BITS > 32 { MOST } else { MOST_OF_32 };
@@ -70,9 +69,9 @@ impl<T: State + ?Sized> State for &mut T {
     }
 }
 
-/// Makes a type a [`State`] of the fields that are named: `state!([const N: usize] Type<N> { field, field })`. With
-/// `, bounded` after them the type has a method of that name, which brings places, lengths and counts back to where
-/// they may be: numbers may have been made by anyone.
+/// Implements [`State`] for a type by the named fields: `state!([const N: usize] Type<N> { field, field })`. With
+/// `, bounded` after them the type has a method of that name, which limits indices, lengths and counts to their valid
+/// ranges: the numbers may come from any source.
 #[macro_export]
 macro_rules! state {
     ([$($generics:tt)*] $type:ty { $($field:ident),+ $(,)? }) => {

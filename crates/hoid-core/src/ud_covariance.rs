@@ -1,7 +1,6 @@
 //! A covariance matrix in factors: `P = U D U'`, U unit upper triangular, D diagonal.
 //!
-//! P stays symmetric and positive whatever rounding does, as long as D does. The rules of
-//! forgetting need three operations:
+//! P stays symmetric and positive despite rounding, as long as D does. The rules of forgetting need three operations:
 //!
 //! - **measurement** with the regressor psi and the variance R: `g = P psi/(R + psi' P psi)`,
 //!   `P <- P - g psi' P`. With `f = U' psi`, `v = D f` and the partial sums
@@ -14,23 +13,21 @@
 //! - **rank one** `P <- P + c a a'` with `c >= 0` (W. S. Agee and R. H. Turner, 1972; Bierman,
 //!   section III.4).
 //!
-//! N is the capacity for parameters. Where there are fewer, the d of the others are zero and stay
-//! so.
+//! N is the capacity for parameters. If there are fewer, the d of the others are zero and stay zero.
 
 /// `U D U'` of an N x N matrix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]
 pub struct UdCovariance<const N: usize> {
-    /// Column j holds `U_ij`, i < j, and `d_j` in the place of the 1; the rest is not used. The entries d
-    /// are not contiguous, so that no compiler makes a vector of them, whose first element
-    /// would wait for the last.
+    /// Column j holds `U_ij`, i < j, and `d_j` in place of the 1; the rest is not used. The entries d are not
+    /// contiguous, so that no compiler makes a vector of them, whose first element would wait for the last.
     u: [[f64; N]; N],
 }
 
 crate::state!([const N: usize] UdCovariance<N> { u });
 
 impl<const N: usize> UdCovariance<N> {
-    /// A diagonal matrix.
+    /// Returns a diagonal matrix.
     pub fn diagonal(d: [f64; N]) -> Self {
         let mut u = [[0.0; N]; N];
         for j in 0..N {
@@ -39,8 +36,8 @@ impl<const N: usize> UdCovariance<N> {
         Self { u }
     }
 
-    /// The factors of a symmetric matrix; `None` unless it is positive semidefinite up to rounding.
-    /// Rows and columns of zeros are parameters that do not move.
+    /// Returns the factors of a symmetric matrix; `None` unless it is positive semidefinite up to rounding. Rows and
+    /// columns of zeros are parameters that do not move.
     pub fn from_matrix(p: &[[f64; N]; N]) -> Option<Self> {
         let mut rest = *p;
         let mut factored = Self::diagonal([0.0; N]);
@@ -51,7 +48,7 @@ impl<const N: usize> UdCovariance<N> {
             }
             factored.u[j][j] = d;
             if d == 0.0 {
-                // Nothing can be correlated with what does not vary.
+                // A constant parameter cannot be correlated with others.
                 if (0..j).any(|i| rest[i][j] != 0.0) {
                     return None;
                 }
@@ -70,13 +67,13 @@ impl<const N: usize> UdCovariance<N> {
         Some(factored)
     }
 
-    /// The measurement of the module: the gain g; P moves on.
+    /// Performs the measurement of the module docs: returns the gain g, and updates P.
     #[inline]
     pub fn measurement_update(&mut self, psi: &[f64; N], variance: f64) -> [f64; N] {
         self.inflate_and_update(1.0, psi, variance)
     }
 
-    /// `P <- growth P`, then the measurement, in one pass.
+    /// Performs `P <- growth P`, then the measurement, in one pass.
     #[inline(always)]
     pub fn inflate_and_update(&mut self, growth: f64, psi: &[f64; N], variance: f64) -> [f64; N] {
         let (mut f, mut v, mut grown) = ([0.0; N], [0.0; N], [0.0; N]);
@@ -92,7 +89,7 @@ impl<const N: usize> UdCovariance<N> {
         self.update_projected_by(grown, f, v, variance)
     }
 
-    /// The measurement, of the projections and of D.
+    /// Performs the measurement, given the projections.
     #[inline(always)]
     fn update_projected_by(&mut self, grown: [f64; N], f: [f64; N], v: [f64; N], variance: f64) -> [f64; N] {
         // Bierman's recursion: alpha_j = R + sum_{i<=j} f_i v_i. All d_j are multiplied by positive ratios, so that P
@@ -118,21 +115,21 @@ impl<const N: usize> UdCovariance<N> {
         gain
     }
 
-    /// `psi' P psi`.
+    /// Returns `psi' P psi`.
     #[inline]
     pub fn quadratic_form(&self, psi: &[f64; N]) -> f64 {
         let (f, v) = self.projections(psi);
         f.iter().zip(&v).map(|(f, v)| f * v).sum()
     }
 
-    /// [`UdCovariance::measurement_update`] by what [`UdCovariance::projections`] gave for psi.
+    /// Performs [`UdCovariance::measurement_update`] with the result of [`UdCovariance::projections`] for psi.
     #[inline(always)]
     pub fn update_projected(&mut self, (f, v): ([f64; N], [f64; N]), variance: f64) -> [f64; N] {
         let grown = core::array::from_fn(|j| self.u[j][j]);
         self.update_projected_by(grown, f, v, variance)
     }
 
-    /// `f = U' psi` and `v = D f`: `psi' P psi = f' v`.
+    /// Returns `f = U' psi` and `v = D f`: `psi' P psi = f' v`.
     #[inline(always)]
     pub fn projections(&self, psi: &[f64; N]) -> ([f64; N], [f64; N]) {
         let (mut f, mut v) = ([0.0; N], [0.0; N]);
@@ -147,7 +144,7 @@ impl<const N: usize> UdCovariance<N> {
         (f, v)
     }
 
-    /// `P psi`.
+    /// Returns `P psi`.
     #[inline]
     pub fn times(&self, psi: &[f64; N]) -> [f64; N] {
         let (_, v) = self.projections(psi);
@@ -160,7 +157,7 @@ impl<const N: usize> UdCovariance<N> {
         product
     }
 
-    /// `P <- s^2 P`.
+    /// Performs `P <- s^2 P`.
     #[inline]
     pub fn scale_all(&mut self, squared: f64) {
         for j in 0..N {
@@ -168,7 +165,7 @@ impl<const N: usize> UdCovariance<N> {
         }
     }
 
-    /// `P <- S P S` with `S = diag(s)`; `inverse` holds `1/s_j`.
+    /// Performs `P <- S P S` with `S = diag(s)`; `inverse` contains `1/s_j`.
     #[inline]
     pub fn scale(&mut self, s: &[f64; N], inverse: &[f64; N]) {
         for j in 0..N {
@@ -179,7 +176,7 @@ impl<const N: usize> UdCovariance<N> {
         }
     }
 
-    /// `P <- P + c a a'`, c not negative.
+    /// Performs `P <- P + c a a'`, c not negative.
     #[inline]
     pub fn rank_one_update(&mut self, mut c: f64, mut a: [f64; N]) {
         for j in (0..N).rev() {
@@ -199,23 +196,23 @@ impl<const N: usize> UdCovariance<N> {
         }
     }
 
-    /// Element (i, j) of P.
+    /// Returns element (i, j) of P.
     pub fn element(&self, i: usize, j: usize) -> f64 {
         let of = |row: usize, column: usize| if row == column { 1.0 } else { self.u[column][row] };
         (i.max(j)..N).map(|k| of(i, k) * self.u[k][k] * of(j, k)).sum()
     }
 
-    /// Determinant of P.
+    /// Returns the determinant of P.
     pub fn determinant(&self) -> f64 {
         (0..N).map(|j| self.u[j][j]).product()
     }
 
-    /// P itself.
+    /// Returns P.
     pub fn matrix(&self) -> [[f64; N]; N] {
         core::array::from_fn(|i| core::array::from_fn(|j| self.element(i, j)))
     }
 
-    /// True when every number is finite and no variance negative.
+    /// True if every number is finite and no variance is negative.
     #[inline(always)]
     pub fn is_valid(&self) -> bool {
         let mut sum = 0.0;

@@ -1,4 +1,4 @@
-//! A rectangular window: the last W samples count, all the same.
+//! A rectangular window: the last W samples count equally.
 //!
 //! Each sample gives a linear equation for theta, `y = psi' theta + eps` with
 //! `y = eps(t) + psi(t)' theta(t-1)`; for ARX and FIR y is the output and psi the regressor,
@@ -6,21 +6,19 @@
 //! `theta = R^{-1} sum psi y`, `R = sum psi psi'`, which for ARX and FIR is exact and for the
 //! others the recursive prediction-error method with that memory.
 //!
-//! Sums from which the oldest term is subtracted would keep the rounding of all the past. Here the
-//! window is held as two sums: one grows from a boundary on; the other, a sum that grew until that
-//! boundary, loses its terms. When it has lost all of them the first takes its place. No rounding
-//! lives longer than two windows.
+//! If the oldest term were subtracted from the sums, rounding errors would accumulate for ever. Here the window is
+//! kept as two sums: one grows from a boundary on; the other, a sum that grew until that boundary, loses its terms.
+//! When it has lost all of them the first replaces it. No rounding error lasts longer than two windows.
 //!
-//! The covariance of theta over sigma^2 is `R^{-1}`. Where the window does not determine theta
-//! (fewer samples than parameters, no excitation), theta stays and there is no covariance. The
-//! caller owns the memory of `W (N + 1)` numbers.
+//! The covariance of theta over sigma^2 is `R^{-1}`. If the window does not determine theta (fewer samples than
+//! parameters, no excitation), theta stays constant and there is no covariance. The caller owns the memory of
+//! `W (N + 1)` numbers.
 
 use hoid_numerics::cholesky;
 
 use crate::adaptation::{Adaptation, ParameterStep};
 
-/// Smallest pivot of R, scaled to a unit diagonal, of a window that determines theta: some hundred
-/// units of rounding.
+/// Smallest pivot of R, scaled to a unit diagonal, of a window that determines theta: some hundred rounding units.
 const SMALLEST_PIVOT: f64 = 1e-13;
 /// Power of a parameter's gradient, relative to the largest so far, below which it is not excited.
 const NO_EXCITATION: f64 = 1e-20;
@@ -40,19 +38,19 @@ crate::state!([const N: usize] NormalEquations<N> { r, psi_y });
 #[derive(Debug, Clone, PartialEq)]
 pub struct Window<const N: usize, M> {
     memory: M,
-    /// Parameters in use, at most N.
+    /// Number of parameters in use, at most N.
     parameters: usize,
     /// W.
     length: usize,
-    /// Samples in the memory, and the place of the next.
+    /// Number of samples in the memory, and index of the next.
     filled: usize,
     next: usize,
-    /// Sums since the boundary, and those before it that are still in the window.
+    /// Sums since the boundary, and sums before it that are still in the window.
     growing: NormalEquations<N>,
     fading: NormalEquations<N>,
     /// Largest power of each parameter's gradient over a window so far.
     largest: [f64; N],
-    /// Samples whose window did not determine theta.
+    /// Number of samples whose window did not determine theta.
     undetermined: u64,
 }
 
@@ -90,13 +88,13 @@ impl<const N: usize> NormalEquations<N> {
 }
 
 impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Window<N, M> {
-    /// Length of the memory for a window of this many samples.
+    /// Returns the length of the memory for a window of this many samples.
     pub const fn memory_length(samples: usize) -> usize {
         samples * (N + 1)
     }
 
-    /// A window as long as the memory allows, for the first `parameters` of N. `None` when the
-    /// memory is shorter than one sample or there is no parameter.
+    /// Builds a window as long as the memory allows, for the first `parameters` of N. `None` if the memory is shorter
+    /// than one sample or there is no parameter.
     pub fn new(memory: M, parameters: usize) -> Option<Self> {
         let length = memory.as_ref().len() / (N + 1);
         (length > 0 && (1..=N).contains(&parameters)).then_some(Self {
@@ -112,12 +110,12 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Window<N, M> {
         })
     }
 
-    /// Samples whose window did not determine theta, so that it stayed.
+    /// Returns the number of samples whose window did not determine theta, so that it stayed constant.
     pub fn undetermined(&self) -> u64 {
         self.undetermined
     }
 
-    /// R in factors; `None` when it is singular.
+    /// R in factors; `None` if it is singular.
     fn cholesky(&self) -> Option<Cholesky<N>> {
         let p = self.parameters;
         let (mut l, mut scale) = ([[0.0; N]; N], [0.0; N]);

@@ -542,7 +542,7 @@ fn what_is_known_stands_at_the_beginning() {
         response(&basis(default_operator()), GAINS_OF_A_PERSON, 2.0),
     );
     assert!((value[0] - truth[0]).hypot(value[1] - truth[1]) < 1e-9);
-    // Next to one who starts with nothing, over ten seconds.
+    // Compared with a filter without an initial estimate, over ten seconds.
     let (mut person, mut other) = (Person::new(3), filter(1e9));
     let mut errors = [0.0; 2];
     for k in 0..500 {

@@ -236,7 +236,7 @@ fn a_forgetting_matrix_with_equal_entries_is_the_scalar_factor() {
 #[test]
 fn a_window_is_least_squares_over_its_samples() {
     const W: usize = 300;
-    // Large samples first: what they leave behind by rounding must be gone after two windows.
+    // Large samples first: their rounding errors must be gone after two windows.
     let mut data = box_jenkins(2000, 4, 0.02);
     for (x, u) in &mut data[..700] {
         *x *= 1e6;

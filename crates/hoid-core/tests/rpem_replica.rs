@@ -1,5 +1,5 @@
-//! The recursive prediction-error method against its plain twin in Python
-//! (`fixtures/recursive/make.py`), while theta moves: only there does the order of filters show.
+//! The recursive prediction-error method compared with its plain implementation in Python
+//! (`fixtures/recursive/make.py`), while theta moves: only then does the order of filters matter.
 
 #![allow(clippy::unwrap_used)]
 
@@ -116,8 +116,8 @@ fn a_cascade_is_another_recursion() {
     }
 }
 
-/// What the order of the two filters does while theta moves, by the page on recursive
-/// identification: with one pole and one zero the difference of the cascade and the direct form is
+/// Effect of the order of the two filters while theta moves, from the page on recursive identification: with one pole
+/// and one zero the difference of the cascade and the direct form is
 /// `Delta(t) = -f(t) Delta(t-1) + [f(t) d(t-1) - d(t) f(t-1)] z(t-2)`, `z = x/F`.
 #[test]
 fn the_order_of_two_filters_differs_by_the_moves_of_theta() {

@@ -1,5 +1,4 @@
-//! A processor without an operating system: entry, the file and the output by semihosting, and how much of
-//! the stack was used.
+//! A processor without an operating system: entry, file and output by semihosting, and the stack usage.
 #![allow(unsafe_code)]
 
 use cortex_m_rt::entry;
@@ -8,7 +7,7 @@ use semihosting::{fs::File, io::Read, println, process};
 use crate::run;
 
 unsafe extern "C" {
-    /// Ends of the stack, by the linker.
+    /// Ends of the stack, from the linker.
     static _stack_start: u32;
     static _stack_end: u32;
 }
@@ -42,12 +41,12 @@ fn work() -> Result<(), &'static str> {
     )
 }
 
-/// Bytes of the stack that were ever written to.
+/// Number of bytes of the stack that were ever written.
 fn used() -> usize {
     let (top, bottom) = (&raw const _stack_start, &raw const _stack_end);
     let words = (top as usize - bottom as usize) / size_of::<u32>();
-    // SAFETY: both are ends of one region of the board's memory, which holds `words` aligned words. They are read
-    // volatile, since the stack above is in use; what is in use is not read, as the first used word ends it.
+    // SAFETY: both are ends of one region of the board's memory, which contains `words` aligned words. The reads are
+    // volatile, since the stack above is in use; the part in use is not read, as the first used word ends the loop.
     let painted = (0..words)
         .take_while(|i| unsafe { bottom.add(*i).read_volatile() } == PAINT)
         .count();

@@ -1,5 +1,5 @@
-//! The tracker on a bare processor: samples of e and u in the file `run.csv`, and the estimate of each
-//! second on standard output.
+//! The tracker on a bare processor: reads samples of e and u from the file `run.csv`, and writes the estimate of each
+//! second to standard output.
 //!
 //! | file | holds |
 //! |---|---|

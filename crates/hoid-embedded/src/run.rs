@@ -12,31 +12,31 @@ use hoid_core::adaptive::{
 
 /// The file of the samples.
 pub const FILE: &CStr = c"run.csv";
-/// The report where it cannot be read.
+/// Message if it cannot be read.
 pub const UNREADABLE: &str = "run.csv cannot be read";
 /// Columns of the output.
 const HEADER: &str = "t,K_e,K_e_se,K_e_dot,K_e_dot_se,omega_nm,omega_nm_se,zeta_nm,zeta_nm_se,tau_e,tau_e_se";
-/// s.
+/// Sample time, s.
 const SAMPLE_TIME_S: f64 = 0.01;
-/// nk of the textbook's operator, whose delay the filter starts with.
+/// nk of the textbook's operator, the initial delay of the filter.
 const NK: f64 = 29.0;
-/// Samples from one line of output to the next.
+/// Number of samples per line of output.
 const EVERY: u32 = 100;
-/// Numbers of memory: more than `least_memory(SAMPLE_TIME_S)`, and too few for replays.
+/// Number of memory entries: more than `least_memory(SAMPLE_TIME_S)`, and too few for replays.
 const MEMORY: usize = 3 * 128;
-/// Longest line of input.
+/// Longest line of input, in bytes.
 const LONGEST: usize = 80;
 
-/// The recursion, with memory of its own.
+/// The recursion, with its own memory.
 type Filter = AdaptiveFilter<[f64; MEMORY]>;
 
-/// Bytes that the recursion takes.
+/// Size of the recursion in bytes.
 pub const STATE_BYTES: usize = size_of::<Filter>();
 
-/// Reads samples to their end and writes estimates.
+/// Reads all samples and writes the estimates.
 ///
 /// # Errors
-/// A sentence about input or output that failed.
+/// A sentence about a failure of input or output.
 pub fn run(
     read: impl FnMut(&mut [u8]) -> Result<usize, &'static str>,
     mut write: impl FnMut(Arguments<'_>) -> Result<(), &'static str>,
@@ -68,7 +68,7 @@ pub fn run(
     Ok(())
 }
 
-/// Lines of two numbers.
+/// Reader of lines of two numbers.
 struct Lines<R> {
     read: R,
     chunk: [u8; 256],
@@ -86,7 +86,7 @@ impl<R: FnMut(&mut [u8]) -> Result<usize, &'static str>> Lines<R> {
         }
     }
 
-    /// e and u of the next line; `None` at the end.
+    /// Returns e and u of the next line; `None` at the end.
     fn next(&mut self) -> Result<Option<(f64, f64)>, &'static str> {
         let (mut line, mut length) = ([0_u8; LONGEST], 0);
         loop {
@@ -128,7 +128,7 @@ mod tests {
     fn of(text: &str) -> Result<Vec<String>, &'static str> {
         let (mut rest, mut lines) = (text.as_bytes(), Vec::new());
         let read = |bytes: &mut [u8]| {
-            // In small parts, as they may come.
+            // In small parts, as they may arrive.
             let n = rest.len().min(bytes.len()).min(7);
             bytes[..n].copy_from_slice(&rest[..n]);
             rest = &rest[n..];

@@ -1,22 +1,21 @@
 //! Four numbers in one register or two.
 //!
-//! A sum over a record is a recursion: each term waits for the sum of those before it. Four partial
-//! sums, each of every fourth term, do not wait for one another. They are four whatever the
-//! registers, since their number decides the last digits of the sum: with AVX2 they fill one
-//! register, elsewhere two. Products and sums are those of each number by itself, without
-//! contraction: the same bits in all registers.
+//! A sum over a record is a recursion: each term has to wait for the sum of those before it. Four partial sums, each
+//! of every fourth term, are independent of each other. Their number is four for all registers, since it determines
+//! the last digits of the sum: with AVX2 they fill one register, elsewhere two. Products and sums are those of each
+//! number by itself, without contraction: the same bits in all registers.
 
 use std::ops::{Add, Mul, Sub};
 
 use crate::instruction_set::InstructionSet;
 
-/// Four numbers, with the operations of each by itself.
+/// Four numbers with lane-wise operations.
 pub trait FourLanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
-    /// The same number four times.
+    /// Returns the same number in all four lanes.
     fn splat(self, value: f64) -> Self;
-    /// These numbers.
+    /// Returns these numbers.
     fn load(self, values: &[f64; 4]) -> Self;
-    /// The four numbers as an array.
+    /// Returns the four numbers as an array.
     fn to_array(self) -> [f64; 4];
 }
 
@@ -24,13 +23,13 @@ pub trait FourLanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output
 pub trait FourLaneTask {
     /// Its result.
     type Output;
-    /// The computation, with numbers of the type of `zero`.
+    /// Runs the computation, with numbers of the type of `zero`.
     ///
-    /// Mark it `#[inline(always)]`, and all that it calls at every sample.
+    /// Mark it `#[inline(always)]`, and all functions that it calls at every sample.
     fn run<F: FourLanes>(self, zero: F) -> Self::Output;
 }
 
-/// The registers that every processor has for which this was compiled.
+/// The registers of every processor of the compilation target.
 impl FourLanes for wide::f64x4 {
     #[inline(always)]
     fn splat(self, value: f64) -> Self {
@@ -112,7 +111,7 @@ mod avx2 {
     }
 }
 
-/// The result of a task in registers of AVX2, or the task itself where this processor has none.
+/// Runs a task in registers of AVX2, or returns the task if this processor has none.
 fn in_avx2<T: FourLaneTask>(task: T) -> Result<T::Output, T> {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     if let Some(simd) = pulp::x86::V3::try_new() {
@@ -121,17 +120,16 @@ fn in_avx2<T: FourLaneTask>(task: T) -> Result<T::Output, T> {
     Err(task)
 }
 
-/// Runs a task on four numbers at a time, in the best registers that this processor has.
+/// Runs a task on four numbers at a time, in the widest suitable registers of this processor.
 pub fn with_four_lanes<T: FourLaneTask>(task: T) -> T::Output {
     in_avx2(task).unwrap_or_else(|task| task.run(wide::f64x4::ZERO))
 }
 
 impl InstructionSet {
-    /// As [`with_four_lanes`] in these registers; `None` when this processor does not have them.
+    /// Runs a task as [`with_four_lanes`] in these registers; `None` if this processor does not have them.
     ///
-    /// Four numbers fill half of a register of AVX-512, so that [`InstructionSet::Avx512`]
-    /// represents AVX2 here. [`InstructionSet::Scalar`] gives the registers of a processor without
-    /// either.
+    /// Four numbers fill half of a register of AVX-512, so that [`InstructionSet::Avx512`] selects AVX2 here.
+    /// [`InstructionSet::Scalar`] selects the registers of a processor without either.
     pub fn with_four_lanes<T: FourLaneTask>(self, task: T) -> Option<T::Output> {
         match self {
             Self::Best => Some(with_four_lanes(task)),

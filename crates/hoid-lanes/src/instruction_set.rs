@@ -1,20 +1,20 @@
-//! The choice of the vector registers, and tasks that run in them.
+//! Choice of the vector registers, and tasks that run in them.
 
 use pulp::{NullaryFnOnce, Scalar, Simd, WithSimd};
 
 use crate::{number::Number, registers::TwoRegisters};
 
-/// The vector registers that are used. All give the same bits.
+/// The vector registers in use. All give the same bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum InstructionSet {
-    /// The widest registers that this processor has.
+    /// The widest registers of this processor.
     #[default]
     Best,
-    /// One number a register, on any processor.
+    /// One number per register, on any processor.
     Scalar,
-    /// Four numbers a register, on processors with AVX2.
+    /// Four numbers per register, on processors with AVX2.
     Avx2,
-    /// Eight numbers a register, on processors with AVX-512.
+    /// Eight numbers per register, on processors with AVX-512.
     Avx512,
 }
 
@@ -22,10 +22,10 @@ pub enum InstructionSet {
 pub trait LaneTask {
     /// Its result.
     type Output;
-    /// The computation, with numbers of the type of `zero`.
+    /// Runs the computation, with numbers of the type of `zero`.
     ///
-    /// Mark it `#[inline(always)]`, and all that it calls at every sample: a function of its own is
-    /// compiled for the narrowest registers.
+    /// Mark it `#[inline(always)]`, and all functions that it calls at every sample: a separate function is compiled
+    /// for the narrowest registers.
     fn run<R: Number>(self, zero: R) -> Self::Output;
 }
 
@@ -71,11 +71,10 @@ impl<T: LaneTask> NullaryFnOnce for OneLane<T> {
     }
 }
 
-/// Runs a task for one run, with numbers that are f64.
+/// Runs a task for one run, with f64 numbers.
 ///
-/// It is compiled with the instructions of AVX2 where this processor has them. They name three
-/// registers, so that an operand need not be copied before it is overwritten. Products and sums are
-/// not contracted: the same bits.
+/// It is compiled with the instructions of AVX2 if this processor has them. They name three registers, so that an
+/// operand need not be copied before it is overwritten. Products and sums are not contracted: the bits are the same.
 pub fn with_one_lane<T: LaneTask>(task: T) -> T::Output {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     if let Some(simd) = pulp::x86::V3::try_new() {
@@ -85,18 +84,18 @@ pub fn with_one_lane<T: LaneTask>(task: T) -> T::Output {
 }
 
 impl InstructionSet {
-    /// All that this processor has, [`InstructionSet::Best`] among them.
+    /// Returns all instruction sets of this processor, including [`InstructionSet::Best`].
     pub fn available() -> Vec<Self> {
         let all = [Self::Best, Self::Scalar, Self::Avx2, Self::Avx512];
         all.into_iter().filter(|set| set.lanes().is_some()).collect()
     }
 
-    /// Number of runs at a time; `None` when this processor has no such registers.
+    /// Returns the number of runs at a time; `None` if this processor does not have these registers.
     pub fn lanes(self) -> Option<usize> {
         self.with_lanes(CountLanes)
     }
 
-    /// Runs a task with a run in each lane; `None` when this processor has no such registers.
+    /// Runs a task with one run per lane; `None` if this processor does not have these registers.
     pub fn with_lanes<T: LaneTask>(self, task: T) -> Option<T::Output> {
         match self {
             Self::Best => Some(pulp::Arch::new().dispatch(Dispatched(task))),

@@ -1,20 +1,19 @@
-//! Runs of a recursion in the lanes of vector registers, with the bits of each run alone.
+//! Runs of a recursion in the lanes of vector registers, with the same bits as each run alone.
 //!
-//! A recursion `y(t) = x(t) - f y(t-1)` waits at each sample for its own last result, so that one run leaves most of a
-//! processor idle, and no vector instruction can shorten it: sample t + 1 cannot start before sample t has ended.
-//! Several runs can go at a time, one in each lane of a register:
+//! A recursion `y(t) = x(t) - f y(t-1)` has to wait at each sample for its last result, so that one run leaves most of
+//! a processor idle, and no vector instruction can shorten it: sample t + 1 cannot start before sample t has ended.
+//! Several runs can be computed at the same time, one in each lane of a register:
 //!
 //! `[y_1(t) .. y_L(t)] = [x_1(t) .. x_L(t)] - [f_1 .. f_L] [y_1(t-1) .. y_L(t-1)]`, lane by lane.
 //!
-//! The same holds for a sum over a record, `s(t) = s(t-1) + a(t) b(t)`: four partial sums, each of
-//! every fourth term, do not wait for one another.
+//! The same holds for a sum over a record, `s(t) = s(t-1) + a(t) b(t)`: four partial sums, each of every fourth term,
+//! are independent of each other.
 //!
-//! The registers are chosen when the program runs (AVX-512, AVX2, else scalar ones; Neon on ARM).
-//! The operations on each lane are those of the run alone, in their order and without contraction
-//! (no fused multiply-add). So the result depends neither on the registers nor on what runs in the
-//! other lanes, to the last bit.
+//! The registers are chosen at run time (AVX-512, AVX2, else scalar ones; Neon on ARM). The operations on each lane
+//! are those of the run alone, in their order and without contraction (no fused multiply-add). The result is therefore
+//! independent of the registers and of the other lanes, to the last bit.
 //!
-//! A task is written once, over a [`Number`], and run in the registers of an [`InstructionSet`]:
+//! A task is written once, for a [`Number`], and runs in the registers of an [`InstructionSet`]:
 //!
 //! ```
 //! use hoid_lanes::{InstructionSet, LaneTask, Number};

@@ -1,7 +1,7 @@
 //! A number in each lane of two registers.
 //!
-//! Two, because the result of an operation takes several cycles while the next operation can start
-//! in each: two independent registers fill the latency of a recursion.
+//! Two, because the result of an operation takes several cycles while the next operation can start in each cycle: two
+//! independent registers hide the latency of a recursion.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -9,7 +9,7 @@ use pulp::Simd;
 
 use crate::number::Number;
 
-/// A number of each of [`TwoRegisters::LANES`] runs.
+/// A number for each of [`TwoRegisters::LANES`] runs.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TwoRegisters<S: Simd> {
     simd: S,
@@ -20,7 +20,7 @@ impl<S: Simd> TwoRegisters<S> {
     /// Number of lanes.
     const LANES: usize = 2 * S::F64_LANES;
 
-    /// The same number in all lanes.
+    /// Returns the same number in all lanes.
     #[inline(always)]
     pub(crate) fn splat(simd: S, value: f64) -> Self {
         Self {

@@ -1,11 +1,10 @@
-//! Every lane has the bits of its run alone, in all registers that this processor has.
+//! Every lane has the same bits as its run alone, in all registers of this processor.
 
 #![allow(clippy::unwrap_used)]
 
 use hoid_lanes::{FourLaneTask, FourLanes, InstructionSet, LaneTask, Number, with_four_lanes, with_one_lane};
 
-/// A sum, a difference and a product of each four; products that a contraction would round
-/// otherwise.
+/// A sum, a difference and a product of each four; contraction would change the rounding of the products.
 struct Horner<'a>(&'a [[f64; 4]]);
 
 impl FourLaneTask for Horner<'_> {
@@ -40,9 +39,8 @@ fn each_number_goes_alone_and_without_contraction() {
     }
 }
 
-/// A recursion of second order with a gain that is divided by what it has measured: all operations
-/// of a number, with products that a contraction would round otherwise. `x` holds a sample of all
-/// lanes, then the next.
+/// A recursion of second order with a gain that is divided by its input power: all operations of a number, with
+/// products whose rounding contraction would change. `x` contains a sample of all lanes, then the next.
 struct Recursion<'a>(&'a [f64]);
 
 impl LaneTask for Recursion<'_> {

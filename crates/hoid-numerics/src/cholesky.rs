@@ -2,17 +2,17 @@
 //! E. Benoit, *Bulletin géodésique* 2 (1924) 67-77; G. H. Golub and C. F. Van Loan, *Matrix
 //! Computations*, 2013, section 4.2).
 //!
-//! Matrices are N by N, of which the first n rows and columns count. [`solve`] takes each known part away as it comes.
-//! [`forward`] and [`backward`] add up what is known and take it away at once: both together are [`solve`] except for
+//! Matrices are N by N, of which the first n rows and columns are used. [`solve`] subtracts each known term as soon as
+//! it is known.
+//! [`forward`] and [`backward`] sum the known terms and subtract the sum: both together equal [`solve`] except for
 //! rounding.
 
-/// L in the place of the lower triangle of A; false if A is not positive definite.
+/// Replaces the lower triangle of A by L; false if A is not positive definite.
 pub fn factor<const N: usize>(a: &mut [[f64; N]; N], n: usize) -> bool {
     factor_above(a, n, 0.0)
 }
 
-/// L in the place of the lower triangle of A; false if the square of a number on its diagonal is
-/// not above the least.
+/// Replaces the lower triangle of A by L; false if the square of a number on its diagonal is not above `least`.
 pub fn factor_above<const N: usize>(a: &mut [[f64; N]; N], n: usize, least: f64) -> bool {
     for i in 0..n {
         for j in 0..=i {
@@ -32,7 +32,7 @@ pub fn factor_above<const N: usize>(a: &mut [[f64; N]; N], n: usize, least: f64)
     true
 }
 
-/// The solution of `A x = b` in the place of b, with L of [`factor`].
+/// Replaces b by the solution of `A x = b`, with L of [`factor`].
 pub fn solve<const N: usize>(l: &[[f64; N]; N], n: usize, b: &mut [f64; N]) {
     for i in 0..n {
         let mut sum = b[i];
@@ -50,7 +50,7 @@ pub fn solve<const N: usize>(l: &[[f64; N]; N], n: usize, b: &mut [f64; N]) {
     }
 }
 
-/// `scale A^-1`, with L of [`factor`]; zeros beyond the first n rows and columns.
+/// Returns `scale A^-1`, with L of [`factor`]; zeros beyond the first n rows and columns.
 pub fn scaled_inverse<const N: usize>(l: &[[f64; N]; N], n: usize, scale: f64) -> [[f64; N]; N] {
     let mut inverse = [[0.0; N]; N];
     for (i, row) in inverse.iter_mut().enumerate().take(n) {
@@ -60,7 +60,7 @@ pub fn scaled_inverse<const N: usize>(l: &[[f64; N]; N], n: usize, scale: f64) -
     inverse
 }
 
-/// `L^-1 b` in the place of b.
+/// Replaces b by `L^-1 b`.
 pub fn forward<const N: usize>(l: &[[f64; N]; N], n: usize, b: &mut [f64; N]) {
     for i in 0..n {
         let known: f64 = (0..i).map(|k| l[i][k] * b[k]).sum();
@@ -68,7 +68,7 @@ pub fn forward<const N: usize>(l: &[[f64; N]; N], n: usize, b: &mut [f64; N]) {
     }
 }
 
-/// `L'^-1 b` in the place of b.
+/// Replaces b by `L'^-1 b`.
 pub fn backward<const N: usize>(l: &[[f64; N]; N], n: usize, b: &mut [f64; N]) {
     for i in (0..n).rev() {
         let known: f64 = (i + 1..n).map(|k| l[k][i] * b[k]).sum();

@@ -1,19 +1,19 @@
-//! Solution of systems in place, by elimination without roots.
+//! Solution of linear systems in place, by elimination without roots.
 //!
-//! **Positive definite**, one right side ([`solve`]). With rows `u_k` and pivots `p_k = u_kk`,
-//! `A = sum_k u_k' u_k/p_k` (C. F. Gauss, *Disquisitio de elementis ellipticis Palladis*, 1810): the right
-//! side is taken along, and from the last unknown back each is taken out of all before it as soon as it is
-//! known, so that nothing waits for a whole sum. Where the factor itself is needed, [`crate::cholesky`] has
-//! it.
+//! **Positive definite**, one right-hand side ([`solve`]). With rows `u_k` and pivots `p_k = u_kk`,
+//! `A = sum_k u_k' u_k/p_k` (C. F. Gauss, *Disquisitio de elementis ellipticis Palladis*, 1810): the right-hand side
+//! is eliminated together with A. In the back substitution each unknown is subtracted from all equations before it as
+//! soon as it is known, so that no step waits for a whole sum. If the factor itself is needed, use
+//! [`crate::cholesky`].
 //!
-//! **Any matrix**, many right sides ([`solve_any`]): with row pivots (G. H. Golub and C. F. Van Loan, *Matrix
+//! **Any matrix**, several right-hand sides ([`solve_any`]): with row pivots (G. H. Golub and C. F. Van Loan, *Matrix
 //! Computations*, 2013, section 3.4).
 
-/// Columns that are made at a time.
+/// Number of columns that are computed at a time.
 const WIDE: usize = 4;
 
-/// The solution in the place of b, of the first n of N unknowns; false if A is not positive definite. Only the upper
-/// triangle of A is read; what is left in it is not a result. N is a multiple of four.
+/// Replaces b by the solution, for the first n of N unknowns; false if A is not positive definite. Only the upper
+/// triangle of A is read, and it is overwritten. N is a multiple of four.
 #[inline(always)]
 pub fn solve<const N: usize>(a: &mut [[f64; N]; N], n: usize, b: &mut [f64; N]) -> bool {
     const { assert!(N.is_multiple_of(WIDE)) };
@@ -53,7 +53,7 @@ pub fn solve<const N: usize>(a: &mut [[f64; N]; N], n: usize, b: &mut [f64; N]) 
     true
 }
 
-/// The solution X of `A X = B` in the place of B, and `ln |det A|`. What has none gives numbers that are not
+/// Replaces B by the solution X of `A X = B`, and returns `ln |det A|`. For a singular matrix the numbers are not
 /// finite.
 pub fn solve_any<const N: usize>(a: &mut [[f64; N]; N], b: &mut [[f64; N]; N]) -> f64 {
     let mut log_determinant = 0.0;
@@ -99,7 +99,7 @@ mod tests {
 
     #[test]
     fn it_is_the_solution_by_cholesky() {
-        // A Hilbert matrix and a ridge, of any size up to N.
+        // A Hilbert matrix plus a ridge, of any size up to N.
         for n in 1..=8 {
             let mut a: [[f64; 8]; 8] = std::array::from_fn(|i| std::array::from_fn(|j| 1.0 / (i + j + 1) as f64));
             (0..8).for_each(|i| a[i][i] += 0.1);

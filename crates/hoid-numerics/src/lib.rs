@@ -1,4 +1,4 @@
-//! Small numerics that the crates of hoid share, each written once.
+//! Small numerical routines that the crates of hoid share, each written once.
 //!
 //! | module | contents |
 //! |---|---|
@@ -7,13 +7,12 @@
 //! | [`cholesky`] | small positive definite systems by their factor, and its triangular systems |
 //! | [`elimination`] | small systems without a factor, positive definite or any |
 //!
-//! The order of operations of each function is part of what it promises: sums run from the first to
-//! the last, nothing is contracted, and roots are those of `libm`, so that results are the same to
-//! the last bit on every machine. Two functions that differ in nothing but rounding report it.
+//! The order of operations of each function is part of its specification: sums run from the first to the last term,
+//! nothing is contracted, and roots are those of `libm`, so that results are the same to the last bit on every
+//! machine. The docs of two functions that differ only in rounding state it.
 //!
-//! `no_std`, without allocation; the feature `alloc` adds the statistics that put values in order
-//! first. Matrices whose size is known at run time only are those of nalgebra, and sums over records
-//! those of `hoid-lanes`.
+//! `no_std`, without allocation; the feature `alloc` adds the statistics that sort their values. Matrices whose size
+//! is known only at run time are those of nalgebra, and sums over records those of `hoid-lanes`.
 //!
 //! ```
 //! use hoid_numerics::{cholesky, statistics};

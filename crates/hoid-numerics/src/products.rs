@@ -1,9 +1,9 @@
 //! Products of vectors.
 
-/// `sum_i a_i b_i` over the shorter of the two, from the first to the last; zero of none.
+/// Returns `sum_i a_i b_i` over the length of the shorter one, from the first to the last; zero for empty slices.
 #[inline(always)]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // Not from zero: every addition is one more that a recursion waits for.
+    // Does not start from zero: every addition adds to the latency of a recursion.
     let mut pairs = a.iter().zip(b);
     let Some((a, b)) = pairs.next() else {
         return 0.0;

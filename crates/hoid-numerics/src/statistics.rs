@@ -1,4 +1,4 @@
-//! Statistics of some values.
+//! Statistics of values.
 //!
 //! **Quantiles** are those of R. J. Hyndman and Y. Fan, *The American Statistician* 50 (1996) 361-365.
 //! With the order statistics `x_0 <= .. <= x_(n-1)` and a share p:
@@ -9,59 +9,59 @@
 //! | [`nearest_quantile`] | `x_k`, k the whole number nearest to `(n-1) p` | type 7 without interpolation |
 //! | [`upper_quantile`] | `x_k`, k the largest whole number not above `n p` | right-continuous inverse of the distribution of the values, type 1 but where `n p` is whole |
 //!
-//! The first is what tables and figures report. The others give one of the values and need no order of all of them:
-//! scales of many samples, and thresholds whose results depend on that definition. Their medians are the same, the
-//! upper one of the two in the middle.
+//! The first is used in tables and figures. The others return one of the values and do not need a full sort: they are
+//! used for scales of many samples, and for thresholds whose results depend on that definition. Their medians are the
+//! same, the upper one of the two in the middle.
 //!
-//! Order is that of [`f64::total_cmp`].
+//! Values are ordered by [`f64::total_cmp`].
 
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
 
-/// Mean; no number of none.
+/// Returns the mean; NaN for no values.
 #[inline]
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Sum of the squared distances from the mean.
+/// Returns the sum of the squared deviations from the mean.
 #[inline]
 pub fn squared_deviations(values: &[f64]) -> f64 {
     let mean = mean(values);
     values.iter().map(|v| (v - mean) * (v - mean)).sum()
 }
 
-/// Variance around the mean with the divisor n; no number of none.
+/// Returns the variance about the mean with the divisor n; NaN for no values.
 #[inline]
 pub fn variance(values: &[f64]) -> f64 {
     squared_deviations(values) / values.len() as f64
 }
 
-/// Variance around the mean with the divisor n - 1, without bias; no number of fewer than two values.
+/// Returns the unbiased variance about the mean with the divisor n - 1; NaN for fewer than two values.
 #[inline]
 pub fn sample_variance(values: &[f64]) -> f64 {
     squared_deviations(values) / (values.len() as f64 - 1.0)
 }
 
-/// Root of the variance around the mean with the divisor n; zero of none, unlike [`variance`].
+/// Returns the root of the variance about the mean with the divisor n; zero for no values, unlike [`variance`].
 #[inline]
 pub fn standard_deviation(values: &[f64]) -> f64 {
     libm::sqrt(squared_deviations(values) / values.len().max(1) as f64)
 }
 
-/// Mean of the squares; no number of none.
+/// Returns the mean of the squares; NaN for no values.
 #[inline]
 pub fn mean_square(values: &[f64]) -> f64 {
     values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64
 }
 
-/// Root of the mean of the squares; no number of none.
+/// Returns the root mean square; NaN for no values.
 #[inline]
 pub fn root_mean_square(values: &[f64]) -> f64 {
     libm::sqrt(mean_square(values))
 }
 
-/// The value below which this share of sorted values lies, by linear interpolation; `None` of none.
+/// Returns the value below which this share of sorted values lies, by linear interpolation; `None` for no values.
 pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     let at = share.clamp(0.0, 1.0) * last as f64;
@@ -70,31 +70,31 @@ pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     Some(low + (at - below as f64) * (high - low))
 }
 
-/// The value nearest to the place of a quantile, of two the upper; the values are put in another
-/// order. `None` of none.
+/// Returns the value nearest to the position of a quantile, the upper one of two; reorders the values. `None` for no
+/// values.
 pub fn nearest_quantile(values: &mut [f64], share: f64) -> Option<f64> {
     let last = values.len().checked_sub(1)?;
     order_statistic(values, libm::round(last as f64 * share) as usize)
 }
 
-/// The smallest value with more than this share of the values at or below it, at most the largest;
-/// the values are put in another order. `None` of none.
+/// Returns the smallest value with more than this share of the values at or below it, at most the largest; reorders
+/// the values. `None` for no values.
 pub fn upper_quantile(values: &mut [f64], share: f64) -> Option<f64> {
     order_statistic(values, (share * values.len() as f64) as usize)
 }
 
-/// The median, of two in the middle the upper; the values are put in another order. `None` of none.
+/// Returns the median, the upper one of two in the middle; reorders the values. `None` for no values.
 pub fn upper_median(values: &mut [f64]) -> Option<f64> {
     order_statistic(values, values.len() / 2)
 }
 
-/// The value at this place in ascending order, at most the largest.
+/// Returns the value at this index in ascending order, at most the largest.
 fn order_statistic(values: &mut [f64], place: usize) -> Option<f64> {
     let last = values.len().checked_sub(1)?;
     Some(*values.select_nth_unstable_by(place.min(last), f64::total_cmp).1)
 }
 
-/// The finite values in ascending order.
+/// Returns the finite values in ascending order.
 #[cfg(feature = "alloc")]
 pub fn finite_sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     let mut finite: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
@@ -102,8 +102,8 @@ pub fn finite_sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     finite
 }
 
-/// The value below which this share of the finite values lies, by linear interpolation; `None` if
-/// none is finite.
+/// Returns the value below which this share of the finite values lies, by linear interpolation; `None` if none is
+/// finite.
 #[cfg(feature = "alloc")]
 pub fn quantile_of(values: &[f64], share: f64) -> Option<f64> {
     quantile(&finite_sorted(values.iter().copied()), share)

@@ -1,18 +1,16 @@
-//! Exact zero-order hold of the cascade `1/(T_n s + 1)^m` driven by noise that is held over each
-//! sample.
+//! Exact zero-order hold of the cascade `1/(T_n s + 1)^m` driven by noise that is held over each sample.
 //!
 //! The states are the outputs of the m first-order sections, `T_n z_1' = eps - z_1`,
 //! `T_n z_i' = z_{i-1} - z_i`. With `h = Ts/T_n` the transition matrix is lower triangular Toeplitz
 //! with `e^-h h^k/k!` on diagonal k, and the input enters section k (from 0) with
-//! `1 - e^-h sum_{j<=k} h^j/j!`, summed from its tail `e^-h sum_{j>k} h^j/j!` so that nothing
-//! cancels.
+//! `1 - e^-h sum_{j<=k} h^j/j!`, computed from its tail `e^-h sum_{j>k} h^j/j!` to avoid cancellation.
 
 use hoid_lanes::Number;
 
 /// Highest order of the remnant filter.
 pub(crate) const MOST: usize = hoid_model::remnant::HIGHEST_ORDER;
 
-/// Coefficients of one sample.
+/// Coefficients for one sample.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Cascade {
     order: usize,
@@ -21,7 +19,7 @@ pub(crate) struct Cascade {
 }
 
 impl Cascade {
-    /// For `h = Ts/T_n > 0` and an order of 1 to [`MOST`].
+    /// Builds the cascade for `h = Ts/T_n > 0` and an order of 1 to [`MOST`].
     pub fn new(order: usize, h: f64) -> Self {
         let decay = (-h).exp();
         let mut transition = [0.0; MOST];
@@ -43,12 +41,12 @@ impl Cascade {
         }
     }
 
-    /// Number of sections.
+    /// Returns the number of sections.
     pub fn order(&self) -> usize {
         self.order
     }
 
-    /// One sample on, driven by `eps`: the outputs of M sections.
+    /// Advances the outputs of M sections by one sample, driven by `eps`.
     #[inline(always)]
     pub fn step<R: Number, const M: usize>(&self, z: [R; M], eps: R) -> [R; M] {
         let mut next = z;
@@ -101,7 +99,7 @@ mod tests {
                         theirs -= a * y[t - i];
                     }
                     y.push(theirs);
-                    // The recursion of order 4 amplifies rounding where its poles are nearly 1.
+                    // The recursion of order 4 amplifies rounding errors if its poles are nearly 1.
                     assert!(
                         (ours - theirs).abs() < 1e-10,
                         "m = {order}, h = {}, t = {t}: {ours} {theirs}",

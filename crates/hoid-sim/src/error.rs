@@ -1,4 +1,4 @@
-//! Why a simulation gives no record.
+//! Reasons why a simulation gives no record.
 
 use hoid_model::ModelError;
 use thiserror::Error;
@@ -7,10 +7,10 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SimError {
-    /// The scenario is wrong by itself.
+    /// The scenario is invalid.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The closed loop is unstable and has left the range of numbers.
+    /// The closed loop is unstable and has overflowed.
     #[error(
         "the loop diverges: {signal} is not finite at t = {time_s:.2} s; check gains, delay and controlled element of {scenario}"
     )]
@@ -22,7 +22,7 @@ pub enum SimError {
         /// Name of the scenario.
         scenario: String,
     },
-    /// An operator whose control hangs on the error of the same sample.
+    /// An operator whose control depends on the error of the same sample.
     #[error(
         "the operator of {scenario} answers an error within its sample: its delay is {tau_e_s} s, it has no neuromuscular part and \
          its response is not strictly proper; expected a delay of at least half a sample ({half_a_sample_s} s): make tau_e longer \
@@ -45,15 +45,15 @@ pub enum SimError {
         form: String,
         /// Controlled element.
         plant: String,
-        /// Draws that were made.
+        /// Number of draws.
         draws: usize,
     },
-    /// Noise of another length than the run.
+    /// Noise whose length differs from that of the run.
     #[error("the noise has {found} samples, the run needs {expected} (run-in and measurement)")]
     NoiseLength {
-        /// Samples given.
+        /// Number of samples given.
         found: usize,
-        /// Samples needed.
+        /// Number of samples needed.
         expected: usize,
     },
     /// An instruction set that this processor does not have.

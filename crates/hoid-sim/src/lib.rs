@@ -1,9 +1,8 @@
 //! The closed loop of operator, remnant and controlled element, simulated sample by sample.
 //!
-//! Operator, remnant filter and controlled element are each held exactly over a sample (zero-order
-//! hold), so that the simulated record has the model that an estimator looks for and no error of
-//! integration. The random numbers of a run are named by seed, cell and replication, never by a
-//! thread: any run can be repeated alone.
+//! Operator, remnant filter and controlled element are each held exactly over a sample (zero-order hold), so that the
+//! simulated record follows the model of an estimator without integration errors. The random numbers of a run are
+//! identified by seed, cell and replication, not by a thread: any run can be repeated alone.
 //!
 //! ```
 //! use hoid_model::scenario::{Condition, Scenario};

@@ -1,11 +1,10 @@
 //! Standard normal deviates from a generator of random bits.
 //!
-//! Normal deviates are those of `rand_distr`, by the ziggurat: the surface below the density is cut
-//! into 256 layers of one area; a random layer i and a random place in it give a deviate at once
-//! where it lies below the edge of the next layer, 99 times in a hundred (G. Marsaglia and W. W.
-//! Tsang, *J. Statistical Software* 5 (2000) 8; J. A. Doornik, *An Improved Ziggurat Method to
-//! Generate Normal Random Samples*, 2005). These are made here, many in a row, and the others by
-//! the crate, from the same numbers: the same deviates in less time.
+//! Normal deviates are those of `rand_distr`, by the ziggurat: the area below the density is divided into 256 layers
+//! of equal area; a random layer i and a random position in it give a deviate directly if it lies below the edge of
+//! the next layer, 99 times in a hundred (G. Marsaglia and W. W. Tsang, *J. Statistical Software* 5 (2000) 8; J. A.
+//! Doornik, *An Improved Ziggurat Method to Generate Normal Random Samples*, 2005). These are computed here, many in a
+//! row, and the others by the crate, from the same numbers: the same deviates in less time.
 
 use std::{convert::Infallible, sync::OnceLock};
 
@@ -15,7 +14,7 @@ use rand_chacha::{
 };
 use rand_distr::{Distribution, StandardNormal};
 
-/// Standard normal deviates, each from the numbers that [`StandardNormal`] would take for it.
+/// Writes standard normal deviates, each from the numbers that [`StandardNormal`] would use for it.
 pub(crate) fn normal_deviates(generator: ChaCha8Rng, deviates: &mut [f64]) {
     let generator = &mut Buffered::new(generator);
     let edges = EDGES.get_or_init(edges);
@@ -42,18 +41,18 @@ pub(crate) fn normal_deviates(generator: ChaCha8Rng, deviates: &mut [f64]) {
 static EDGES: OnceLock<[f64; LAYERS + 1]> = OnceLock::new();
 const LAYERS: usize = 256;
 
-/// The deviate of a random number where it is decided at once: layer and place are its lowest and
-/// highest bits.
+/// Returns the deviate of a random number if it is accepted directly: layer and position are its lowest and highest
+/// bits.
 #[inline(always)]
 fn quick(edges: &[f64; LAYERS + 1], bits: u64) -> Option<f64> {
     let layer = bits as usize % LAYERS;
-    // From [2, 4).
+    // In the range [2, 4).
     let place = f64::from_bits(1024 << 52 | bits >> 12) - 3.0;
     let deviate = place * edges[layer];
     (deviate.abs() < edges[layer + 1]).then_some(deviate)
 }
 
-/// The edges that the crate has: the middle of each layer, which it accepts, twice.
+/// Returns the edges of the crate: the middle of each layer, which it accepts, times two.
 fn edges() -> [f64; LAYERS + 1] {
     let mut edges = [0.0; LAYERS + 1];
     for (layer, edge) in (0..).zip(&mut edges[..LAYERS]) {
@@ -63,7 +62,7 @@ fn edges() -> [f64; LAYERS + 1] {
     edges
 }
 
-/// Gives the number that represents the middle of a layer, and then the largest.
+/// Returns the number for the middle of a layer, and then the largest number.
 struct Middle(u64);
 
 impl TryRng for Middle {
@@ -83,7 +82,7 @@ impl TryRng for Middle {
     }
 }
 
-/// Bytes that are drawn at a time.
+/// Number of bytes that are drawn at a time.
 const DRAWN: usize = 2048;
 
 /// The numbers of a generator, drawn many at a time: the same numbers in half the time.
@@ -102,13 +101,13 @@ impl Buffered {
         }
     }
 
-    /// The remainder of what was drawn, in numbers.
+    /// Returns the unused part of the drawn numbers.
     #[inline(always)]
     fn drawn(&self) -> &[[u8; 8]] {
         self.bytes[self.at..].as_chunks().0
     }
 
-    /// Leaves out so many numbers.
+    /// Skips a number of values.
     #[inline(always)]
     fn pass(&mut self, numbers: usize) {
         self.at += 8 * numbers;
@@ -186,7 +185,7 @@ mod tests {
     fn deviates_are_those_of_the_library() {
         let edges = edges();
         assert!(edges.windows(2).all(|pair| pair[0] > pair[1]), "{edges:?}");
-        // Many thousand of them are not decided at once, some hundred in the tail.
+        // Many thousand of them are not accepted directly, some hundred are in the tail.
         let mut found = vec![0.0; 1_000_003];
         normal_deviates(ChaCha8Rng::from_seed([3; 32]), &mut found);
         let mut alone = ChaCha8Rng::from_seed([3; 32]);

@@ -1,22 +1,21 @@
-//! The operator of a scenario alone, a sample at a time: for a loop that is closed elsewhere.
+//! The operator of a scenario alone, sample by sample: for a loop that is closed elsewhere.
 //!
-//! Simulates, as [`Simulator`] does in a loop, `u = y(k - tau_e/Ts) + n`, with the same random
-//! numbers: a loop that answers u as its controlled element does gives the same run to the last
-//! bit. The control of a sample does not hang on the error of the same sample, for the operator's
-//! response holds e over a sample first.
+//! Simulates, as [`Simulator`] does in a loop, `u = y(k - tau_e/Ts) + n`, with the same random numbers: a loop that
+//! responds to u like its controlled element gives the same run to the last bit. The control of a sample does not
+//! depend on the error of the same sample, since the response of the operator first holds e over a sample.
 
 use crate::{RunSeed, Simulator, cascade::MOST};
 
-/// Most samples of an operator that continues from what was saved, eight hours at 1 kHz: its random numbers are drawn
-/// again, and what claims to stand farther on must not take all memory.
+/// Largest number of samples of a restored operator, eight hours at 1 kHz: its random numbers are drawn again, and an
+/// invalid larger number must not exhaust the memory.
 const MOST_SAMPLES: f64 = 3e7;
 
-/// The number of a sample as it was saved; `None` if it is no such number.
+/// Returns the number of a saved sample; `None` if it is not valid.
 pub(crate) fn saved_sample(k: f64) -> Option<usize> {
     ((0.0..=MOST_SAMPLES).contains(&k) && k.fract() == 0.0).then_some(k as usize)
 }
 
-/// An operator that is at work.
+/// A running operator.
 #[derive(Debug, Clone)]
 pub struct OperatorRun {
     simulator: Simulator,
@@ -25,15 +24,15 @@ pub struct OperatorRun {
     noise: Vec<f64>,
     operator: [f64; 2],
     remnant: [f64; MOST],
-    /// The last responses, that of sample k in place k of a ring.
+    /// The last responses, that of sample k at index k of a ring.
     memory: Vec<f64>,
-    /// The sample that is next.
+    /// The next sample.
     k: usize,
 }
 
 impl OperatorRun {
-    /// An operator at rest before the sample at `start_s`, in s from the start of the measurement.
-    /// What the run-in would have been before it is left out; its random numbers are passed over.
+    /// Starts an operator at rest before the sample at `start_s`, in s from the start of the measurement. The part of
+    /// the run-in before it is left out; its random numbers are skipped.
     pub fn new(simulator: Simulator, run: RunSeed, start_s: f64) -> Self {
         let scenario = simulator.scenario();
         let after_run_in = (start_s / scenario.scenario().sample_time.s()).round() as isize;
@@ -51,19 +50,19 @@ impl OperatorRun {
         run
     }
 
-    /// The control u of the sample that is next, deg.
+    /// Returns the control u of the next sample, deg.
     pub fn control(&self) -> f64 {
         let m = self.matrices();
         let response = self.memory[self.k.wrapping_sub(m.delay) & (self.memory.len() - 1)];
         response + self.remnant()
     }
 
-    /// The remnant n of the sample that is next, deg.
+    /// Returns the remnant n of the next sample, deg.
     pub fn remnant(&self) -> f64 {
         self.matrices().k_n * self.remnant[self.simulator.cascade.order() - 1]
     }
 
-    /// Takes the error e of the sample, deg: the next one is one sample later.
+    /// Takes the error e of the sample, deg, and advances by one sample.
     pub fn take(&mut self, e: f64) {
         self.operator = self.matrices().operator.step(self.operator, e);
         let white = self.white();
@@ -77,7 +76,7 @@ impl OperatorRun {
         self.respond();
     }
 
-    /// Its position, as numbers.
+    /// Returns its state as numbers.
     pub fn saved(&self) -> Vec<f64> {
         let mut numbers = vec![self.k as f64];
         numbers.extend(self.operator);
@@ -86,8 +85,8 @@ impl OperatorRun {
         numbers
     }
 
-    /// Continues from where an operator of the same scenario and run was ([`OperatorRun::saved`]), with the same
-    /// digits. False if the numbers are of another; then nothing has changed.
+    /// Continues from a saved state of an operator of the same scenario and run ([`OperatorRun::saved`]), with the
+    /// same digits. False, without any change, if the numbers belong to another one.
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
         let Some(([k], rest)) = numbers.split_first_chunk::<1>() else {
             return false;
@@ -106,7 +105,7 @@ impl OperatorRun {
         true
     }
 
-    /// Contents of the ring for the sample that is next.
+    /// Updates the ring for the next sample.
     fn respond(&mut self) {
         let [of_output, of_rate] = self.matrices().operator_output;
         let last = self.memory.len() - 1;
@@ -118,7 +117,7 @@ impl OperatorRun {
         all[self.k.min(all.len() - 1)]
     }
 
-    /// The white noise of the sample that is next; after the end of the scenario it continues.
+    /// Returns the white noise of the next sample; it continues after the end of the scenario.
     fn white(&mut self) -> f64 {
         if self.k >= self.noise.len() {
             self.noise = self.run.white_noise(2 * self.k + 1);
@@ -142,8 +141,8 @@ mod tests {
 
     use super::*;
 
-    /// Given the error of a run from its run-in on, the operator gives its control to the last bit, at
-    /// every order of the remnant and through a change of the task.
+    /// For the error of a run from its run-in on, the operator gives the control of the run to the last bit, at every
+    /// order of the remnant and through a change of the task.
     #[test]
     fn the_operator_of_a_run_gives_its_control() {
         for (condition, order) in [
@@ -174,7 +173,7 @@ mod tests {
         }
     }
 
-    /// An operator continues in another, after the end of its scenario too.
+    /// An operator continues in another one, also after the end of its scenario.
     #[test]
     fn a_saved_operator_goes_on_with_the_same_digits() {
         let mut scenario = Scenario::condition(Condition::C4);
@@ -221,7 +220,7 @@ mod tests {
             assert!((of[0].control() - of[1].control()).abs() < 1e-3, "{k}");
             of.iter_mut().for_each(|operator| operator.take(e));
         }
-        // A start before the run-in is that of the run-in.
+        // A start before the run-in is a start at the run-in.
         let simulator = Simulator::new(&scenario).unwrap();
         assert_eq!(OperatorRun::new(simulator, seed, -1e9).k, 0);
     }

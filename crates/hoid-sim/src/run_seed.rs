@@ -1,8 +1,7 @@
 //! Random streams that belong to a run, not to a thread.
 //!
-//! A run is named by (seed, cell, replication). These three numbers are the key of a ChaCha8
-//! generator, so that any run can be repeated alone, in any order and on any number of threads, and
-//! no two runs share a stream.
+//! A run is identified by (seed, cell, replication). These three numbers are the key of a ChaCha8 generator, so that
+//! any run can be repeated alone, in any order and on any number of threads, and no two runs share a stream.
 
 use rand_chacha::{
     ChaCha8Rng,
@@ -11,7 +10,7 @@ use rand_chacha::{
 
 use crate::normal_deviates::normal_deviates;
 
-/// Name of the random stream of one run.
+/// Identifier of the random stream of one run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct RunSeed {
     /// Seed of the study.
@@ -22,41 +21,40 @@ pub struct RunSeed {
     pub replication: u64,
 }
 
-/// Last eight bytes of each key: other uses of (seed, cell, replication) get another tag and so
-/// another stream.
+/// Last eight bytes of each key: other uses of (seed, cell, replication) have another tag and therefore another
+/// stream.
 const REMNANT: u64 = u64::from_le_bytes(*b"remnant\0");
 const UNIFORM: u64 = u64::from_le_bytes(*b"uniform\0");
 
 impl RunSeed {
-    /// White Gaussian noise of unit variance.
+    /// Returns white Gaussian noise of unit variance.
     pub fn white_noise(&self, n: usize) -> Vec<f64> {
         let mut noise = vec![0.0; n];
         self.white_noise_into(&mut noise);
         noise
     }
 
-    /// The first samples of [`RunSeed::white_noise`], into memory that was used before.
+    /// Writes the first samples of [`RunSeed::white_noise`] into existing memory.
     pub fn white_noise_into(&self, noise: &mut [f64]) {
         normal_deviates(self.generator(REMNANT), noise);
     }
 
-    /// Numbers from `[0, 1)`, each equally likely, for callers that draws persons or phases of a
-    /// run.
+    /// Returns uniform numbers from `[0, 1)`, for callers that draw persons or phases of a run.
     pub fn uniform(&self, n: usize) -> Vec<f64> {
         self.uniform_of(UNIFORM, n)
     }
 
-    /// White Gaussian noise of unit variance of another use of the run.
+    /// Returns white Gaussian noise of unit variance for another use of the run.
     pub(crate) fn white_noise_of(&self, tag: u64, n: usize) -> Vec<f64> {
         let mut noise = vec![0.0; n];
         normal_deviates(self.generator(tag), &mut noise);
         noise
     }
 
-    /// Numbers from `[0, 1)`, each equally likely, of another use of the run.
+    /// Returns uniform numbers from `[0, 1)` for another use of the run.
     pub(crate) fn uniform_of(&self, tag: u64, n: usize) -> Vec<f64> {
         let mut generator = self.generator(tag);
-        // The 53 bits that a number from [0, 1) has.
+        // The 53 bits of a number from [0, 1).
         (0..n)
             .map(|_| (generator.next_u64() >> 11) as f64 / (1u64 << 53) as f64)
             .collect()

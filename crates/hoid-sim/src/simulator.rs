@@ -1,21 +1,19 @@
 //! One run of the loop.
 //!
-//! At sample k, with the parameters in force at its time,
+//! At sample k, with the parameters at that time,
 //!
 //! `e = f_t - x`, `u = y(k - tau_e/Ts) + n`, `n = K_n z`,
 //!
-//! where y is the operator's response without delay, x the output of the controlled element and z
-//! that of the unit remnant cascade. Each block is then taken over one sample exactly, for an input
-//! that is held: the operator driven by e, the controlled element by u, the cascade by one normal
-//! deviate. The hold delays the response by one sample more, so that `nk = tau_e/Ts + 1`. The
-//! remnant is not delayed. A delay that changes is that of the sample at which the response
-//! arrives: when it grows, parts of the response are heard twice, when it shrinks some are not
-//! heard.
+//! where y is the operator's response without delay, x the output of the controlled element and z that of the unit
+//! remnant cascade. Each block is then advanced by one sample exactly, for a held input: the operator driven by e, the
+//! controlled element by u, the cascade by one normal deviate. The hold delays the response by one more sample, so
+//! that `nk = tau_e/Ts + 1`. The remnant is not delayed. A changing delay is that of the sample at which the response
+//! arrives: if it grows, parts of the response are repeated; if it shrinks, some are skipped.
 //!
 //! Operator and controlled element are in controllable canonical form (states: output and rate of
-//! `1/den`). The operator's gains are in its output matrix; those of the controlled element where
-//! [`Realisation`] states. When parameters change, the matrices of each sample are those of the
-//! continuous model with the values at that sample.
+//! `1/den`). The operator's gains are in its output matrix; those of the controlled element are placed as
+//! [`Realisation`] states. For changing parameters the matrices of each sample are those of the continuous model with
+//! the values at that sample.
 
 use std::ops::Range;
 
@@ -33,12 +31,12 @@ use crate::{
     cascade::{Cascade, MOST},
 };
 
-/// A scenario made ready: forcing function, parameters and matrices of every sample.
+/// A prepared scenario: forcing function, parameters and matrices of every sample.
 #[derive(Debug, Clone)]
 pub struct Simulator {
     scenario: ResolvedScenario,
     forcing_deg: Vec<f64>,
-    /// One entry when nothing changes, else one a sample.
+    /// One entry if nothing changes, else one per sample.
     parameters: Vec<TrueParameters>,
     pub(crate) matrices: Vec<Matrices>,
     pub(crate) cascade: Cascade,
@@ -55,9 +53,9 @@ pub(crate) struct Matrices {
     pub delay: usize,
 }
 
-/// A held system by rows, `[a x_0 + b x_1 + g u, d x_1 - c x_0 - h u]`: the bits of
-/// [`HeldStates::step`]. Were both rows sums, the compiler would pack the states into one register,
-/// and each sample would wait for the shuffles in addition.
+/// A held system by rows, `[a x_0 + b x_1 + g u, d x_1 - c x_0 - h u]`, with the same bits as
+/// [`HeldStates::step`]. If both rows were sums, the compiler would pack the states into one register, and each sample
+/// would also wait for the shuffles.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Rows {
     plus: [f64; 3],
@@ -73,7 +71,7 @@ impl Rows {
         }
     }
 
-    /// One sample on.
+    /// Advances the states by one sample.
     #[inline(always)]
     pub fn step<R: Number>(&self, x: [R; 2], u: R) -> [R; 2] {
         let ([a, b, g], [d, c, h]) = (self.plus, self.minus);
@@ -98,10 +96,10 @@ pub struct Signals {
 }
 
 impl Simulator {
-    /// Prepares a scenario. Runs share what is computed here.
+    /// Prepares a scenario. Its runs share the results.
     ///
     /// # Errors
-    /// [`SimError::Model`] when the scenario has no meaning.
+    /// [`SimError::Model`] if the scenario is invalid.
     pub fn new(scenario: &Scenario) -> Result<Self, SimError> {
         let resolved = scenario.resolve()?;
         let ts = scenario.sample_time;
@@ -126,18 +124,18 @@ impl Simulator {
         })
     }
 
-    /// The scenario.
+    /// Returns the scenario.
     pub fn scenario(&self) -> &ResolvedScenario {
         &self.scenario
     }
 
-    /// Samples of a run: run-in and measurement.
+    /// Returns the number of samples of a run: run-in and measurement.
     pub fn samples(&self) -> usize {
         self.forcing_deg.len()
     }
 
-    /// One run as a record of the measurement (or from the start of the run-in): e, u, f_t, x, n
-    /// and the true parameters.
+    /// Returns one run as a record of the measurement (or from the start of the run-in): e, u, f_t, x, n and the true
+    /// parameters.
     ///
     /// # Errors
     /// [`SimError::Diverged`].
@@ -146,7 +144,7 @@ impl Simulator {
         self.record(signals, keep_run_in)
     }
 
-    /// The signals of a run driven by given white noise of unit variance, one value a sample.
+    /// Returns the signals of a run driven by given white noise of unit variance, one value per sample.
     ///
     /// # Errors
     /// [`SimError::NoiseLength`], [`SimError::NoiseNotFinite`], [`SimError::Diverged`].
@@ -156,11 +154,10 @@ impl Simulator {
         Ok(signals)
     }
 
-    /// As [`Simulator::signals`], into memory that was used before: new memory costs half as much
-    /// as the run.
+    /// Computes [`Simulator::signals`] into existing memory: new memory costs half as much as the run.
     ///
     /// # Errors
-    /// As [`Simulator::signals`]; the signals are then of no use.
+    /// As [`Simulator::signals`]; the signals are then invalid.
     pub fn signals_into(&self, noise: &[f64], signals: &mut Signals) -> Result<(), SimError> {
         self.check_length(noise)?;
         signals.resize_to(self.samples());
@@ -176,12 +173,11 @@ impl Simulator {
         }
     }
 
-    /// The signals of several runs, each driven by its own white noise, side by side in the lanes
-    /// of vector registers: the bits of [`Simulator::signals`] for each alone, with every
-    /// instruction set.
+    /// Returns the signals of several runs, each driven by its own white noise, in parallel lanes of vector registers:
+    /// with the same bits as [`Simulator::signals`] for each alone, with every instruction set.
     ///
     /// # Errors
-    /// As [`Simulator::signals`], for the first run that has one;
+    /// As [`Simulator::signals`], for the first run with an error;
     /// [`SimError::NoSuchInstructionSet`].
     pub fn batched_signals(&self, noises: &[Vec<f64>], instructions: InstructionSet) -> Result<Vec<Signals>, SimError> {
         let mut all = Vec::new();
@@ -189,8 +185,7 @@ impl Simulator {
         Ok(all)
     }
 
-    /// As [`Simulator::batched_signals`], into memory that was used before: new memory costs more
-    /// than the runs.
+    /// Computes [`Simulator::batched_signals`] into existing memory: new memory costs more than the runs.
     ///
     /// # Errors
     /// As [`Simulator::batched_signals`].
@@ -234,8 +229,7 @@ impl Simulator {
         })
     }
 
-    /// The samples of `range`, from noise into e, u, x and n that hold the lanes of each sample
-    /// next to each other.
+    /// Computes the samples of `range`, from noise into e, u, x and n, in which the lanes of each sample are adjacent.
     #[inline(always)]
     fn pass<R: Number>(&self, state: &mut LoopState<R>, range: Range<usize>, noise: &[f64], out: [&mut [f64]; 4]) {
         match self.cascade.order() {
@@ -261,7 +255,7 @@ impl Simulator {
         }
     }
 
-    /// Two programs, so that numbers that never change stay in the registers.
+    /// Compiled in two versions, so that constant numbers stay in the registers.
     #[inline(always)]
     fn pass_through<R: Number, const M: usize, const CHANGES: bool>(
         &self,
@@ -309,7 +303,7 @@ impl Simulator {
         state.remnant[..M].copy_from_slice(&remnant);
     }
 
-    /// Signals of a whole run with time, units and truth.
+    /// Returns the signals of a whole run with time, units and true values.
     fn record(&self, signals: Signals, keep_run_in: bool) -> Result<Record, SimError> {
         let run_in = self.scenario.run_in_samples();
         let first = if keep_run_in { 0 } else { run_in };
@@ -349,7 +343,7 @@ impl Simulator {
         Ok(record)
     }
 
-    /// The first number that is not finite, where there is one.
+    /// Returns an error for the first number that is not finite, if there is one.
     fn check_finite(&self, noise: &[f64], signals: &Signals) -> Result<(), SimError> {
         if let Some(index) = first_not_finite(noise) {
             let value = noise[index];
@@ -369,17 +363,17 @@ impl Simulator {
     }
 }
 
-/// Index of the first value that is not finite.
+/// Returns the index of the first value that is not finite.
 fn first_not_finite(values: &[f64]) -> Option<usize> {
     values.iter().position(|v| !v.is_finite())
 }
 
-/// Where the loop is between two samples.
+/// State of the loop between two samples.
 struct LoopState<R> {
     operator: [R; 2],
     element: [R; 2],
     remnant: [R; MOST],
-    /// The last responses, that of sample k in place k of a ring.
+    /// The last responses, that of sample k at index k of a ring.
     memory: Vec<R>,
 }
 
@@ -393,8 +387,8 @@ impl<R: Number> LoopState<R> {
         }
     }
 
-    /// True when all that a lane has gone through was finite. A number that is not stays in the
-    /// states for ever: zero times it is not finite either.
+    /// True if all values of a lane were finite. A value that is not finite stays in the states for ever: zero times
+    /// it is not finite either.
     fn is_finite(&self, lane: usize) -> bool {
         let states = self.operator.iter().chain(&self.element).chain(&self.remnant);
         states.chain(&self.memory).all(|state| state.lane(lane).is_finite())
@@ -406,7 +400,7 @@ impl Signals {
         let Self { e, u, x, n } = self;
         for values in [e, u, x, n] {
             if values.capacity() < samples {
-                // Zeros of the system cost nothing before they are written.
+                // Zeros from the operating system cost nothing before they are written.
                 *values = vec![0.0; samples];
             }
             values.resize(samples, 0.0);
@@ -414,19 +408,19 @@ impl Signals {
     }
 }
 
-/// Samples that are laid side by side at a time.
+/// Number of samples that are interleaved at a time.
 const BLOCK: usize = 64;
 
 /// One run.
 struct SingleRun<'a> {
     simulator: &'a Simulator,
     noise: &'a [f64],
-    /// Signals as long as the run.
+    /// Signals of the length of the run.
     into: &'a mut Signals,
 }
 
 impl LaneTask for SingleRun<'_> {
-    /// True when all was finite.
+    /// True if all values were finite.
     type Output = bool;
 
     #[inline(always)]
@@ -439,16 +433,16 @@ impl LaneTask for SingleRun<'_> {
     }
 }
 
-/// Runs side by side.
+/// Parallel runs.
 struct BatchedRuns<'a> {
     simulator: &'a Simulator,
     noises: &'a [Vec<f64>],
-    /// As many signals, as long as the runs.
+    /// Signals of the length of the runs, as many as there are runs.
     into: &'a mut [Signals],
 }
 
 impl LaneTask for BatchedRuns<'_> {
-    /// True when all was finite.
+    /// True if all values were finite.
     type Output = bool;
 
     #[inline(always)]
@@ -459,7 +453,7 @@ impl LaneTask for BatchedRuns<'_> {
         let mut finite = true;
         for (noises, into) in self.noises.chunks(width).zip(self.into.chunks_mut(width)) {
             let mut state = LoopState::at_rest(zero, self.simulator.longest_delay());
-            // Lanes that are left over run without remnant.
+            // Unused lanes run without remnant.
             noise.fill(0.0);
             for begin in (0..samples).step_by(BLOCK) {
                 let range = begin..(begin + BLOCK).min(samples);

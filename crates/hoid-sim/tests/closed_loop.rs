@@ -1,4 +1,4 @@
-//! The simulated loop against what is known about it by other ways.
+//! The simulated loop compared with results obtained in other ways.
 
 #![allow(clippy::unwrap_used)]
 
@@ -112,8 +112,8 @@ fn errors_against_continuous(condition: Condition, extra: f64) -> Vec<[f64; 2]> 
 
 #[test]
 fn the_noise_free_loop_tends_to_the_continuous_one() {
-    // Bounds at Ts = 0.01 s: measured 0.036 and 0.088. The phase margin of s2 is 23 deg, so that it
-    // feels the holds more.
+    // Bounds at Ts = 0.01 s: measured 0.036 and 0.088. The phase margin of s2 is 23 deg, so that it is more sensitive
+    // to the holds.
     for (condition, bound) in [(Condition::C1, 0.04), (Condition::C2, 0.1)] {
         let errors = errors_against_continuous(condition, 0.0);
         println!("{condition}: relative error of u and e at Ts = 0.02, 0.01, 0.005 s: {errors:.5?}");
@@ -184,8 +184,8 @@ fn realisations_agree_while_nothing_changes_and_differ_at_the_jump() {
     assert!(largest_step(&output.x) > 5.0 * largest_step(&input.x));
 }
 
-/// With a controlled element that does nothing the error is the target, and the response at each
-/// sample is that of the delay of this sample.
+/// With a controlled element of zero the error is the target, and the response at each sample is that of the delay of
+/// this sample.
 #[test]
 fn a_delay_that_changes_is_that_of_the_sample_at_which_the_response_arrives() {
     let with = |before: f64, after: f64| {
@@ -386,13 +386,13 @@ fn a_diverging_loop_is_an_error_and_not_a_row_of_nan() {
         simulator.run(RunSeed::default(), false),
         Err(SimError::Diverged { .. })
     ));
-    // A noise level has no meaning there, and is refused before anything runs.
+    // A noise level has no meaning there, and is refused before any run.
     scenario.remnant.strength = RemnantStrength::Level {
         level: 0.1,
         definition: NoiseDefinition::Response,
     };
     assert!(Simulator::new(&scenario).is_err());
-    // Silence has no level to reach: the unstable loop can be examined until it overflows.
+    // Without noise there is no level to reach: the unstable loop can be examined until it overflows.
     let silent = with_unstable_operator(with_level(Condition::C2, 0.0));
     assert!(Simulator::new(&silent).is_ok());
     let good = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();

@@ -1,4 +1,4 @@
-//! The loop of the family against what is known about it by other ways.
+//! The loop of the family compared with results obtained in other ways.
 
 #![allow(clippy::unwrap_used)]
 
@@ -123,7 +123,7 @@ fn a_lead_on_the_element_of_the_text_is_the_known_simulator() {
     }
 }
 
-/// Coordinates of an operator by what they are.
+/// Returns a coordinate of an operator by its kind.
 fn part(operator: &FamilyOperator, wanted: Coordinate) -> f64 {
     let kinds = operator.form().coordinates(operator.has_neuromuscular());
     let at = kinds.iter().position(|kind| *kind == wanted);
@@ -279,7 +279,7 @@ fn the_describing_function_is_the_operator_behind_a_hold() {
                 polynomial::value(&held.b, backward) / polynomial::value(&f, backward) * backward.powu(held.nk as u32);
             let error = (found - exact).norm() / exact.norm();
             assert!(error < 1e-6, "{:?} {omega}: {error}", operator.form());
-            // In continuous time behind half a sample of delay, up to (omega Ts)^2.
+            // In continuous time with half a sample of delay, up to (omega Ts)^2.
             let near = operator.response(omega) * Complex64::from_polar(1.0, -omega * ts / 2.0);
             assert!((found - near).norm() / near.norm() < 2e-3 + (omega * ts).powi(2));
         }
@@ -288,8 +288,8 @@ fn the_describing_function_is_the_operator_behind_a_hold() {
 
 #[test]
 fn parameters_that_change_are_those_in_force() {
-    // A step of all parameters at once: from then on the loop of the last state, from where the
-    // first has left it. The slow way: both states in one run, each with its own recursion.
+    // A step of all parameters at once: from then on the loop of the last state, from the state left by the first. For
+    // comparison both states are simulated in one run, each with its own recursion.
     let mut scenario = typical();
     let x = [6.0, 0.4, 0.3, 9.0_f64.ln(), 0.3_f64.ln(), 0.15];
     scenario.last.operator = FamilyOperator::new(Form::LeadLag, true, &x).unwrap();
@@ -302,7 +302,7 @@ fn parameters_that_change_are_those_in_force() {
     let truth = record.channel("omega_nm").unwrap();
     assert!((truth[1200] - 12.0).abs() < 1e-12 && (truth[1201] - 9.0).abs() < 1e-12);
     assert!((record.channel("T_I").unwrap()[2399] - 1.0 / 0.3).abs() < 1e-12);
-    // The response of the last state continues what was heard before.
+    // The response of the last state continues from the earlier one.
     let only = |state: &FamilyState| {
         let held = state.operator.zoh(sixty()).unwrap();
         (held.nk, held.b, held.f)
@@ -325,7 +325,7 @@ fn parameters_that_change_are_those_in_force() {
     assert!((tau[0] - 9.0 / 60.0).abs() < 1e-12 && (tau[2399] - 0.2).abs() < 1e-12);
 }
 
-/// Every way in which a remnant can come.
+/// Every kind of remnant.
 fn parts() -> Vec<Vec<RemnantPart>> {
     let lag = RemnantShape::Lag {
         time_constant_s: 0.1,
@@ -389,7 +389,7 @@ fn each_remnant_has_its_share_of_the_variance() {
         let mut shares = Vec::new();
         let (mut whole, mut of_error) = (0.0, 0.0);
         for replication in 0..runs {
-            // The loop is linear: what the remnant makes is the difference.
+            // The loop is linear: the effect of the remnant is the difference.
             let (a, b) = (
                 silent.signals(seed(replication)).unwrap(),
                 noisy.signals(seed(replication)).unwrap(),
@@ -462,7 +462,7 @@ fn the_stick_drifts_and_records_are_offset() {
         assert!((offset.e[k] - plain.e[k] - 0.3).abs() < 1e-14 && (offset.u[k] - plain.u[k] + 0.2).abs() < 1e-14);
         assert_eq!(offset.y[k], plain.y[k]);
     }
-    // In the loop the integrator takes a constant bias out of u, and leaves it in e.
+    // In the loop the integrator removes a constant bias from u, and leaves it in e.
     scenario.stick = Stick {
         bias: 0.5,
         ..Stick::default()
@@ -471,9 +471,9 @@ fn the_stick_drifts_and_records_are_offset() {
     let end = plain.u.len() - 1;
     assert!((biased.n[end] - 0.5).abs() < 1e-14);
     assert!((biased.u[end] - plain.u[end]).abs() < 1e-3);
-    // K = 4/0.2 makes 0.5 of it.
+    // K = 4/0.2 contributes 0.5 of it.
     assert!((biased.e[end] - plain.e[end] + 0.5 / 20.0).abs() < 1e-3);
-    // A walk of s a root second has s^2 T behind T seconds.
+    // A walk of s per root second has the variance s^2 T after T seconds.
     scenario.stick = Stick {
         walk_per_root_s: 0.1,
         ..Stick::default()

@@ -1,4 +1,4 @@
-//! Virtual people are as they are drawn.
+//! Virtual people have the parameters with which they were drawn.
 
 #![allow(clippy::unwrap_used)]
 

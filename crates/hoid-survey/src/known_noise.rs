@@ -1,4 +1,4 @@
-//! Common parts of methods in the operator's parameters with the noise model of a batch fit: their checks, and T_L of
+//! Common parts of methods in physical parameters with the noise model of a batch fit: their checks, and T_L from the
 //! gains.
 
 use hoid_ident::IdentError;
@@ -10,7 +10,7 @@ use hoid_track::{
 /// Largest order of the noise model.
 pub(crate) const LARGEST_ND: usize = 8;
 
-/// Checks the requirements of a method that has a model of how the person changes.
+/// Checks the requirements of a method with a model of how the person changes.
 ///
 /// # Errors
 /// [`IdentError::BadOption`].
@@ -35,7 +35,7 @@ pub(crate) fn check_model_of_change(name: &str, setup: &Setup) -> Result<(), Ide
     Ok(())
 }
 
-/// As [`check_model_of_change`], of a method whose noise model is of order 1.
+/// As [`check_model_of_change`], for a method whose noise model is of order 1.
 ///
 /// # Errors
 /// [`IdentError::BadOption`].
@@ -47,7 +47,7 @@ pub(crate) fn check_first_order(name: &str, setup: &Setup) -> Result<(), IdentEr
     }
 }
 
-/// T_L = K_e_dot/K_e, and its variance to first order, `d T_L = (d K_e_dot - T_L d K_e)/K_e`.
+/// Returns T_L = K_e_dot/K_e, and its variance to first order, `d T_L = (d K_e_dot - T_L d K_e)/K_e`.
 pub(crate) fn lead_of(eta: [f64; OPERATOR], c: &[[f64; OPERATOR]; OPERATOR]) -> [f64; 2] {
     let t_l = eta[1] / eta[0];
     let of_ratio = c[1][1] - 2.0 * t_l * c[0][1] + t_l * t_l * c[0][0];

@@ -1,8 +1,8 @@
-//! The recursive methods of the literature next to those of hoid: for comparison.
+//! Recursive methods of the literature, for comparison with those of hoid.
 //!
-//! Each follows the source that its file names, and is a [`Method`](hoid_track::Method) as the default is: the tracker,
-//! the guard, saved states, traces and verdicts of [`hoid_track`] are those of all. This crate sees all
-//! methods, and holds the one list of their names.
+//! Each follows the source named in its file, and is a [`Method`](hoid_track::Method) like the default: all share the
+//! tracker, the guard, saved states, traces and verdicts of [`hoid_track`]. This crate contains the list of all
+//! methods by name.
 //!
 //! ```
 //! use hoid_model::scenario::{Condition, Scenario};

@@ -1,5 +1,4 @@
-//! All recursive methods by name: those of [`hoid_track`] and those of this crate. A new one is a line
-//! in the list.
+//! All recursive methods by name: those of [`hoid_track`] and those of this crate. A new one needs a line in the list.
 
 use hoid_ident::{IdentError, settings::MethodSpec};
 use hoid_track::{AdaptiveOptions, Method, RlsOptions, RpemOptions, building::bad};
@@ -44,7 +43,7 @@ methods! {
     linear_network = LinearNetworkOptions,
 }
 
-/// All methods with their defaults, in the order of help.
+/// Returns all methods with their defaults, in the order of help.
 pub fn methods() -> Vec<Method> {
     vec![
         RlsOptions::default().into(),
@@ -62,25 +61,25 @@ pub fn methods() -> Vec<Method> {
     ]
 }
 
-/// True for a method of this crate: help in short does without it.
+/// True for a method of this crate: the short help omits it.
 pub fn is_for_comparison(method: &Method) -> bool {
     ![Method::rls(), Method::rpem(), Method::default()]
         .iter()
         .any(|own| own.name() == method.name())
 }
 
-/// Known properties of each method: what command line, plans, Python and the book read.
+/// Returns the known properties of each method, for command line, plans, Python and the book.
 pub fn registry() -> Vec<MethodSpec> {
     methods().iter().map(Method::spec).collect()
 }
 
-/// A name as it was typed, in the form of the list.
+/// Converts a typed name to the form of the list.
 fn plain(text: &str) -> String {
     text.trim().to_ascii_lowercase()
 }
 
-/// The method of a name, with its defaults. An earlier name is in plans and in saved trackers, and is read as well; who
-/// can determine the user reports it ([`renamed`]).
+/// Returns the method of a name, with its defaults. Earlier names, which plans and saved trackers contain, are
+/// accepted as well; a caller with a connection to the user reports them ([`renamed`]).
 ///
 /// # Errors
 /// [`IdentError::BadOption`] for a name that no method has.
@@ -93,7 +92,7 @@ pub fn method(text: &str) -> Result<Method, IdentError> {
     found.ok_or_else(|| bad("the method", text.to_owned(), &format!("one of {}", names.join(", "))))
 }
 
-/// For an earlier name of a method the current one, and the sentence that reports it.
+/// Returns the current name for an earlier name of a method, and the sentence that reports it.
 pub fn renamed(text: &str) -> Option<(&'static str, String)> {
     let earlier = plain(text);
     let found = methods()

@@ -1,4 +1,4 @@
-//! psi of the recursion in physical parameters against finite differences, and the delay that it follows.
+//! psi of the recursion in physical parameters compared with finite differences, and its tracked delay.
 #![allow(clippy::unwrap_used)]
 
 #[path = "../../hoid-core/tests/common/mod.rs"]

@@ -42,7 +42,7 @@ fn a_guard_that_never_acts_changes_no_digit() {
             let without = track(&record, &options(method(), "no"), 16).unwrap();
             assert!(with.is_guarded() && !without.is_guarded());
             assert_eq!(with.faults(), [], "{}", method());
-            // As bits: there is none before the estimate starts.
+            // As bits: there is no estimate before the start.
             let bits = |numbers: &[f64]| numbers.iter().map(|x| x.to_bits()).collect::<Vec<u64>>();
             for row in 0..with.len() {
                 assert_eq!(with.theta(row), without.theta(row), "{}", method());
@@ -78,7 +78,7 @@ fn a_jump_that_stays_is_taken_as_if_nothing_had_been() {
             let (e, u) = (record.input()[k] + jump, record.output()[k]);
             let found = with.step(e, u);
             let plain = without.step(e, u);
-            // A step of the target: nothing to tell.
+            // A step of the target: nothing to report.
             assert_eq!(with.event(), None);
             if found.held {
                 accepted = k + 1;
@@ -93,7 +93,7 @@ fn a_jump_that_stays_is_taken_as_if_nothing_had_been() {
     }
 }
 
-/// What a stream may bring: e and u of sample k, wrong from 4000 on.
+/// Faulty input: e and u of sample k, wrong from 4000 on.
 fn hostile(record: &Record, k: usize) -> (f64, f64) {
     let (e, u) = (record.input()[k], record.output()[k]);
     match k {
@@ -193,7 +193,7 @@ fn streams_of_nothing_and_of_anything_leave_numbers() {
                 }
                 assert!(tracker.theta().iter().all(|t| t.is_finite()), "{method}");
                 assert!(tracker.innovation_variance().is_finite(), "{method}");
-                // It lives: the run that follows is taken.
+                // It recovers: the run that follows is tracked.
                 let before = tracker.counts();
                 (0..record.len()).for_each(|k| {
                     tracker.step(record.input()[k], record.output()[k]);

@@ -1,5 +1,4 @@
-//! The bank of hypotheses: its filters, one hypothesis against least squares, changes, signals that
-//! are not as they should be.
+//! The bank of hypotheses: its filters, one hypothesis compared with least squares, changes, faulty signals.
 #![allow(clippy::unwrap_used)]
 
 #[path = "../../hoid-core/tests/common/mod.rs"]
@@ -23,7 +22,7 @@ fn prior_of() -> ChangePrior {
     operator::prior_of(DelayPrior::KNOWN)
 }
 
-/// A prior of an operator who never changes.
+/// A prior of an operator that never changes.
 fn steady() -> ChangePrior {
     ChangePrior {
         birth_interval: u32::MAX,
@@ -51,8 +50,8 @@ fn level(deviation: f64) -> InnovationVariance {
     InnovationVariance::new(deviation * deviation, 2000.0, 1.0 - 1.0 / 2000.0)
 }
 
-/// Delayed error and control of an operator whose gains are those of `eta` at each sample, in its
-/// output, with AR(1) noise.
+/// Delayed error and control of an operator whose gains are those of `eta` at each sample, in its output, with AR(1)
+/// noise.
 fn operator(samples: usize, seed: u64, deviation: f64, eta: impl Fn(usize) -> [f64; 4]) -> Vec<(f64, f64)> {
     with_noise(samples, seed, |_| deviation, eta)
 }
@@ -120,8 +119,7 @@ fn responses_times_gains_are_the_held_operator_and_their_derivatives_are_differe
 
 #[test]
 fn a_point_that_moves_takes_the_past_with_it() {
-    // What the filters remember after a move differs in the second order from that of filters that
-    // always was there.
+    // The memory of the filters after a move differs in the second order from that of filters that always were there.
     let error = |step: f64| {
         let mut noise = Noise(9);
         let (mut moved, mut there) = (
@@ -147,7 +145,7 @@ fn one_hypothesis_with_a_known_neuromuscular_system_is_least_squares() {
     let d = [-0.85];
     let data = operator(3000, 3, 0.02, |_| S1);
     let prior = [1e-4, 1e-4];
-    // A given number of residuals that sigma^2 stays what it is.
+    // With many prior residuals sigma^2 stays constant.
     let sigma2 = 4e-4;
     let fixed = InnovationVariance::new(sigma2, 1e30, 1.0);
     let mut bank = bank(
@@ -203,7 +201,7 @@ fn the_neuromuscular_system_is_found_from_a_quarter_away() {
     let covariance = bank.bank().covariance();
     for i in 0..4 {
         let error = bank.bank().mixture().eta[i] - S1[i];
-        // Five standard errors, and what the linearisation at the far start leaves: a hundredth.
+        // Five standard errors, plus the error of the linearisation at the distant start: a hundredth.
         let allowed = 5.0 * covariance[i][i].sqrt() + 0.01 * S1[i];
         assert!(error.abs() < allowed, "{i}: {error} {allowed}");
     }

@@ -1,5 +1,4 @@
-//! Rests, frozen channels and a constant error, of 10 s to 1000 s: nothing arrives, and no error bar
-//! shrinks.
+//! Rests, frozen channels and a constant error, of 10 s to 1000 s: without information no error bar shrinks.
 #![allow(clippy::unwrap_used)]
 
 use hoid_model::{
@@ -24,10 +23,10 @@ fn record(condition: Condition) -> Record {
         .unwrap()
 }
 
-/// The answer to a step of e, and the second in which its end is found, s.
+/// Duration of the response to a step of e, and the second in which its end is found, s.
 const ANSWER_S: f64 = 4.0;
 
-/// What stays constant.
+/// Kind of constant signals.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stand {
     /// e and u are zero.
@@ -37,7 +36,7 @@ enum Stand {
     FrozenE,
     FrozenU,
     Frozen,
-    /// e is constant, and u what the person answers, by their gain.
+    /// e is constant, and u is the response of the person, by their gain.
     ConstantE,
 }
 
@@ -69,21 +68,21 @@ fn bars(tracker: &Tracker) -> Vec<(String, f64)> {
     theta.chain(operator.collect::<Vec<_>>()).collect()
 }
 
-/// How far back the numbers of a guard are that it goes back to, s.
+/// Largest age of the numbers that a guard restores, s.
 const KEPT_S: f64 = 10.0;
 
-/// The smaller of each bar.
+/// Takes the smaller of each error bar.
 fn smallest(of: &mut [(String, f64)], others: Vec<(String, f64)>) {
     for ((_, one), (_, other)) in of.iter_mut().zip(others) {
         *one = one.min(other);
     }
 }
 
-/// A tracker after the stand, and the bars before it: of a guard that goes back the smallest of the numbers that
-/// it may have kept.
+/// Returns a tracker after the constant span, and the error bars before it: for a guard that restores earlier numbers,
+/// the smallest of those that it may have kept.
 fn through(options: &TrackOptions, record: &Record, stand: Stand, length_s: f64) -> (Tracker, Vec<(String, f64)>) {
     let goes_back = match options.method.name() {
-        // From the first sample on it learns, and its bars are not the same from one reading to the next.
+        // It learns from the first sample on, and its error bars vary with time.
         "adaptive" => true,
         "multiple-model" | "physical" => stand == Stand::FrozenU,
         _ => false,
@@ -107,7 +106,7 @@ fn through(options: &TrackOptions, record: &Record, stand: Stand, length_s: f64)
     let (mut begin, before) = (kept.unwrap_or_else(|| bars(&tracker)), at(first - 1));
     let mut told = Vec::new();
     for k in 0..(length_s / ts) as usize {
-        // Where e has stepped the answer is news, as long as it moves.
+        // After a step of e the response carries information, as long as it moves.
         if stand == Stand::ConstantE && k as f64 * ts <= ANSWER_S {
             begin = bars(&tracker);
         }
@@ -207,7 +206,7 @@ fn a_long_rest_is_as_a_short_one_and_tracking_goes_on_behind_it() {
             "{}",
             options.method.name()
         );
-        // A few seconds of news do not make bars that are a hundredth of what they were.
+        // A few seconds of information do not reduce the error bars to a hundredth.
         for ((name, before), (_, after)) in begin.iter().zip(bars(&tracker)) {
             assert!(
                 after >= 0.05 * before,
@@ -218,8 +217,7 @@ fn a_long_rest_is_as_a_short_one_and_tracking_goes_on_behind_it() {
     }
 }
 
-/// A record with a rest: the trace reports when nothing arrived, and one without is not informed of
-/// any.
+/// A record with a rest: the trace reports the time without information, and a trace without a rest reports none.
 #[test]
 fn the_time_without_excitation_is_a_finding() {
     let whole = record(Condition::C1);

@@ -1,5 +1,5 @@
-//! Trackers at every sample time, from a microsecond to days: each takes its samples or refuses with the
-//! sample time and the remedy.
+//! Trackers at every sample time, from a microsecond to days: each takes its samples, or refuses with the sample time
+//! and the remedy.
 #![allow(clippy::unwrap_used)]
 
 use hoid_ident::{IdentError, NamedOrders, order_selection::Criterion};
@@ -12,7 +12,7 @@ fn sample_times() -> impl Iterator<Item = f64> {
     (-24..=24).map(|quarter| 10_f64.powf(f64::from(quarter) / 4.0))
 }
 
-/// Two sums of sines with a lag, which is enough to be taken.
+/// Two sums of sines with a lag, which is sufficient as input.
 fn signals(k: usize) -> (f64, f64) {
     let x = k as f64;
     (

@@ -21,7 +21,7 @@ fn span() -> Record {
         .unwrap()
 }
 
-/// Bounds that the Box-Jenkins fit cannot keep lead to the grey box.
+/// Bounds that the Box-Jenkins fit cannot satisfy lead to the grey box.
 fn outside() -> TrackOptions {
     let mut own = MultipleModelOptions::default();
     own.bounds.bound = BTreeMap::from([("omega_nm".to_owned(), Constraint::Between(20.0, 30.0))]);

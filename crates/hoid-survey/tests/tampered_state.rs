@@ -1,5 +1,5 @@
-//! Trackers and warm-ups that are to be restored from numbers that were changed, cut or never saved:
-//! refused, and never a panic.
+//! Restoring trackers and warm-ups from numbers that were changed, cut or never saved: they are refused, without a
+//! panic.
 #![allow(clippy::unwrap_used)]
 
 use std::sync::OnceLock;
@@ -72,7 +72,7 @@ fn saved() -> &'static Saved {
     })
 }
 
-/// Treatment of numbers.
+/// Modification of the numbers.
 #[derive(Debug, Clone)]
 enum Tampering {
     Set(Index, f64),
@@ -158,7 +158,7 @@ proptest! {
         if options != others && numbers.len() != of_others.len() {
             prop_assert!(Tracker::restored(options, saved.sample_time, of_others).is_err());
         }
-        // For the same length they are numbers of that tracker: no panic, whatever they mean.
+        // With the same length they are numbers of that tracker: no panic, whatever they mean.
         let orders = options.structure.operator_orders(nk);
         let other = TrackOptions { orders, ..options.clone() };
         let _ = Tracker::restored(&other, saved.sample_time, numbers);

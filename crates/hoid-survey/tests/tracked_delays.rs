@@ -1,4 +1,4 @@
-//! The delay that `rpem` follows in whole samples.
+//! The delay that `rpem` tracks in whole samples.
 
 #![allow(clippy::unwrap_used)]
 
@@ -102,7 +102,7 @@ fn the_response_of_physical_has_the_delay_of_its_row() {
         at_rad_s: vec![2.5],
         ..TrackOptions::default_for(hoid_survey::physical(), NK)
     };
-    // A memory that lets the delay go.
+    // A memory with which the delay can move.
     let options = physical
         .with(&[("track_delay", "0.2..0.4"), ("memory_of", "tau_e=5s")])
         .unwrap();
@@ -112,7 +112,7 @@ fn the_response_of_physical_has_the_delay_of_its_row() {
         trace.operator(last).unwrap().tau_e_s.value,
         trace.response(last, 0).unwrap().phase_deg().value,
     );
-    // The value for the operator of the row, not of the delay of the start fit.
+    // The value for the operator of the row, not for the delay of the start fit.
     let found = trace.operator(last).unwrap();
     let square = found.omega_nm_rad_s.value.powi(2);
     let lead = (2.5 * found.t_l_s.value).atan();

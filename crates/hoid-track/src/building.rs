@@ -1,6 +1,6 @@
-//! Components of a method, for those in other crates: `hoid-survey` holds the methods that the default is compared
-//! with. A method is a struct of options (`hoid_ident::settings!`) with [`RecursiveMethod`], which builds a
-//! [`Recursion`]; then `Method::from(options)` is used as any other.
+//! Building blocks of a method, for methods of other crates: `hoid-survey` holds the methods with which the default is
+//! compared. A method is a struct of options (`hoid_ident::settings!`) with [`RecursiveMethod`], which builds a
+//! [`Recursion`]; `Method::from(options)` is then used like any other.
 
 pub use crate::{
     gain::{Gain, ROOM_WITHOUT_FIT, Scaled, error_bars},

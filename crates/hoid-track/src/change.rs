@@ -1,9 +1,9 @@
-//! When a person changed, as a method reports it, and the published baseline.
+//! Change of a person as a method reports it, and the published baseline.
 //!
-//! The baseline looks at the loop from outside: an adaptation is taken to be needed while the
-//! tracking error or its rate is larger than k of its standard deviations before the change (R. A.
-//! Hess, *Journal of Guidance, Control, and Dynamics* 32 (2009): three; here either signal raises
-//! the alarm, the rate by the difference of neighbouring samples).
+//! The baseline uses only the signals of the loop: an adaptation is assumed to be needed while the tracking error or
+//! its rate is larger than k of its standard deviations before the change (R. A. Hess, *Journal of Guidance, Control,
+//! and Dynamics* 32 (2009): three; here either signal raises the alarm, and the rate is the difference of neighbouring
+//! samples).
 
 use hoid_model::{SampleTime, uncertainty::Estimate};
 use hoid_numerics::statistics::{mean, sample_variance};
@@ -11,7 +11,7 @@ use hoid_numerics::statistics::{mean, sample_variance};
 /// A change of the person that was declared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Change {
-    /// How long ago the person changed when it was declared, s; to a third of a second.
+    /// Time since the change of the person at its declaration, s; accurate to a third of a second.
     pub seconds_ago: f64,
     /// Logarithm of the odds of a change within the last seconds.
     pub odds: f64,
@@ -23,23 +23,23 @@ pub struct Change {
     pub omega_nm_rad_s: [Estimate; 2],
     /// zeta_nm before and after.
     pub zeta_nm: [Estimate; 2],
-    /// Delay tau_e before and after, s; the same where it is known.
+    /// Delay tau_e before and after, s; both equal if it is known.
     pub tau_e_s: [Estimate; 2],
     /// T_L before and after, s.
     pub t_l_s: [f64; 2],
     /// Innovation variance before and after.
     pub innovation_variance: [f64; 2],
-    /// Change of K_e, K_e_dot, omega_nm, zeta_nm, the logarithm of the innovation variance and
-    /// tau_e, each over its standard error.
+    /// Changes of K_e, K_e_dot, omega_nm, zeta_nm, the logarithm of the innovation variance and tau_e, each over its
+    /// standard error.
     pub z: [f64; 6],
-    /// True if the operator was held against before as a whole: their response has changed then, even where no single
-    /// quantity has by two standard errors.
+    /// True if the operator was tested as a whole: the response has then changed, even if no single quantity changed
+    /// by two standard errors.
     pub of_operator: bool,
 }
 
-/// Change over its standard error from which a quantity is reported to have changed.
+/// Change over its standard error from which a quantity counts as changed.
 const CHANGED: f64 = 2.0;
-/// Quantities of [`Change::z`].
+/// Names of the quantities of [`Change::z`].
 const QUANTITIES: [&str; 6] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", REMNANT, "tau_e"];
 const REMNANT: &str = "remnant";
 
@@ -49,9 +49,8 @@ impl Change {
         1.0 / (1.0 + (-self.odds).exp())
     }
 
-    /// Names of the change by more than two standard errors: `K_e`, `K_e_dot`, `omega_nm`, `zeta_nm`, `remnant`,
-    /// `tau_e`. Where the operator as a whole was found to have changed, and no single quantity of theirs did by so
-    /// much, `response` represents them.
+    /// Names of the quantities that changed by more than two standard errors: `K_e`, `K_e_dot`, `omega_nm`, `zeta_nm`,
+    /// `remnant`, `tau_e`. If the operator as a whole changed, but no single quantity of it by so much, `response`.
     pub fn changed(&self) -> Vec<&'static str> {
         let each = || QUANTITIES.into_iter().zip(self.z).filter(|(_, z)| z.abs() > CHANGED);
         let is_named = each().any(|(name, _)| name != REMNANT);
@@ -71,8 +70,8 @@ pub struct ErrorThreshold {
 }
 
 impl ErrorThreshold {
-    /// From the error of a span without a change; `None` with fewer than three samples, or values
-    /// that are not finite.
+    /// Computes the levels from the error of a span without a change; `None` for fewer than three samples, or for
+    /// values that are not finite.
     pub fn new(error: &[f64], sample_time: SampleTime) -> Option<Self> {
         let ts = sample_time.s();
         let rate: Vec<f64> = error.windows(2).map(|w| (w[1] - w[0]) / ts).collect();
@@ -87,8 +86,8 @@ impl ErrorThreshold {
         })
     }
 
-    /// The larger distance of error and error rate from their means, in standard deviations: an
-    /// alarm where it is above k. The rate counts from the second sample on.
+    /// Returns the larger distance of error and error rate from their means, in standard deviations: an alarm if it is
+    /// above k. The rate counts from the second sample on.
     pub fn step(&mut self, error: f64) -> f64 {
         let distance = |[mean, deviation]: [f64; 2], v: f64| ((v - mean) / deviation).abs();
         let by_error = distance(self.levels[0], error);

@@ -11,12 +11,12 @@ use crate::{OPERATOR_COLUMNS, OpenLoop, Response, Trace};
 pub type Columns = Vec<(String, Vec<f64>)>;
 
 impl Trace {
-    /// The operator of every row.
+    /// Returns the operator of every row.
     pub fn operators(&self) -> Vec<Result<OperatorEstimate, NotConvertible>> {
         (0..self.len()).map(|row| self.operator(row)).collect()
     }
 
-    /// Names of the operator's columns: those of every trace, and the delay where it is tracked.
+    /// Returns the names of the operator's columns: those of every trace, and the delay if it is tracked.
     pub fn operator_columns(&self) -> Vec<&'static str> {
         let mut names = OPERATOR_COLUMNS.to_vec();
         let method = &self.options().method;
@@ -26,10 +26,10 @@ impl Trace {
         names
     }
 
-    /// `t`, each coefficient, each parameter of the operator, and gain in dB and phase in degrees at the frequencies of
-    /// the options (`gain_db@2.5`, `phase_deg@2.5`), and with a controlled element `crossover_rad_s` and
-    /// `phase_margin_deg`, with their standard errors after each (`_se`). NaN is where a row has no operator or no
-    /// crossover, or a value no standard error. `operators` are those of [`Trace::operators`].
+    /// Returns `t`, each coefficient, each parameter of the operator, gain in dB and phase in degrees at the
+    /// frequencies of the options (`gain_db@2.5`, `phase_deg@2.5`), and with a controlled element `crossover_rad_s`
+    /// and `phase_margin_deg`, each followed by its standard error (`_se`). NaN marks a row without an operator or a
+    /// crossover, and a value without a standard error. `operators` are those of [`Trace::operators`].
     pub fn estimate_columns(&self, operators: &[Result<OperatorEstimate, NotConvertible>]) -> Columns {
         let mut columns: Columns = vec![("t".to_owned(), self.times_s().to_vec())];
         let mut add = |name: &str, estimates: &[Option<Estimate>]| {
@@ -67,7 +67,7 @@ impl Trace {
     }
 }
 
-/// A parameter of an operator by its name.
+/// Returns a parameter of an operator by its name.
 pub fn value_of(operator: &Result<OperatorEstimate, NotConvertible>, name: &str) -> Option<Estimate> {
     let rows = operator.as_ref().ok()?.rows();
     rows.into_iter().find(|(n, _, _)| *n == name).map(|(_, _, e)| e)

@@ -3,21 +3,21 @@
 //! stochastic processes*, 1965; with evidence that is forgotten as in A. H. Jazwinski, *Stochastic Processes and
 //! Filtering Theory*, 1970, section 8.8).
 //!
-//! With the a-priori innovation eps_k of the recursion with the delay k and sigma^2 of the one that is
-//! reported, the logarithm of the evidence is
+//! With the a-priori innovation eps_k of the recursion with the delay k, and sigma^2 of the reported one, the
+//! logarithm of the evidence is
 //!
 //! `L_k(t) = gamma L_k(t-1) - eps_k(t)^2/(2 sigma^2)`,  `gamma = 1 - Ts/T`,
 //!
-//! with T = 10 s: evidence of a delay from before a change fades as the change recedes. Another delay is reported once
-//! it leads by 2. Its recursion has run all the time, so that the estimate does not start again. The weights `p_k` are
-//! those of `exp(L_k/3)`, for neighbouring innovations of a model that is not right state the same thing more than once
-//! (without the 3 bands of 95 % hold 82 % where the delay stays, with it 95); tau_e is reported as their mean, and its
-//! standard error as the root of their variance and of that of a delay that lies evenly between two samples, `Ts^2/12`.
+//! with T = 10 s: evidence from before a change fades with time. Another delay is reported once it leads by 2. Its
+//! recursion has run all the time, so that the estimate does not restart. The weights `p_k` are proportional to
+//! `exp(L_k/3)`, because neighbouring innovations of a wrong model carry the same information more than once (without
+//! the factor 3, bands of 95 % hold 82 % for a constant delay; with it 95 %). tau_e is reported as their mean; its
+//! variance is that of the weights plus that of a delay uniformly distributed between two samples, `Ts^2/12`.
 //!
-//! Before there is evidence the delay lies about that of the start, `L_k = -(tau_k - tau_start)^2/(2 s^2)` with s =
-//! 0.03 s; that fades like all evidence. An innovation counts up to [`LARGEST`] standard deviations, so that one
-//! outlier does not decide. While the estimate stays constant nothing is learnt of the delay: all but one of the
-//! recursions have the coefficients of another delay then.
+//! Before there is evidence the delay is distributed about that of the start, `L_k = -(tau_k - tau_start)^2/(2 s^2)`
+//! with s = 0.03 s; this fades like all evidence. An innovation counts up to [`LARGEST`] standard deviations, so that
+//! one outlier does not decide. While the estimate stays constant nothing is learnt about the delay: all but one of
+//! the recursions then have the coefficients of another delay.
 
 use hoid_core::state::{State, visit_all};
 use hoid_model::{Orders, SampleTime, uncertainty::Estimate};
@@ -32,21 +32,21 @@ use crate::{
 
 /// Memory of the evidence, s.
 const MEMORY_S: f64 = 10.0;
-/// Lead of the logarithm of the evidence with which another delay is taken.
+/// Lead of the logarithm of the evidence from which another delay is reported.
 const LEAD: f64 = 2.0;
-/// Definition of the evidence is divided by where it shows how sure the delay.
+/// Divisor of the evidence in the weights of the delays.
 const TEMPER: f64 = 3.0;
-/// Standard deviations up to which an innovation counts.
+/// Limit of an innovation in the evidence, in standard deviations.
 const LARGEST: f64 = 5.0;
 /// Standard deviation of the delay about that of the start before there is any evidence, s.
 const BEFORE_S: f64 = 0.03;
-/// Most delays that are tracked.
+/// Largest number of tracked delays.
 const MOST: usize = 128;
 
 /// One recursion for each delay.
 pub(crate) struct DelayBank {
     members: Vec<Box<dyn Recursion>>,
-    /// nk of the first.
+    /// nk of the first recursion.
     first_nk: usize,
     sample_time_s: f64,
     /// gamma.
@@ -68,10 +68,10 @@ impl State for DelayBank {
 }
 
 impl DelayBank {
-    /// For the range of a setup; `build` makes the recursion of a setup with one delay.
+    /// Builds the bank for the delay range of a setup; `build` makes the recursion of a setup with one delay.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a range of too many samples; those of `build`.
+    /// [`IdentError::BadOption`] for a range of too many samples; the errors of `build`.
     pub(crate) fn new(
         setup: &Setup,
         (low_s, high_s): (f64, f64),
@@ -95,7 +95,7 @@ impl DelayBank {
         };
         let members = (first_nk..=last_nk).map(of).collect::<Result<Vec<_>, _>>()?;
         let count = members.len();
-        // The delay of the start fit, where it lies in the range.
+        // The delay of the start fit, if it lies in the range.
         let best = setup.orders.nk.clamp(first_nk, last_nk) - first_nk;
         let before = |k: usize| -0.5 * ((k as f64 - best as f64) * sample_time.s() / BEFORE_S).powi(2);
         Ok(Self {
@@ -109,7 +109,7 @@ impl DelayBank {
         })
     }
 
-    /// The recursion that is reported.
+    /// Returns the recursion that is reported.
     fn reported(&self) -> &dyn Recursion {
         &*self.members[self.best]
     }

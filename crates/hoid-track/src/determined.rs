@@ -1,19 +1,18 @@
-//! Which parameters of an operator the data determine.
+//! The parameters of an operator that the data determine.
 //!
-//! A parameter is determined where it is more than two standard errors from zero and, where the
-//! method supposes something of it before the first sample, where the data have at least halved that
-//! variance: else what is there is the supposition.
+//! A parameter is determined if it is more than two standard errors from zero and, if the method has a prior of it, if
+//! the data have at least halved the prior variance: otherwise the value is that of the prior.
 
 use hoid_model::uncertainty::OperatorEstimate;
 
 use crate::{Trace, Tracker, methods::Method};
 
-/// Standard errors from zero.
+/// Distance from zero, in standard errors.
 const APART: f64 = 2.0;
-/// Share of the variance before the data that may be left.
+/// Largest remaining share of the prior variance.
 const LEFT: f64 = 0.5;
 
-/// A parameter by its name, and whether it is determined.
+/// Name of a parameter, and whether it is determined.
 pub type Determined = (&'static str, bool);
 
 fn determined(method: &Method, operator: &OperatorEstimate) -> Vec<Determined> {
@@ -36,20 +35,20 @@ fn determined(method: &Method, operator: &OperatorEstimate) -> Vec<Determined> {
 }
 
 impl Tracker {
-    /// Which parameters of the operator are determined now; those without an error are left out.
+    /// Returns which parameters of the operator are determined now; those without a standard error are left out.
     pub fn determined(&self, operator: &OperatorEstimate) -> Vec<Determined> {
         determined(&self.options().method, operator)
     }
 }
 
 impl Trace {
-    /// Which parameters of the operator of a row are determined; those without an error are left out.
+    /// Returns which parameters of the operator of a row are determined; those without a standard error are left out.
     pub fn determined(&self, operator: &OperatorEstimate) -> Vec<Determined> {
         determined(&self.options().method, operator)
     }
 
-    /// Columns that report where a parameter is determined, 1 or 0, for methods that suppose
-    /// something before the first sample: `K_e_determined` and so on.
+    /// Columns that show for each parameter whether it is determined, 1 or 0, for methods with a prior:
+    /// `K_e_determined` and so on.
     pub fn determined_columns(
         &self,
         operators: &[Result<OperatorEstimate, hoid_model::NotConvertible>],

@@ -1,4 +1,4 @@
-//! Options as text, as results and reports print them.
+//! Options as text, for results and reports.
 
 use hoid_model::SampleTime;
 
@@ -7,7 +7,7 @@ use crate::{
 };
 
 impl TrackOptions {
-    /// Memory of the recursion.
+    /// Returns the memory of the recursion as text.
     pub fn memory_as_text(&self, sample_time: SampleTime) -> String {
         let method = &self.method;
         if let Some(words) = method.memory_as_text() {
@@ -33,7 +33,7 @@ impl TrackOptions {
         }
     }
 
-    /// Each memory once, with the parameters that have it.
+    /// Lists each memory once, with the parameters that have it.
     fn memories_as_text(&self, sample_time: SampleTime) -> String {
         let mut groups: Vec<(Memory, Vec<String>)> = Vec::new();
         for (name, memory) in self
@@ -54,7 +54,7 @@ impl TrackOptions {
         groups.iter().map(of).collect::<Vec<_>>().join(", ")
     }
 
-    /// Where the recursion starts.
+    /// Returns the start of the recursion as text.
     pub fn start_as_text(&self) -> String {
         if let Some(prior) = self.method.person_prior() {
             return prior.as_text();
@@ -73,7 +73,7 @@ impl TrackOptions {
 }
 
 impl Memory {
-    /// With its unit, in samples and seconds.
+    /// Returns the memory with its unit, in samples and seconds.
     pub fn as_text(self, sample_time: SampleTime) -> String {
         let ts = sample_time.s();
         let round = |v: f64| (v * 1e6).round() / 1e6;

@@ -1,4 +1,4 @@
-//! How a recursion forgets.
+//! Rules of forgetting.
 
 use std::collections::BTreeMap;
 
@@ -7,10 +7,10 @@ use hoid_ident::{
     settings::{Bounds, Kind, Setting, Settings, Value},
 };
 
-/// Rate of the gradient when none is given.
+/// Rate of the gradient if none is given.
 const DEFAULT_RATE: f64 = 0.1;
 
-/// The words for the rules.
+/// Names of the rules.
 const WORDS: [&str; 6] = [
     "exponential",
     "random-walk",
@@ -20,18 +20,18 @@ const WORDS: [&str; 6] = [
     "gradient",
 ];
 
-/// How the recursion forgets.
+/// Rule of forgetting of a recursion.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum ForgettingRule {
-    /// A factor for each parameter; with equal memories the scalar factor.
+    /// A factor for each parameter; for equal memories the scalar factor.
     #[default]
     Exponential,
-    /// Random walk: the standard deviation by which each parameter drifts in one second, in its
-    /// unit. Parameters that are not named do not drift.
+    /// Random walk: the standard deviation of the drift of each parameter in one second, in its unit. Parameters that
+    /// are not named do not drift.
     RandomWalk(BTreeMap<String, f64>),
-    /// Sliding rectangular window as long as the shortest memory.
+    /// Sliding rectangular window of the length of the shortest memory.
     Window,
-    /// Variable factor with the shortest memory while innovations are as expected.
+    /// Variable factor, with the shortest memory while the innovations are as expected.
     Variable,
     /// Directional forgetting with the shortest memory.
     Directional,
@@ -39,7 +39,7 @@ pub enum ForgettingRule {
     Gradient(f64),
 }
 
-/// The rule of a word, without what belongs to it.
+/// Reads the rule from its name, without the options that belong to it.
 impl Value for ForgettingRule {
     const KIND: Kind = Kind::Choice(&WORDS);
 
@@ -97,7 +97,7 @@ impl ForgettingRule {
         }
     }
 
-    /// Checks that the rule has what it needs.
+    /// Checks that the options that the rule needs are given.
     ///
     /// # Errors
     /// [`IdentError::BadOption`].
@@ -118,7 +118,7 @@ impl ForgettingRule {
     }
 }
 
-/// `forgetting` comes first: what belongs to one rule is refused by the others.
+/// `forgetting` comes first: the options of one rule are refused by the others.
 impl Settings for ForgettingRule {
     fn list(&self) -> Vec<Setting> {
         vec![Self::rule(), Self::drift(), Self::rate()]

@@ -1,4 +1,4 @@
-//! The adaptation that the options ask for.
+//! The adaptation that the options select.
 
 use hoid_core::{
     adaptation::{Adaptation, Forgetting, ParameterStep},
@@ -15,19 +15,18 @@ use hoid_ident::IdentError;
 
 use crate::{forgetting::ForgettingRule, setup::Setup, shared_options::WindupGuard, start::StartState};
 
-/// Where nothing excites a parameter, its variance in P may grow to this multiple of the level that
-/// it has with the excitation of the start fit: the gain after a silence is that of three times the
-/// typical standard error.
+/// Limit of the variance of an unexcited parameter in P, as a multiple of its level with the excitation of the start
+/// fit: the gain after a silence is that of three times the typical standard error.
 const ROOM_TO_GROW: f64 = 10.0;
-/// The same for a start covariance that comes from no fit, as a multiple of it.
+/// The same for a start covariance that does not come from a fit, as a multiple of it.
 pub const ROOM_WITHOUT_FIT: f64 = 1e4;
-/// Growing memory of a start without a fit: what the first sample forgets, and the share of it that
-/// the next one forgets still.
+/// Growing memory of a start without a fit: additional forgetting at the first sample, and its decay from sample to
+/// sample.
 const EARLY_FORGETTING: f64 = 0.01;
 const EARLY_SHARE: f64 = 0.9993;
 /// Smallest factor of variable forgetting: a memory of ten samples.
 const SMALLEST_FACTOR: f64 = 0.9;
-/// Memory of the innovation variance in units of the shortest memory of a parameter.
+/// Memory of the innovation variance, in units of the shortest memory of a parameter.
 const LEVEL_MEMORIES: f64 = 4.0;
 
 /// The adaptations of the kernel as one type, so that each recursion is compiled once.
@@ -48,13 +47,12 @@ impl<const N: usize> State for Gain<N> {
 }
 
 impl<const N: usize> Gain<N> {
-    /// The adaptation with room for N parameters. With `growing` a start without a fit has a
-    /// growing memory: gradients on the way from a start that no data speak for must not be
-    /// remembered for ever; least squares has none.
+    /// Builds the adaptation with capacity for N parameters. With `growing`, a start without a fit has a growing
+    /// memory: gradients of early estimates without support in the data must be forgotten. Least squares has no such
+    /// gradients.
     ///
     /// # Errors
-    /// [`IdentError`] for options that contradict each other, or a start covariance that is not
-    /// positive.
+    /// [`IdentError`] for options that contradict each other, or a start covariance that is not positive.
     pub fn new(setup: &Setup, from: &StartState, sample_time: SampleTime, growing: bool) -> Result<Self, IdentError> {
         let p = from.values.len();
         let lambda = setup
@@ -63,8 +61,7 @@ impl<const N: usize> Gain<N> {
             .map(|(_, memory)| memory.lambda(sample_time))
             .collect::<Result<Vec<f64>, _>>()?;
         let shortest = lambda.iter().copied().fold(1.0, f64::min);
-        // Where no fit shows what the innovation variance is, P and drift are in the units of the
-        // parameters.
+        // Without a fit the innovation variance is unknown, and P and drift are in the units of the parameters.
         let unit = if from.variance > 0.0 { from.variance } else { 1.0 };
         let padded =
             |values: &[f64], fill: f64| -> [f64; N] { std::array::from_fn(|i| values.get(i).copied().unwrap_or(fill)) };
@@ -143,7 +140,7 @@ impl<const N: usize> Gain<N> {
 
 /// A gain with a covariance that can be changed from outside.
 pub trait Scaled {
-    /// P times a factor; false if there is no P that stays.
+    /// Multiplies P by a factor; false if there is no P.
     fn scale(&mut self, factor: f64) -> bool;
 }
 
@@ -196,7 +193,7 @@ impl<const N: usize> Adaptation<N> for Gain<N> {
     }
 }
 
-/// The error bars at the start, with room for N parameters and the errors of K filters.
+/// Returns the error bars at the start, with capacity for N parameters and the errors of K filters.
 ///
 /// # Errors
 /// [`IdentError::BadOption`] for a memory that is too short.

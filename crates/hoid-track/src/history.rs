@@ -2,18 +2,16 @@
 
 use hoid_core::state::{State, visit_all};
 
-/// Largest size of a value in a recursion. Its fourth power is still a number, so that covariances
-/// of filtered signals are.
+/// Largest size of a value in a recursion. Its fourth power is still finite, so that covariances of filtered signals
+/// are.
 const LARGEST: f64 = 1e60;
 
-/// The value as a recursion takes it: within 1e60, and zero if a product of large numbers has no
-/// value.
+/// Limits a value to 1e60; NaN, as from products of large numbers, becomes zero.
 pub fn bounded(x: f64) -> f64 {
     if x.is_nan() { 0.0 } else { x.clamp(-LARGEST, LARGEST) }
 }
 
-/// The last n values in one slice. Each is written twice, n places apart, so that nothing is ever
-/// moved.
+/// The last n values in one slice. Each is written twice, n places apart, so that nothing is moved.
 #[derive(Debug, Clone)]
 pub struct History {
     values: Vec<f64>,
@@ -28,7 +26,7 @@ impl State for History {
 }
 
 impl History {
-    /// n zeros.
+    /// A history of n zeros.
     pub fn new(n: usize) -> Self {
         Self {
             values: vec![0.0; 2 * n],
@@ -37,7 +35,7 @@ impl History {
         }
     }
 
-    /// Takes the next value; the oldest one goes.
+    /// Takes the next value; the oldest one is dropped.
     pub fn push(&mut self, x: f64) {
         if self.n == 0 {
             return;
@@ -48,13 +46,13 @@ impl History {
         self.values[self.at + self.n] = x;
     }
 
-    /// `[x(t), x(t-1), ..., x(t-n+1)]` when x(t) was the last value taken.
+    /// Returns `[x(t), x(t-1), ..., x(t-n+1)]`, with x(t) the last value.
     pub fn newest(&self) -> &[f64] {
         &self.values[self.at..self.at + self.n]
     }
 }
 
-/// `sum c_i x(t-i)` over as many terms as there are coefficients.
+/// Returns `sum c_i x(t-i)` over as many terms as there are coefficients.
 pub fn weighted(coefficients: &[f64], past: &[f64]) -> f64 {
     coefficients.iter().zip(past).map(|(c, x)| c * x).sum()
 }

@@ -1,11 +1,10 @@
 //! The idle head of a record: what was recorded before the run started.
 //!
-//! A person who waits for the run to start is not tracking. A fit of such samples takes a delay and
-//! poles from nothing, and gives them small standard errors. The head is the longest run of first
-//! samples in which both e and u stay within [`SHARE`] of their later size about their first second,
-//! or within a step of their resolution; the size is the 90 % quantile of the distance from the
-//! median in the second half of the record. A head shorter than [`LEAST_S`] is none: signals start
-//! near zero.
+//! A person who waits for the run to start is not tracking. A fit of such samples gives a delay and poles without
+//! information, with small standard errors. The head is the longest run of first samples in which both e and u stay
+//! within [`SHARE`] of their later size about their first second, or within a step of their resolution; the size is
+//! the 90 % quantile of the distance from the median in the second half of the record. A head shorter than [`LEAST_S`]
+//! does not count: signals start near zero.
 
 use hoid_model::Record;
 use hoid_numerics::statistics::{upper_median, upper_quantile};
@@ -14,15 +13,15 @@ use hoid_numerics::statistics::{upper_median, upper_quantile};
 const SHARE: f64 = 0.02;
 /// Shortest head, s.
 const LEAST_S: f64 = 1.0;
-/// Quantile that is the size of a signal.
+/// Quantile that defines the size of a signal.
 const SIZE: f64 = 0.9;
-/// Steps of the resolution that are nothing.
+/// Number of steps of the resolution that count as constant.
 const STEPS: f64 = 1.01;
 /// Largest step of a resolution, as a share of the size.
 const COARSE: f64 = 0.2;
 
-/// Samples at the start of a record in which neither e nor u moves; 0 where there are few, all
-/// where neither ever moves.
+/// Returns the number of samples at the start of a record in which neither e nor u moves; 0 for a short head, and all
+/// samples if neither ever moves.
 pub fn idle_head(record: &Record) -> usize {
     let second = (1.0 / record.sample_time().s()).round().max(1.0) as usize;
     let still = |signal: &[f64]| {
@@ -57,8 +56,7 @@ pub fn idle_head(record: &Record) -> usize {
     }
 }
 
-/// The span of a record that gives the start fit when none is named, s: the first third after the
-/// idle head.
+/// Returns the default span of the start fit, s: the first third after the idle head.
 pub fn default_start_span(record: &Record) -> (f64, f64) {
     let head = match idle_head(record) {
         all if all >= record.len() => 0,
@@ -107,7 +105,7 @@ mod tests {
             assert!((1490..1540).contains(&head), "{head}");
             let (from, to) = default_start_span(&idle);
             assert!((from - 15.0).abs() < 0.5 && (to - from - third).abs() < 0.2);
-            // Half a second is not worth a word, and e alone no rest.
+            // Half a second is not reported, and e alone is not idle.
             assert_eq!(idle_head(&with_head(&record, &noise[..50], &offset[..50])), 0);
             let moving: Vec<f64> = (0..1500).map(|k| (f64::from(k) * 0.02).sin()).collect();
             assert_eq!(idle_head(&with_head(&record, &moving, &offset)), 0);

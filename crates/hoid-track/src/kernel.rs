@@ -1,5 +1,5 @@
-//! The recursions of the real-time kernel after one face: room for the parameters, the delay line,
-//! the covariance in units of the parameters.
+//! The recursions of the real-time kernel with a common interface: capacity for the parameters, the delay line, the
+//! covariance in units of the parameters.
 
 use hoid_core::{
     adaptation::Adaptation,
@@ -30,7 +30,7 @@ pub enum Kernel {
     PredictionError(Regressor),
 }
 
-/// The refusal of more parameters than there is room for.
+/// Error for more parameters than there is capacity for.
 pub fn too_many(parameters: usize) -> IdentError {
     IdentError::BadOption {
         option: "the orders of a recursion".to_owned(),
@@ -43,14 +43,14 @@ pub fn too_many(parameters: usize) -> IdentError {
 pub struct Plan<'a> {
     /// Structure, orders and options.
     pub setup: &'a Setup,
-    /// Where it starts.
+    /// Start of the recursion.
     pub from: &'a StartState,
     /// Time between samples.
     pub sample_time: SampleTime,
 }
 
 impl<'a> Plan<'a> {
-    /// From setup and start.
+    /// Builds a plan from setup and start.
     pub fn new(setup: &'a Setup, from: &'a StartState, sample_time: SampleTime) -> Self {
         Self {
             setup,
@@ -59,12 +59,11 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// Builds a recursion of the kernel: the smallest room that holds its parameters, and the
-    /// orders in its type where they are those of the operator.
+    /// Builds a recursion of the kernel: with the smallest capacity for its parameters, and with the orders in its
+    /// type if they are those of the operator.
     ///
     /// # Errors
-    /// [`IdentError`] for options that contradict each other or a start that the recursion cannot
-    /// take.
+    /// [`IdentError`] for options that contradict each other, or a start that the recursion cannot use.
     pub fn build(&self, kernel: Kernel) -> Result<Box<dyn Recursion>, IdentError> {
         let o = self.setup.polynomial_orders();
         let p = self.from.values.len();
@@ -94,7 +93,7 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// The start, with room for N parameters.
+    /// Returns the start values, with capacity for N parameters.
     pub fn values<const N: usize>(&self) -> [f64; N] {
         std::array::from_fn(|i| self.from.values.get(i).copied().unwrap_or(0.0))
     }
@@ -107,15 +106,15 @@ impl<'a> Plan<'a> {
         Gain::new(self.setup, self.from, self.sample_time, growing)
     }
 
-    /// The error bars at the start, as [`gain::error_bars`].
+    /// Returns the error bars at the start, as [`gain::error_bars`].
     ///
     /// # Errors
-    /// As those.
+    /// As there.
     pub fn bars<const N: usize, const K: usize>(&self) -> Result<ErrorBars<N, K>, IdentError> {
         gain::error_bars(self.setup, self.from, self.sample_time)
     }
 
-    /// Number of parameters.
+    /// Returns the number of parameters.
     pub fn parameters(&self) -> usize {
         self.from.values.len()
     }

@@ -6,7 +6,7 @@
 //! `theta(t) = theta(t-1) + P(t) psi(t) eps(t)`,
 //!
 //! and forgets the past, so that it can follow (L. Ljung, *System Identification*, 1999, chapter
-//! 11). The methods differ in psi, in what theta is, and in what they suppose of the change.
+//! 11). The methods differ in psi, in the parameters theta, and in their prior of the change.
 //!
 //! ```
 //! use hoid_model::scenario::{Condition, Scenario};
@@ -49,15 +49,15 @@
 //! | `validation` | what a trace explains of another run; the covariance at the start that this chooses |
 //! | `change` | [`Change`]: when a person changed |
 //!
-//! **A recursion starts with what is known.** By default it is the batch fit of the first third of
-//! a record, with the covariance of that fit; until the end of that span the filters follow and the
-//! estimate stays, so that no sample counts twice and the error bars hold. With the text's own
-//! start, `P_0 = 0.1 I` (eq. 38, 5.41, 5.55), the estimate moves from the first sample on.
+//! **A recursion starts from the available knowledge.** By default this is the batch fit of the first third of a
+//! record, with the covariance of that fit; until the end of that span the filters follow and the estimate stays
+//! constant, so that no sample counts twice and the error bars are valid. With the start of the thesis, `P_0 = 0.1 I`
+//! (eq. 38, 5.41, 5.55), the estimate moves from the first sample on.
 //!
-//! **Samples that are not as they should be** never reach the filters. A value is a fault when it is not a finite
-//! number or larger than [`TrackOptions::largest`]. An error e is then replaced by the last good one, an output u by
-//! the one-step prediction, and the estimate stays at that sample. Each is counted. After a guard (`guard`; by default
-//! for `adaptive`) so are outliers and spans that no tracking makes.
+//! **Faulty samples** never reach the filters. A value is a fault if it is not a finite number or is larger than
+//! [`TrackOptions::largest`]. A faulty error e is replaced by the last good one and a faulty output u by the one-step
+//! prediction, and the estimate stays constant at that sample. Each is counted. With a guard (`guard`; by default for
+//! `adaptive`) the same holds for outliers and for spans that no tracking produces.
 
 pub mod building;
 mod change;

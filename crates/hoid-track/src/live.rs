@@ -1,4 +1,4 @@
-//! The recursion of a stream: the warm-up that its start fit is made of, then the tracker.
+//! The recursion of a stream: the warm-up for the start fit, then the tracker.
 
 use std::collections::VecDeque;
 
@@ -15,34 +15,34 @@ use hoid_ident::{Choice, IdentError};
 /// Computes the options from a record of the warm-up, with the searched values.
 pub type Choose<'a> = &'a dyn Fn(&Record) -> Result<(TrackOptions, Option<Choice>), IdentError>;
 
-/// Share of the warm-up that is collected in addition after a fit that failed.
+/// Share of the warm-up that is collected in addition after a failed fit.
 const QUARTER: usize = 4;
-/// For a warm-up that continues, so many times its length is kept.
+/// Length that is kept of a warm-up that continues, as a multiple of its length.
 const KEPT: usize = 2;
-/// Longest run of faulty samples within a warm-up, s; after a longer one it starts again.
+/// Longest run of faulty samples within a warm-up, s; after a longer one the warm-up restarts.
 const LONGEST_FAULT_S: f64 = 1.0;
 
-/// Where the recursion is.
+/// State of a live recursion.
 #[derive(Debug)]
 pub enum Live {
     /// The samples of the start fit are being collected.
     Collecting(WarmUp),
-    /// The estimate is there.
+    /// The tracker is running.
     Tracking(Box<Tracker>),
 }
 
 /// Result of a sample.
 #[derive(Debug, Default)]
 pub struct LiveOutcome {
-    /// Report of the tracker, once there is one.
+    /// Outcome of the tracker, once there is one.
     pub outcome: Option<Outcome>,
-    /// Options and search of a start fit that has just been made.
+    /// Options and search of a start fit that was made at this sample.
     pub started: Option<(TrackOptions, Option<Choice>)>,
 }
 
 impl Live {
-    /// A recursion that starts at once where its start is given, else with a warm-up of a given
-    /// number of samples.
+    /// Builds a recursion that starts at once if its start is given, else after a warm-up of a given number of
+    /// samples.
     ///
     /// # Errors
     /// [`IdentError`] for a start that cannot be used.
@@ -53,8 +53,8 @@ impl Live {
         })
     }
 
-    /// All that changes as numbers, and the orders once there is a tracker, for [`Live::restored`]. It
-    /// does not change.
+    /// Returns everything that changes as numbers, and the orders once there is a tracker, for [`Live::restored`]. The
+    /// recursion does not change.
     pub fn saved(&mut self) -> (Option<Orders>, Vec<f64>) {
         match self {
             Self::Tracking(tracker) => (Some(tracker.options().orders), tracker.saved()),
@@ -62,11 +62,11 @@ impl Live {
         }
     }
 
-    /// The recursion that [`Live::saved`] was asked of, from its plan.
+    /// Restores the recursion that [`Live::saved`] returned, from its plan.
     ///
     /// # Errors
-    /// [`IdentError::BadStart`] for numbers of another recursion, and for such that were changed or
-    /// cut; those of [`Tracker::new`].
+    /// [`IdentError::BadStart`] for numbers of another recursion, and for numbers that were changed or cut; the errors
+    /// of [`Tracker::new`].
     pub fn restored(
         plan: &TrackPlan,
         orders: Option<Orders>,
@@ -83,8 +83,8 @@ impl Live {
         Ok(Self::Tracking(Box::new(tracker)))
     }
 
-    /// Takes a sample; NaN represents faulty values or missing. The fit of the warm-up is made when
-    /// its last sample comes, with the options that `choose` gives for it.
+    /// Takes a sample; NaN marks faulty or missing values. The fit of the warm-up is made at its last sample, with the
+    /// options that `choose` returns for it.
     pub fn update(&mut self, sample: Sample, choose: Choose<'_>) -> LiveOutcome {
         let warm_up = match self {
             Self::Tracking(tracker) => {
@@ -120,19 +120,19 @@ impl Live {
     }
 }
 
-/// Samples that are collected for the start fit.
+/// The samples that are collected for the start fit.
 #[derive(Debug)]
 pub struct WarmUp {
     length: usize,
     sample_time: SampleTime,
     samples: VecDeque<Sample>,
-    /// Samples since the collection started.
+    /// Number of samples since the collection started.
     pub collected: usize,
-    /// How many there are to be when the fit is tried.
+    /// Number of samples at which the fit is tried.
     pub needed: usize,
-    /// Why the last start fit failed, or the collection started again.
+    /// Reason why the last start fit failed or the collection restarted.
     pub trouble: Option<String>,
-    /// Faulty samples at the end.
+    /// Number of faulty samples at the end.
     faulty: usize,
 }
 
@@ -165,16 +165,15 @@ impl State for WarmUp {
 }
 
 impl WarmUp {
-    /// The warm-up as numbers, for [`WarmUp::restored`]; the trouble of the last fit is not among
-    /// them.
+    /// Returns the warm-up as numbers, for [`WarmUp::restored`]; the reason of the last failure is not among them.
     pub fn saved(&mut self) -> Vec<f64> {
         let mut numbers = Vec::new();
         self.visit(&mut |number| numbers.push(*number));
         sealed(numbers)
     }
 
-    /// The warm-up that [`WarmUp::saved`] was asked of. `None` for the numbers of something else, and
-    /// for such that were changed or cut.
+    /// Restores the warm-up that [`WarmUp::saved`] returned. `None` for numbers of something else, and for numbers
+    /// that were changed or cut.
     pub fn restored(sample_time: SampleTime, numbers: &[f64]) -> Option<Self> {
         let mut warm_up = Self::new(0, sample_time);
         let mut left = opened(numbers)?.iter();
@@ -198,7 +197,7 @@ impl WarmUp {
         }
     }
 
-    /// Takes a sample. The collection starts with a sound one, and starts again after a long fault.
+    /// Takes a sample. The collection starts with a sound sample, and restarts after a long fault.
     fn collect(&mut self, sample: Sample) {
         let sound = sample.e.is_finite() && sample.u.is_finite();
         self.faulty = if sound { 0 } else { self.faulty + 1 };
@@ -219,8 +218,7 @@ impl WarmUp {
         self.collected += 1;
     }
 
-    /// Leaves out the data before the run, and collects as much in its place; false if there is
-    /// nothing of the kind.
+    /// Leaves out the idle head, and collects as many samples in its place; false if there is none.
     fn leave_out_idle(&mut self) -> bool {
         let Ok(record) = self.record() else { return false };
         let idle = idle_head(&record);
@@ -236,7 +234,7 @@ impl WarmUp {
         true
     }
 
-    /// The tracker with the batch fit of what was collected, its filters warm.
+    /// Builds the tracker with the batch fit of the collected samples and with settled filters.
     fn start(&self, choose: Choose<'_>) -> Result<(Tracker, Option<Choice>), IdentError> {
         let record = self.record()?;
         let (options, choice) = choose(&record)?;
@@ -247,7 +245,7 @@ impl WarmUp {
         Ok((tracker, choice))
     }
 
-    /// The collected samples as a record; a faulty value is the last good one.
+    /// Returns the collected samples as a record; a faulty value is replaced by the last good one.
     fn record(&self) -> Result<Record, IdentError> {
         let channel = |name: &str, of: fn(&Sample) -> f64| {
             let mut last = self.samples.iter().map(of).find(|v| v.is_finite()).unwrap_or(0.0);

@@ -1,9 +1,8 @@
 //! Self-description of a recursive method.
 //!
-//! A method is a file or folder: its options (a struct made by `settings!`), [`RecursiveMethod`] for
-//! them, and the [`Recursion`] that it builds. That makes it a [`Method`](crate::Method), in this crate or
-//! in any other; a line in the list of `hoid-survey` gives it to the command line, plans, Python and
-//! the book.
+//! A method is a file or folder: its options (a struct made by `settings!`), [`RecursiveMethod`] for them, and the
+//! [`Recursion`] that it builds. That makes it a [`Method`](crate::Method), in this or any other crate; a line in the
+//! list of `hoid-survey` adds it to the command line, plans, Python and the book.
 
 use std::{any::Any, collections::BTreeMap, fmt};
 
@@ -26,28 +25,27 @@ use crate::{
     two_sided::{Causal, TwoSided},
 };
 
-/// The words for a method.
+/// Name and description of a method.
 pub struct About {
     /// Name as typed.
     pub name: &'static str,
-    /// Its definition, in a line without a full stop.
+    /// Definition, in one line without a full stop.
     pub help: &'static str,
-    /// Where it comes from.
+    /// Source.
     pub source: &'static str,
-    /// The structures that it serves; the first is that of the method when none is named, except
-    /// for Box-Jenkins where it is among them.
+    /// Supported structures; the first is the default, except that Box-Jenkins is the default if it is among them.
     pub structures: &'static [Structure],
-    /// Defaults, as text, of options that it shares with others.
+    /// Defaults, as text, of options that are shared with other methods.
     pub defaults: &'static [(&'static str, &'static str)],
 }
 
 /// Object-safe operations of a method: clone and comparison.
 pub trait Boxed: fmt::Debug + Send + Sync {
-    /// A copy.
+    /// Returns a copy.
     fn boxed(&self) -> Box<dyn RecursiveMethod>;
-    /// Whether the other is the same method with the same options.
+    /// True if the other is the same method with the same options.
     fn is_same(&self, other: &dyn RecursiveMethod) -> bool;
-    /// As of any type.
+    /// Returns it as a value of any type.
     fn as_any(&self) -> &dyn Any;
 }
 
@@ -67,21 +65,21 @@ impl<M: RecursiveMethod + Clone + PartialEq + 'static> Boxed for M {
 
 /// A recursive method with its options.
 pub trait RecursiveMethod: Settings + Boxed + 'static {
-    /// The words for it.
+    /// Returns its name and description.
     fn about(&self) -> About;
 
-    /// What it was called before, where that is still read.
+    /// Returns its earlier name, if that is still accepted.
     fn earlier_name(&self) -> Option<&'static str> {
         None
     }
 
-    /// Memory of a parameter when none is given.
+    /// Memory of a parameter if none is given.
     fn default_memory(&self, parameter: &str) -> Memory;
 
     /// Builds the recursion.
     ///
     /// # Errors
-    /// [`IdentError`] for options that contradict each other, or a start that it cannot take.
+    /// [`IdentError`] for options that contradict each other, or a start that the method cannot use.
     fn build(
         &self,
         setup: &Setup,
@@ -103,18 +101,18 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         Ok(())
     }
 
-    /// Order of the noise model when none is named; none if that of the structure is taken.
+    /// Order of the noise model if none is named; none for that of the structure.
     fn default_nd(&self) -> Option<usize> {
         None
     }
 
-    /// True for a method that estimates the operator's parameters.
+    /// True for a method that estimates the parameters of the operator.
     fn is_physical(&self) -> bool {
         false
     }
 
-    /// True for a method that has a model of how the person changes, and no memory: physical
-    /// parameters after the noise model of a batch fit, which stays.
+    /// True for a method with a model of how the person changes, and without memory: it estimates physical parameters
+    /// with the noise model of a batch fit, which stays constant.
     fn is_model_of_change(&self) -> bool {
         false
     }
@@ -124,7 +122,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         false
     }
 
-    /// Lag of the basis in which it estimates gains, s; `None` without one.
+    /// Lag of the basis in which the gains are estimated, s; `None` without a basis.
     fn lag_of_basis_s(&self) -> Option<f64> {
         None
     }
@@ -134,7 +132,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         false
     }
 
-    /// That estimate, a row for each of a causal trace.
+    /// Computes that estimate, a row for each row of a causal trace.
     ///
     /// # Errors
     /// [`IdentError::BadStart`] for a start that cannot be used.
@@ -142,27 +140,27 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         Ok(Vec::new())
     }
 
-    /// True for a method that fits what it keeps again: it starts from no coefficients and waits for nothing.
+    /// True for a method that fits its stored samples again: it needs no start coefficients and no warm-up.
     fn fits_anew(&self) -> bool {
         false
     }
 
-    /// What it remembers, as text, where that is not a memory of parameters.
+    /// Describes the memory as text, if it is not a memory of parameters.
     fn memory_as_text(&self) -> Option<String> {
         None
     }
 
-    /// The options of its gain, where that is the kernel's.
+    /// Options of its gain, if it uses that of the kernel.
     fn gain(&self) -> Option<&GainOptions> {
         None
     }
 
-    /// Its memories, where it has some.
+    /// Options of its memories, if it has any.
     fn memories(&self) -> Option<&MemoryOptions> {
         self.gain().map(|gain| &gain.memories)
     }
 
-    /// How it forgets.
+    /// Rule of forgetting.
     fn forgetting(&self) -> ForgettingRule {
         self.gain()
             .map_or(ForgettingRule::Exponential, |gain| gain.forgetting.clone())
@@ -173,24 +171,22 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         self.gain().and_then(|gain| gain.covariance)
     }
 
-    /// Multiple of the innovation's standard deviation beyond which an innovation moves the
-    /// estimate no further.
+    /// Limit of an innovation in the update, in standard deviations of the innovation.
     fn limit(&self) -> f64 {
         f64::INFINITY
     }
 
-    /// How far P may grow where nothing excites a parameter; none if that follows from the start.
+    /// Limit of P where nothing excites a parameter; none if that follows from the start.
     fn windup_guard(&self, _structure: Structure) -> Option<WindupGuard> {
         self.gain().and_then(|gain| gain.windup_guard)
     }
 
-    /// Whether a guard is in front of it, or that was refused; none if nothing was specified and its own default is to
-    /// have none.
+    /// Whether a guard was requested or refused; none if nothing was specified and the default is to have none.
     fn guard(&self) -> Option<GuardChoice> {
         None
     }
 
-    /// True if a guard is in front of it.
+    /// True with a guard.
     fn is_guarded(&self) -> bool {
         self.guard() == Some(GuardChoice::Yes)
     }
@@ -200,50 +196,49 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         Stable::Predictor
     }
 
-    /// Bounds of physical parameters.
+    /// Bounds of the physical parameters.
     fn bounds(&self) -> BTreeMap<String, Constraint> {
         BTreeMap::new()
     }
 
-    /// Range of tau_e in s that it follows.
+    /// Range of the tracked delay tau_e, s.
     fn track_delay_s(&self) -> Option<(f64, f64)> {
         None
     }
 
-    /// True if tau_e, when it is followed, is one of the parameters that move.
+    /// True if a tracked tau_e is one of the estimated parameters.
     fn delay_is_parameter(&self) -> bool {
         false
     }
 
-    /// Channel of the signal from outside the loop that it takes.
+    /// Channel of the external signal that the method uses.
     fn reference_channel(&self) -> Option<&str> {
         None
     }
 
-    /// Prior knowledge of the person before the first sample, where that is an option.
+    /// Prior knowledge of the person before the first sample, for methods with that option.
     fn person_prior(&self) -> Option<&PersonPrior> {
         None
     }
 
-    /// Standard deviations of omega_nm in rad/s, zeta_nm and tau_e in s before the first sample, where
-    /// the method supposes some.
+    /// Prior standard deviations of omega_nm in rad/s, zeta_nm and tau_e in s, for methods with a prior.
     fn spread_before(&self) -> Option<[f64; 3]> {
         None
     }
 
-    /// Takes the prior knowledge of the person; false if that is not an option.
+    /// Sets the prior knowledge of the person; false for methods without that option.
     fn set_person_prior(&mut self, _prior: PersonPrior) -> bool {
         false
     }
 
-    /// Takes settings with a default from a record.
+    /// Sets the options that have a default from a record.
     fn prepare(&mut self, _record: &Record) {}
 
-    /// Leaves out what was reported about parameters that are not known.
+    /// Removes the options of parameters that do not exist.
     fn retain(&mut self, _known: &dyn Fn(&str) -> bool) {}
 }
 
-/// Known properties of a method.
+/// Returns the known properties of a method.
 pub fn spec(method: &dyn RecursiveMethod) -> MethodSpec {
     let about = method.about();
     let own = |setting: Setting| match about.defaults.iter().find(|(name, _)| *name == setting.name) {
@@ -259,7 +254,7 @@ pub fn spec(method: &dyn RecursiveMethod) -> MethodSpec {
     }
 }
 
-/// An error about an option.
+/// Builds an error about an option.
 pub fn bad(option: &str, found: String, expected: &str) -> IdentError {
     IdentError::BadOption {
         option: option.to_owned(),
@@ -284,7 +279,7 @@ pub fn check_operator_orders(name: &str, setup: &Setup) -> Result<(), IdentError
     Ok(())
 }
 
-/// Checks that the delay leaves room for the hold.
+/// Checks that the delay is long enough for the hold.
 ///
 /// # Errors
 /// [`IdentError::BadOption`].

@@ -1,19 +1,18 @@
-//! Crossover frequency and phase margin of an estimate with the controlled element that the person
-//! had.
+//! Crossover frequency and phase margin of an estimate with the controlled element of the run.
 //!
-//! `L(omega) = Y(omega) Y_c(j omega)`, Y the sampled response of the estimate. Where the crossover is
-//! and how it moves with `dL/L` is that of batch fits ([`Crossover`]); `dL/L = dY/Y`, whose covariance is
-//! that of the real and imaginary part of the response at the crossover.
+//! `L(omega) = Y(omega) Y_c(j omega)`, with Y the sampled response of the estimate. The crossover and its sensitivity
+//! to `dL/L` are computed as for batch fits ([`Crossover`]); `dL/L = dY/Y`, whose covariance is that of the real and
+//! imaginary part of the response at the crossover.
 //!
-//! Nothing is reported where |L| does not fall through one, and where the standard error of the crossover is more than
-//! half of it: to first order it carries no information then.
+//! Nothing is reported if |L| does not fall through one, or if the standard error of the crossover is more than half
+//! of it: the first-order error is then meaningless.
 
 use hoid_ident::family::Crossover;
 use hoid_model::{Complex64, ContinuousTransferFunction, SampleTime, uncertainty::Estimate};
 
 use crate::response::Response;
 
-/// Share of the crossover that its standard error may be.
+/// Largest standard error of the crossover, as a share of it.
 const MOST: f64 = 0.5;
 
 /// Crossover frequency and phase margin.
@@ -25,7 +24,7 @@ pub struct OpenLoop {
     pub phase_margin_deg: Estimate,
 }
 
-/// Why there is no crossover of an estimate.
+/// Reason why an estimate has no crossover.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum NoCrossover {
     /// There is no estimate yet.
@@ -37,7 +36,7 @@ pub enum NoCrossover {
 }
 
 impl NoCrossover {
-    /// In words.
+    /// Returns the reason in words.
     pub fn words(self) -> &'static str {
         match self {
             Self::NoEstimate => "there is no estimate yet",
@@ -48,10 +47,10 @@ impl NoCrossover {
 }
 
 impl OpenLoop {
-    /// Numbers of it.
+    /// Number of values of a packed measure.
     pub(crate) const NUMBERS: usize = 4;
 
-    /// For an estimate whose response is `value`, and with its covariance `whole`.
+    /// Computes the measures of an estimate whose response is `value`, with its covariance `whole`.
     pub(crate) fn of(
         value: impl Fn(f64) -> Option<[f64; 2]>,
         whole: impl Fn(f64) -> Option<Response>,
@@ -69,7 +68,7 @@ impl OpenLoop {
         let found = Crossover::lowest(open_loop, sample_time).ok_or(NoCrossover::NeverFalls)?;
         let there = whole(found.omega_rad_s).ok_or(NoCrossover::NoEstimate)?;
         let [re, im] = there.value;
-        // dY/Y of a change of the real and of the imaginary part.
+        // dY/Y for a change of the real and of the imaginary part.
         let moved =
             [Complex64::new(1.0, 0.0), Complex64::new(0.0, 1.0)].map(|d| found.moved_by(d / Complex64::new(re, im)));
         let estimate = |value: f64, of: usize| {
@@ -87,7 +86,7 @@ impl OpenLoop {
         }
     }
 
-    /// Values and variances, for means; NaN if there is none.
+    /// Packs values and variances, for means; NaN if there are none.
     pub(crate) fn packed(found: Result<Self, NoCrossover>) -> [f64; Self::NUMBERS] {
         let Ok(found) = found else {
             return [f64::NAN; Self::NUMBERS];
@@ -97,7 +96,7 @@ impl OpenLoop {
         [a, b, c, d]
     }
 
-    /// For the numbers of [`OpenLoop::packed`].
+    /// Unpacks the numbers of [`OpenLoop::packed`].
     pub(crate) fn unpacked(numbers: &[f64]) -> Option<Self> {
         let &[a, b, c, d] = numbers else { return None };
         a.is_finite().then_some(Self {
@@ -122,7 +121,7 @@ mod tests {
         operator.response(omega) * Complex64::from_polar((half.sin() / half).powi(2), -half)
     }
 
-    /// The same operator and covariance as a batch fit of the family gives the same measures.
+    /// The same operator and covariance as a batch fit of the family give the same measures.
     #[test]
     fn measures_are_those_of_a_batch_fit() {
         let element = ContinuousTransferFunction::new(&[90.0], &[1.0, 6.0, 0.0]).unwrap();

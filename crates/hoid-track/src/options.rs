@@ -1,4 +1,4 @@
-//! Signals to be tracked, and how.
+//! Options of a recursive estimate.
 
 use hoid_ident::{Estimator, IdentError, SearchOptions};
 use hoid_model::{ContinuousTransferFunction, Orders, Record, SampleTime, Structure};
@@ -13,7 +13,7 @@ use crate::{
     start::check_sample_time,
 };
 
-/// Options of a recursive estimate: the method with its own, and what all methods share.
+/// Options of a recursive estimate: the method with its own options, and those that all methods share.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackOptions {
     /// The method, with its options.
@@ -22,14 +22,14 @@ pub struct TrackOptions {
     pub structure: Structure,
     /// The orders.
     pub orders: Orders,
-    /// Where to start. Default: a batch fit of the first third.
+    /// Start. Default: a batch fit of the first third.
     pub start: StartAt,
-    /// Time from which the estimate moves, s; before that only the filters follow. Default: the end
-    /// of the start span when P is that of its fit, else the start of the record.
+    /// Time from which the estimate moves, s; before it only the filters follow. Default: the end of the start span if
+    /// P is that of its fit, else the start of the record.
     pub update_from_s: Option<f64>,
     /// Limits of the search of start fits and windows.
     pub search: SearchOptions,
-    /// Magnitude of e or u beyond which a sample is taken for a fault. Default 1e6.
+    /// Magnitude of e or u beyond which a sample is a fault. Default 1e6.
     pub largest: f64,
     /// Frequencies at which a trace reports gain and phase, rad/s. Default none.
     pub at_rad_s: Vec<f64>,
@@ -38,10 +38,10 @@ pub struct TrackOptions {
 }
 
 impl TrackOptions {
-    /// Magnitude beyond which a sample is a fault, by default.
+    /// Default magnitude beyond which a sample is a fault.
     pub const LARGEST: f64 = 1e6;
 
-    /// Default options, for the orders given.
+    /// Returns the default options for the given orders.
     pub fn new(method: Method, structure: Structure, orders: Orders) -> Self {
         Self {
             method,
@@ -56,19 +56,18 @@ impl TrackOptions {
         }
     }
 
-    /// The defaults of a method that starts itself and gets no information about the person.
+    /// Returns the defaults of a method that starts itself without prior knowledge of the person.
     pub fn without_prior(method: Method, sample_time: SampleTime) -> Self {
         Self::default_for(method, sample_time.nk(DEFAULT_DELAY_S))
     }
 
-    /// Default options with the structure and the orders that the method takes when none are named,
-    /// for a delay of nk samples.
+    /// Returns the default options with the default structure and orders of the method, for a delay of nk samples.
     pub fn default_for(method: Method, nk: usize) -> Self {
         let (structure, orders) = (method.default_structure(), method.default_orders(nk));
         Self::new(method, structure, orders)
     }
 
-    /// With options of the method set from their texts, as
+    /// Sets options of the method from their texts, as
     /// `[("memory", "256"), ("covariance", "0.1")]`.
     ///
     /// # Errors
@@ -80,7 +79,7 @@ impl TrackOptions {
         Ok(self)
     }
 
-    /// The batch fit from which a recursion starts.
+    /// Returns the batch estimator of the start fit.
     pub fn start_estimator(&self) -> Estimator {
         Estimator {
             search: self.search,
@@ -88,30 +87,30 @@ impl TrackOptions {
         }
     }
 
-    /// The span of a record that gives the start fit, s; none if there is no such fit.
+    /// Returns the span of the start fit in a record, s; none without a start fit.
     pub fn start_span(&self, record: &Record) -> Option<(f64, f64)> {
         let StartAt::Span(span) = self.start else { return None };
         Some(span.unwrap_or_else(|| default_start_span(record)))
     }
 
-    /// Range of tau_e in s where it is one of the parameters that the recursion moves.
+    /// Range of tau_e in s if it is one of the estimated parameters.
     pub(crate) fn delay_parameter_s(&self) -> Option<(f64, f64)> {
         let method = &self.method;
         method.track_delay_s().filter(|_| method.delay_is_parameter())
     }
 
-    /// Names of the parameters that the recursion moves: theta, or the physical ones.
+    /// Returns the names of the estimated parameters: theta, or the physical ones.
     pub fn parameter_names(&self) -> Vec<String> {
         let with_delay = self.delay_parameter_s().is_some();
         parameter_names(&self.orders, self.method.is_physical(), with_delay)
     }
 
-    /// Orders of the polynomials that the method reports.
+    /// Returns the orders of the reported polynomials.
     pub(crate) fn polynomial_orders(&self) -> Orders {
         polynomial_orders(self.orders, self.delay_parameter_s().is_some())
     }
 
-    /// Memory of each parameter, in the order of [`TrackOptions::parameter_names`].
+    /// Returns the memory of each parameter, in the order of [`TrackOptions::parameter_names`].
     ///
     /// # Errors
     /// [`IdentError::UnknownParameter`] for a memory of a parameter that does not exist.
@@ -131,7 +130,7 @@ impl TrackOptions {
         Ok(names.iter().map(of).collect())
     }
 
-    /// Components of the recursion.
+    /// Returns the components of the recursion.
     ///
     /// # Errors
     /// As [`TrackOptions::memories`].
@@ -156,7 +155,7 @@ impl TrackOptions {
         })
     }
 
-    /// As [`TrackOptions::check`], with what depends on the sample time.
+    /// Checks the options as [`TrackOptions::check`] does, and those that depend on the sample time.
     ///
     /// # Errors
     /// [`IdentError`] with the problem.

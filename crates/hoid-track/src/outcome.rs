@@ -1,30 +1,30 @@
-//! Report of a tracker on its samples.
+//! Outcome of a sample, and counts of faulty samples.
 
-/// Samples that were not as they should be.
+/// Counts of faulty samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
-    /// Samples given.
+    /// Number of samples.
     pub samples: u64,
-    /// Samples with a fault in e or u, at which the estimate stayed.
+    /// Number of samples with a fault in e or u, at which the estimate stayed constant.
     pub skipped: u64,
-    /// Samples that the guard held back, or during which it let the estimate stay constant; those
-    /// with a fault in e or u are not among them.
+    /// Number of samples that the guard held back, or during which it kept the estimate constant; those with a fault
+    /// in e or u are not included.
     pub held: u64,
-    /// How often the guard started the estimate again.
+    /// Number of restarts by the guard.
     pub restarts: u64,
-    /// Steps that stability or a bound made shorter.
+    /// Number of steps that stability or a bound shortened.
     pub shortened: u64,
 }
 
-/// Report of a tracker on a sample.
+/// Outcome of a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
-    /// A-priori innovation; `None` at a sample that was skipped or held back.
+    /// A-priori innovation; `None` for a sample that was skipped or held back.
     pub innovation: Option<f64>,
-    /// True when e or u was a fault.
+    /// True if e or u was a fault.
     pub skipped: bool,
-    /// True when the guard held it back, or let the estimate stay constant.
+    /// True if the guard held the sample back, or kept the estimate constant.
     pub held: bool,
-    /// True when stability or a bound made the step shorter.
+    /// True if stability or a bound shortened the step.
     pub shortened: bool,
 }

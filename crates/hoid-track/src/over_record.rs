@@ -36,7 +36,7 @@ pub fn track_from(
     track_with(record, options, every, start, &mut |_, _| {})
 }
 
-/// As [`track_from`]; `each` is called with the tracker after every sample, and with its number.
+/// Tracks as [`track_from`]; `each` is called with the tracker and the number of the sample after every sample.
 pub(crate) fn track_with(
     record: &Record,
     options: &TrackOptions,
@@ -145,13 +145,13 @@ pub(crate) fn track_with(
     Ok(trace)
 }
 
-/// The samples of which a trace has rows.
+/// Samples at which a trace has rows.
 fn kept_rows(samples: usize, every: usize) -> Vec<usize> {
     let kept = |k: &usize| (k + 1).is_multiple_of(every) || k + 1 == samples;
     (0..samples).filter(kept).collect()
 }
 
-/// The signal from outside the loop that the method takes, where it takes one.
+/// Returns the external signal, for methods that use one.
 fn reference<'r>(record: &'r Record, options: &TrackOptions) -> Result<Option<&'r [f64]>, IdentError> {
     let Some(name) = options.method.reference_channel() else {
         return Ok(None);

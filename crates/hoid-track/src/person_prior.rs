@@ -1,5 +1,4 @@
-//! Prior knowledge of a person before the first sample: an option of methods that start without a
-//! fit of the record.
+//! Prior knowledge of a person before the first sample: an option of methods that start without a fit of the record.
 
 use hoid_ident::{
     IdentError,
@@ -14,16 +13,16 @@ pub enum PersonPrior {
     /// Default values for people.
     #[default]
     Population,
-    /// As little as can be: the default values with wide errors.
+    /// As little as possible: the default values with wide errors.
     Nothing,
-    /// The same as by default, except for what is named.
+    /// The default values, except for the named parameters.
     Named(OperatorPrior),
     /// An earlier fit of the person.
     Fit(Box<FittedOperator>),
 }
 
 impl PersonPrior {
-    /// The fit, where it is one.
+    /// Returns the fit, if it is one.
     pub fn fit(&self) -> Option<&FittedOperator> {
         match self {
             Self::Fit(fit) => Some(fit),
@@ -31,7 +30,7 @@ impl PersonPrior {
         }
     }
 
-    /// Refuses samples at another rate than those of the fit.
+    /// Checks that the samples have the rate of the fit.
     ///
     /// # Errors
     /// [`IdentError::BadStart`].
@@ -43,7 +42,7 @@ impl PersonPrior {
             })
     }
 
-    /// Where the estimate starts, as text.
+    /// Returns the start of the estimate as text.
     pub(crate) fn as_text(&self) -> String {
         match self {
             Self::Population => "the defaults for people".to_owned(),
@@ -57,7 +56,7 @@ impl PersonPrior {
         }
     }
 
-    /// The delay that is known, s.
+    /// Returns the known delay, s.
     pub(crate) fn delay_s(&self) -> Option<f64> {
         match self.fit() {
             Some(fit) => Some(fit.operator.tau_e_s()),
@@ -65,7 +64,7 @@ impl PersonPrior {
         }
     }
 
-    /// Centre and spread of a parameter that is named.
+    /// Returns centre and spread of a named parameter.
     pub(crate) fn named(&self, parameter: &str) -> Option<(f64, f64)> {
         let Self::Named(prior) = self else { return None };
         let entry = prior.entries().iter().find(|entry| entry.parameter == parameter)?;
@@ -76,7 +75,7 @@ impl PersonPrior {
 impl Value for PersonPrior {
     const KIND: Kind = Kind::Prior;
 
-    /// A file of a fit is read by the program and given by [`Method::start_from`](crate::Method).
+    /// A file of a fit is read by the program and passed to [`Method::start_from`](crate::Method).
     fn read(text: &str) -> Result<Self, String> {
         let expected = "population, none, NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e and T_I separated by commas, as \
                         omega_nm=10.5:0.3, or the file of a fit that hoid identify --json has printed, as fit.json";

@@ -1,5 +1,4 @@
-//! Tracking plan with orders that may still be open: they are searched on the start span or the
-//! warm-up.
+//! Tracking plan whose orders may still be open: they are searched on the start span or the warm-up.
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
@@ -17,7 +16,7 @@ use hoid_ident::{
     order_selection::{Criterion, choose_orders_with, default_operator_ranges},
 };
 
-/// A recursion whose orders may still be ranges.
+/// Plan of a recursion whose orders may still be ranges.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackPlan {
     options: TrackOptions,
@@ -27,12 +26,12 @@ pub struct TrackPlan {
 }
 
 impl TrackPlan {
-    /// A plan; the orders of the options are replaced by the largest of the ranges. Everything is
-    /// checked that can be before there are data.
+    /// Builds a plan; the orders of the options are replaced by the largest of the ranges. Everything that does not
+    /// depend on data is checked.
     ///
     /// # Errors
-    /// [`IdentError`] for options that contradict each other, name what is missing, or give a start
-    /// for one of several models.
+    /// [`IdentError`] for options that contradict each other, for names that do not exist, or for a start that is
+    /// given for one of several models.
     pub fn new(
         options: TrackOptions,
         ranges: OrderRanges,
@@ -48,7 +47,7 @@ impl TrackPlan {
             return Err(of_one_model());
         }
         let options = TrackOptions {
-            // What is not known there is not known at all.
+            // A name that is unknown for the largest orders is unknown for all.
             orders: combinations[combinations.len() - 1],
             ..options
         };
@@ -61,28 +60,27 @@ impl TrackPlan {
         })
     }
 
-    /// True when no order is left to be searched.
+    /// True if no order is left to be searched.
     pub fn is_settled(&self) -> bool {
         self.ranges.combinations().is_ok_and(|all| all.len() == 1)
     }
 
-    /// The options; until [`TrackPlan::choose`] with the largest orders of the ranges.
+    /// Returns the options; until [`TrackPlan::choose`] with the largest orders of the ranges.
     pub fn options(&self) -> &TrackOptions {
         &self.options
     }
 
-    /// Time between the samples that it is for.
+    /// Returns the sample time of the plan.
     pub fn sample_time(&self) -> SampleTime {
         self.sample_time
     }
 
-    /// The ranges that are searched.
+    /// Returns the ranges that are searched.
     pub fn ranges(&self) -> &OrderRanges {
         &self.ranges
     }
 
-    /// Searches what is left open on a record, nothing when all is settled; `each` is called after
-    /// every candidate.
+    /// Searches the open orders on a record; does nothing if there are none. `each` is called after every candidate.
     ///
     /// # Errors
     /// The errors of the search.
@@ -100,8 +98,8 @@ impl TrackPlan {
         Ok((self.with_orders(choice.fit.orders()), Some(choice)))
     }
 
-    /// The options for orders within the ranges; what was reported about coefficients that these
-    /// orders do not have is left out.
+    /// Returns the options for orders within the ranges; options of coefficients that these orders do not have are
+    /// left out.
     pub fn with_orders(&self, orders: Orders) -> TrackOptions {
         let mut options = TrackOptions {
             orders,
@@ -113,7 +111,7 @@ impl TrackPlan {
     }
 }
 
-/// A start that is given while orders are searched.
+/// Error for a given start while orders are searched.
 pub fn of_one_model() -> IdentError {
     IdentError::BadStart {
         reason: "it belongs to one model, but a range of orders or delays is searched; give nk and the orders as single numbers"
@@ -121,7 +119,7 @@ pub fn of_one_model() -> IdentError {
     }
 }
 
-/// Ranges of a method that searches none: the orders that are typical, as near as the ranges allow.
+/// Ranges of a method that searches none: the default orders, as near as the ranges allow.
 fn default_ranges(method: &Method, ranges: &OrderRanges, sample_time: SampleTime) -> OrderRanges {
     let known = method.person_prior().and_then(PersonPrior::delay_s);
     let nk = sample_time.nk(known.unwrap_or(DEFAULT_DELAY_S));
@@ -140,9 +138,9 @@ fn default_ranges(method: &Method, ranges: &OrderRanges, sample_time: SampleTime
     }
 }
 
-/// Search ranges: the defaults of structure and method, with named orders in their place. Where nk
-/// is not named, the delay lies within the range that is tracked; where no other order is, orders
-/// that are still open are those of the coefficients of a start, named as f1 or b0.
+/// Returns the search ranges: the defaults of structure and method, replaced by the named orders. If nk is not named,
+/// the delay lies within the range that is tracked; if no other order is named, orders that are still open are those
+/// of the coefficients of a start, named as f1 or b0.
 ///
 /// # Errors
 /// [`IdentError::BadOption`] for a name that is not an order.
@@ -194,7 +192,7 @@ fn narrowed(
     ranges
 }
 
-/// Checks of the recursion at its start, before data are read or orders searched.
+/// Checks the start of the recursion, before data are read or orders searched.
 fn check(options: &TrackOptions, sample_time: SampleTime) -> Result<(), IdentError> {
     options.check_at(sample_time)?;
     for memory in options.memories()? {

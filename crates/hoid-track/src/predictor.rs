@@ -1,8 +1,8 @@
-//! One-step prediction, sample by sample: the predictor of the kernel after a delay line, for
-//! methods that need no gradient of it.
+//! One-step prediction, sample by sample: the predictor of the kernel with a delay line, for methods that need no
+//! gradient.
 //!
-//! The coefficients may change from sample to sample; the histories of w, v and eps keep the values
-//! that were right when they were taken. A signal that overflows brings the filters to rest.
+//! The coefficients may change from sample to sample; the histories of w, v and eps keep the values of their time.
+//! After an overflow of a signal the filters are reset.
 
 use hoid_core::state::{State, visit_all};
 use hoid_core::{
@@ -14,7 +14,7 @@ use hoid_model::Orders;
 
 use crate::history::bounded;
 
-/// Room for coefficients.
+/// Capacity for coefficients.
 const ROOM: usize = 64;
 
 /// The predictor in direct form.
@@ -32,7 +32,7 @@ impl State for Predictor {
 }
 
 impl Predictor {
-    /// At rest. `None` for more than 64 coefficients.
+    /// Builds the predictor at rest. `None` for more than 64 coefficients.
     pub fn new(orders: Orders) -> Option<Self> {
         let shape = AnyShape {
             na: orders.na,
@@ -48,7 +48,7 @@ impl Predictor {
         })
     }
 
-    /// Takes a sample and returns its prediction error eps under theta, in the order of
+    /// Takes a sample and returns its prediction error eps for theta, in the order of
     /// [`Orders::parameter_names`].
     pub fn step(&mut self, theta: &[f64], e: f64, u: f64) -> f64 {
         let theta = padded(theta);
@@ -57,7 +57,7 @@ impl Predictor {
         eps
     }
 
-    /// Takes a sample whose output is missing; returns the prediction that takes its place.
+    /// Takes a sample whose output is missing; returns the prediction that replaces it.
     pub fn bridge(&mut self, theta: &[f64], e: f64) -> f64 {
         let theta = padded(theta);
         // eps is the output less its prediction.
@@ -78,7 +78,7 @@ impl Predictor {
         }
     }
 
-    /// At rest again.
+    /// Resets the filters.
     pub fn reset(&mut self) {
         self.kernel.reset();
         self.delay = DelayLine::new(vec![0.0; self.nk]);
@@ -124,7 +124,7 @@ mod tests {
         let mut predictor = Predictor::new(orders).unwrap();
         for (t, expected) in batch.iter().enumerate() {
             let eps = predictor.step(&theta, e[t], u[t]);
-            // Rounding of 300 samples.
+            // Rounding errors of 300 samples.
             assert!((eps - expected).abs() < 1e-11, "{t}: {eps} {expected}");
         }
         predictor.reset();

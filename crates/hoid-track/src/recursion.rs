@@ -1,4 +1,4 @@
-//! Definition of a recursive method.
+//! Interface of a recursive method.
 
 use hoid_core::{recursion::Step, state::State};
 use hoid_model::uncertainty::{Estimate, OperatorEstimate};
@@ -12,16 +12,16 @@ pub struct Sample {
     pub e: f64,
     /// Control output.
     pub u: f64,
-    /// External signal f_t, where it is known.
+    /// External signal f_t, if known.
     pub reference: Option<f64>,
 }
 
-/// Report of a recursion on a sample that it has taken.
+/// Outcome of a sample that a recursion has taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepOutcome {
     /// A-priori innovation.
     pub innovation: f64,
-    /// True when stability or a bound made the step shorter.
+    /// True if stability or a bound shortened the step.
     pub shortened: bool,
 }
 
@@ -34,7 +34,7 @@ impl From<Step> for StepOutcome {
     }
 }
 
-/// A delay that is tracked, and that of the polynomials.
+/// The tracked delay, and that of the polynomials.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Delay {
     /// Delay of b0 of the polynomials, samples.
@@ -45,47 +45,47 @@ pub struct Delay {
 
 /// A recursive method. Samples are finite and not too large.
 pub trait Recursion: State + Send + Sync {
-    /// Takes a sample: filters and estimate move on.
+    /// Takes a sample: filters and estimate are updated.
     fn step(&mut self, sample: Sample) -> StepOutcome;
-    /// Takes a sample into the filters alone; the estimate stays.
+    /// Takes a sample into the filters only; the estimate stays constant.
     fn follow(&mut self, sample: Sample) -> StepOutcome;
-    /// As `follow`, where the output is missing and the one-step prediction takes its place.
+    /// As `follow`, for a missing output, which the one-step prediction replaces.
     fn bridge(&mut self, sample: Sample);
-    /// theta in the order of [`hoid_model::Orders::parameter_names`].
+    /// Returns theta in the order of [`hoid_model::Orders::parameter_names`].
     fn theta(&self) -> &[f64];
-    /// Covariance of theta by rows; false when there is none yet.
+    /// Writes the covariance of theta by rows; false if there is none yet.
     fn covariance(&self, into: &mut [f64]) -> bool;
-    /// Innovation variance as tracked.
+    /// Returns the tracked innovation variance.
     fn innovation_variance(&self) -> f64;
-    /// Logarithm of the odds of a recent change, where the recursion has them.
+    /// Returns the logarithm of the odds of a recent change, for methods that compute it.
     fn change_odds(&self) -> Option<f64> {
         None
     }
-    /// The change that was declared at the last sample.
+    /// Returns the change that was declared at the last sample.
     fn change(&self) -> Option<Change> {
         None
     }
-    /// Number of fits that failed, and why the last did, for methods that fit.
+    /// Returns the number of failed fits and the reason of the last, for methods that fit.
     fn failures(&self) -> Option<(usize, String)> {
         None
     }
-    /// The response at a frequency in rad/s, where it is not that of the polynomials.
+    /// Returns the response at a frequency in rad/s, if it is not that of the polynomials.
     fn response(&self, _omega_rad_s: f64) -> Option<Response> {
         None
     }
-    /// Its real and imaginary part alone.
+    /// Returns its real and imaginary part only.
     fn response_value(&self, _omega_rad_s: f64) -> Option<[f64; 2]> {
         None
     }
-    /// Multiplies the covariance of its gain by a factor; false if it has none.
+    /// Multiplies the covariance of the gain by a factor; false if there is none.
     fn scale_covariance(&mut self, _factor: f64) -> bool {
         false
     }
-    /// The delay at present, if it is tracked.
+    /// Returns the current delay, if it is tracked.
     fn delay(&self) -> Option<Delay> {
         None
     }
-    /// The operator, where it is what the recursion estimates.
+    /// Returns the operator, for methods that estimate it.
     fn operator(&self) -> Option<OperatorEstimate> {
         None
     }

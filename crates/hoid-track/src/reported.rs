@@ -1,5 +1,5 @@
-//! Trace of a recursion in physical parameters with a fixed noise model: the polynomials of the
-//! exact hold and the operator.
+//! Reported estimate of a recursion in physical parameters with a fixed noise model: the polynomials of the exact hold
+//! and the operator.
 
 use hoid_core::{
     held_operator::held_operator,
@@ -12,11 +12,11 @@ use hoid_model::{
 
 use crate::start::StartState;
 
-/// Parameters of the operator after a known delay: K_e, K_e_dot, omega_nm and zeta_nm.
+/// Number of parameters of the operator with a known delay: K_e, K_e_dot, omega_nm and zeta_nm.
 pub const OPERATOR: usize = 4;
 
-/// `[b0, b1, d.., f1, f2]` with the Jacobian of the operator's part, and the covariance of d, which
-/// stays that of the start fit.
+/// `[b0, b1, d.., f1, f2]` with the Jacobian of the operator's part, and the covariance of d, which stays that of the
+/// start fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reported {
     sample_time_s: f64,
@@ -33,7 +33,7 @@ impl State for Reported {
 }
 
 impl Reported {
-    /// From a start in physical parameters, `[K_e, K_e_dot, omega_nm, zeta_nm, d..]`.
+    /// Builds it from a start in physical parameters, `[K_e, K_e_dot, omega_nm, zeta_nm, d..]`.
     pub fn new(from: &StartState, nk: usize, sample_time: SampleTime) -> Self {
         let p = from.values.len();
         let (nd, ts) = (p - OPERATOR, sample_time.s());
@@ -51,7 +51,7 @@ impl Reported {
         reported
     }
 
-    /// Takes an estimate.
+    /// Sets the estimate.
     pub fn set(&mut self, eta: [f64; OPERATOR]) {
         let (values, by) = held_operator(eta, self.sample_time_s);
         let p = self.theta.len();
@@ -60,7 +60,7 @@ impl Reported {
         self.by = by;
     }
 
-    /// Takes the first coefficients of a noise model; those that it does not have are zero.
+    /// Sets the first coefficients of a noise model; missing ones are zero.
     pub fn set_noise(&mut self, d: &[f64]) {
         let p = self.theta.len();
         for (i, place) in self.theta[2..p - 2].iter_mut().enumerate() {
@@ -68,17 +68,17 @@ impl Reported {
         }
     }
 
-    /// Sample time, s.
+    /// Returns the sample time, s.
     pub fn sample_time_s(&self) -> f64 {
         self.sample_time_s
     }
 
-    /// The coefficients.
+    /// Returns the coefficients.
     pub fn theta(&self) -> &[f64] {
         &self.theta
     }
 
-    /// `J C J'` of the operator, and that of d, by rows.
+    /// Writes `J C J'` of the operator, and the covariance of d, by rows.
     pub fn covariance(&self, of_eta: &[[f64; OPERATOR]; OPERATOR], into: &mut [f64]) {
         let p = self.theta.len();
         let nd = p - OPERATOR;
@@ -100,8 +100,7 @@ impl Reported {
         }
     }
 
-    /// Puts the covariance of the coefficients of a noise model that is followed in the place of
-    /// that of the start fit.
+    /// Replaces the covariance of d by that of the coefficients of a tracked noise model.
     pub fn set_covariance_of_noise<const D: usize>(&self, of_d: &[[f64; D]; D], into: &mut [f64]) {
         let p = self.theta.len();
         let nd = p - OPERATOR;
@@ -111,7 +110,7 @@ impl Reported {
         }
     }
 
-    /// The operator, with T_L in s and its variance as given.
+    /// Returns the operator, with the given T_L in s and its variance.
     pub fn operator(
         &self,
         eta: [f64; OPERATOR],

@@ -1,5 +1,5 @@
-//! A recursion as it is requested, before the time between samples is known: a delay in seconds is none of the orders
-//! yet, and a start names its coefficients.
+//! A requested recursion, before the sample time is known: a delay in seconds is not yet an order, and a start names
+//! its coefficients.
 
 use std::collections::BTreeMap;
 
@@ -13,10 +13,10 @@ use crate::{
     setup::StartAt,
 };
 
-/// Where the recursion is to start.
+/// Requested start of the recursion.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum RequestedStart {
-    /// As the method does: from a batch fit, or from the prior knowledge of people.
+    /// That of the method: from a batch fit, or from the prior knowledge of people.
     #[default]
     Default,
     /// From nothing.
@@ -25,7 +25,7 @@ pub enum RequestedStart {
     Coefficients(BTreeMap<String, f64>),
 }
 
-/// A recursion as it is requested.
+/// A requested recursion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackRequest {
     /// The recursion, with its options.
@@ -36,9 +36,9 @@ pub struct TrackRequest {
     pub orders: NamedOrders,
     /// The delay, in samples or in s.
     pub delay: Option<DelayRange>,
-    /// Where it starts.
+    /// The start.
     pub start: RequestedStart,
-    /// Criterion that decides between orders that are searched.
+    /// Criterion that chooses between the searched orders.
     pub criterion: Criterion,
     /// Magnitude of e or u beyond which a sample is a fault.
     pub largest: f64,
@@ -55,7 +55,7 @@ impl Default for TrackRequest {
 }
 
 impl TrackRequest {
-    /// A method, and all else by default.
+    /// Requests a method, with defaults for everything else.
     pub fn of(method: Method) -> Self {
         Self {
             method,
@@ -70,21 +70,21 @@ impl TrackRequest {
         }
     }
 
-    /// The structure that was requested, else that of the method.
+    /// Returns the requested structure, or else that of the method.
     pub fn structure(&self) -> Structure {
         self.structure.unwrap_or_else(|| self.method.default_structure())
     }
 
-    /// Whether the recursion is of polynomials, or its delay is given in samples: such takes the samples as they are.
+    /// True for a recursion of polynomials, or a delay in samples: the sample rate is then kept.
     pub fn counts_samples(&self) -> bool {
         let in_samples = matches!(self.delay, Some(DelayRange::Samples(_))) || self.orders.contains_key("nk");
         in_samples || self.method.counts_samples()
     }
 
-    /// The plan for a time between samples; everything is checked that can be before there are data.
+    /// Returns the plan for a sample time; everything that does not depend on data is checked.
     ///
     /// # Errors
-    /// [`IdentError`] for options that contradict each other, or name what is missing.
+    /// [`IdentError`] for options that contradict each other, or for names that do not exist.
     pub fn plan(&self, sample_time: SampleTime) -> Result<TrackPlan, IdentError> {
         let mut orders = self.orders.clone();
         if let Some(delay) = &self.delay {
@@ -113,7 +113,7 @@ impl TrackRequest {
         let structure = self.structure();
         let ranges = ranges_of(&self.method, structure, &orders, &names, sample_time)?;
         let combinations = ranges.combinations()?;
-        // The largest of each order: a quantity that is not known there is not known at all.
+        // The largest of each order: a name that is unknown for them is unknown for all.
         let largest = combinations[combinations.len() - 1];
         let start = match &self.start {
             RequestedStart::Default => StartAt::Span(None),

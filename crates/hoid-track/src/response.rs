@@ -1,4 +1,4 @@
-//! The response of an estimate at a frequency: what seconds of data determine best.
+//! The response of an estimate at a frequency: the quantity that seconds of data determine best.
 //!
 //! For the polynomials, `H = B z^-nk/(A F)` at `z = e^{j omega Ts}`, with the derivatives
 //!
@@ -23,16 +23,16 @@ pub struct Response {
 }
 
 impl Response {
-    /// Numbers of a response.
+    /// Number of values of a packed response.
     pub(crate) const NUMBERS: usize = 5;
 
-    /// Real and imaginary part, and the upper triangle of their covariance.
+    /// Packs the real and imaginary part, and the upper triangle of their covariance.
     pub(crate) fn packed(&self) -> [f64; Self::NUMBERS] {
         let ([re, im], [[a, b], [_, c]]) = (self.value, self.covariance);
         [re, im, a, b, c]
     }
 
-    /// For the numbers of [`Response::packed`]; `None` if they are none.
+    /// Unpacks the numbers of [`Response::packed`]; `None` if there is no response.
     pub(crate) fn unpacked(numbers: &[f64]) -> Option<Self> {
         let &[re, im, a, b, c] = numbers else { return None };
         let sound = re.is_finite() && im.is_finite();
@@ -55,18 +55,18 @@ impl Response {
         Estimate::with_variance(degrees * im.atan2(re), degrees * degrees * self.along([-im, re]))
     }
 
-    /// Variance along a direction of the length of H, over |H|^2 twice.
+    /// Variance in a direction with the length of H, over |H|^4.
     fn along(&self, [a, b]: [f64; 2]) -> f64 {
         let c = &self.covariance;
         let square = self.value[0] * self.value[0] + self.value[1] * self.value[1];
         (a * a * c[0][0] + 2.0 * a * b * c[0][1] + b * b * c[1][1]) / (square * square)
     }
 
-    /// Covariance of real and imaginary part of `dH/H`; `None` if there is none.
+    /// Covariance of the real and imaginary part of `dH/H`; `None` if there is none.
     pub(crate) fn relative_covariance(&self) -> Option<[[f64; 2]; 2]> {
         let [re, im] = self.value;
         let (real, imaginary) = (self.along([re, im]), self.along([-im, re]));
-        // Along both: their sum holds the covariance twice.
+        // Along both directions: their sum contains the covariance twice.
         let both = self.along([re - im, im + re]);
         let cross = 0.5 * (both - real - imaginary);
         [real, imaginary, cross]
@@ -75,7 +75,7 @@ impl Response {
             .then_some([[real, cross], [cross, imaginary]])
     }
 
-    /// Real and imaginary part of polynomials theta with these orders.
+    /// Real and imaginary part of the response of polynomials theta with these orders.
     pub(crate) fn value_of_polynomials(
         orders: &Orders,
         theta: &[f64],
@@ -85,7 +85,7 @@ impl Response {
         let o = orders;
         let (sin, cos) = (-omega_rad_s * sample_time.s()).sin_cos();
         let sum = |first: [f64; 2], of: &[f64]| {
-            // Horner in q^-1, with the constant `first`.
+            // Horner's scheme in q^-1, with the constant `first`.
             let inner = of.iter().rev().fold([0.0; 2], |sum, c| {
                 let [re, im] = times(sum, [cos, sin]);
                 [re + c, im]
@@ -104,7 +104,7 @@ impl Response {
         over(times(b, [cos, sin]), times(a, f))
     }
 
-    /// For polynomials theta with these orders; `covariance` is that of theta by rows.
+    /// Returns the response of polynomials theta with these orders; `covariance` is that of theta by rows.
     pub(crate) fn of_polynomials(
         orders: &Orders,
         theta: &[f64],

@@ -1,8 +1,8 @@
-//! A tracker as numbers, to continue elsewhere: in another process, or after a restart.
+//! A tracker as numbers, so that it can continue elsewhere: in another process, or after a restart.
 //!
-//! The numbers are those of the start, of which gains and bounds are made, and then all that changes
-//! ([`hoid_core::state`]), and a seal against damage. A tracker that was restored continues with the same digits. It
-//! does not have the start fit any more.
+//! The numbers are those of the start, from which gains and bounds are made, then all that change
+//! ([`hoid_core::state`]), and a seal against damage. A restored tracker continues with the same digits. It no longer
+//! has the start fit.
 
 use hoid_core::state::{State, visit_all};
 use hoid_model::SampleTime;
@@ -62,7 +62,7 @@ impl State for StartState {
 }
 
 impl Tracker {
-    /// The tracker as numbers, for [`Tracker::restored`]. It does not change.
+    /// Returns the tracker as numbers, for [`Tracker::restored`]. The tracker does not change.
     pub fn saved(&mut self) -> Vec<f64> {
         let mut numbers = Vec::new();
         let mut save = |number: &mut f64| numbers.push(*number);
@@ -71,11 +71,11 @@ impl Tracker {
         sealed(numbers)
     }
 
-    /// The tracker that [`Tracker::saved`] was asked of, from its options and its numbers.
+    /// Restores the tracker that [`Tracker::saved`] returned, from its options and its numbers.
     ///
     /// # Errors
-    /// [`IdentError::BadStart`] for numbers of another tracker, and for such that were changed or cut;
-    /// those of [`Tracker::new`].
+    /// [`IdentError::BadStart`] for numbers of another tracker, and for numbers that were changed or cut; the errors
+    /// of [`Tracker::new`].
     pub fn restored(options: &TrackOptions, sample_time: SampleTime, numbers: &[f64]) -> Result<Self, IdentError> {
         options.check_at(sample_time)?;
         let wrong = || IdentError::BadStart {

@@ -1,25 +1,24 @@
-//! The seal of saved numbers: a sum over all of them after the last, by which numbers that were changed, cut or mixed
-//! up since are refused.
+//! The seal of saved numbers: a checksum over all of them, appended to them, by which numbers that were changed, cut
+//! or mixed up are refused.
 //!
-//! A state that is only nearly right is worse than none: a place in a ring that lies outside ends the
-//! process, a covariance that is not one gives small error bars. The sum is FNV-1a (Fowler, Noll, Vo,
-//! 1991; offset basis and prime of 64 bits) over the bits of the numbers in their order, its upper 53
-//! bits as a whole number, which every way of writing an f64 keeps. All NaN count as one, for
-//! languages do not keep their bits. It guards against damage, not against an adversary, who can
-//! compute it too.
+//! A state that is only nearly right is worse than none: an index outside a ring ends the process, and a matrix that
+//! is not a covariance gives small error bars. The sum is FNV-1a (Fowler, Noll, Vo, 1991; offset basis and prime of 64
+//! bits) over the bits of the numbers in their order, its upper 53 bits as a whole number, which every notation of an
+//! f64 keeps. All NaN count as one, since languages do not keep their bits. It protects against damage, not against an
+//! adversary, who can compute it too.
 
 const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
 const PRIME: u64 = 0x0000_0100_0000_01b3;
-/// Bits of a whole number that f64 holds.
+/// Bits of a whole number that an f64 represents.
 const KEPT: u32 = 53;
 
-/// The numbers and their seal.
+/// Returns the numbers with their seal.
 pub fn sealed(mut numbers: Vec<f64>) -> Vec<f64> {
     numbers.push(seal(&numbers));
     numbers
 }
 
-/// The numbers before their seal; none if it is another.
+/// Returns the numbers without their seal; none if it does not match.
 pub fn opened(sealed: &[f64]) -> Option<&[f64]> {
     let (stated, numbers) = sealed.split_last()?;
     (stated.to_bits() == seal(numbers).to_bits()).then_some(numbers)

@@ -1,5 +1,4 @@
-//! Components of a recursion, next to its start: structure, orders, and the options that all
-//! methods read alike.
+//! Components of a recursion and its start: structure, orders, and the options that all methods share.
 
 use std::collections::BTreeMap;
 
@@ -9,13 +8,13 @@ use hoid_model::{Orders, Structure};
 
 use crate::{forgetting::ForgettingRule, memory::Memory, shared_options::WindupGuard};
 
-/// Delay of people who track, s: the prior where none is given.
+/// Delay of people who track, s: the prior if none is given.
 pub(crate) const DEFAULT_DELAY_S: f64 = 0.2;
 
 /// Names of the operator's parameters in a physical recursion.
 pub(crate) const PHYSICAL_NAMES: [&str; 5] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 
-/// Where the recursion starts.
+/// Start of the recursion.
 #[derive(Debug, Clone, PartialEq)]
 pub enum StartAt {
     /// From a batch fit of this span of the record, s; `None` is the first third.
@@ -33,42 +32,41 @@ pub struct Setup {
     pub structure: Structure,
     /// The orders.
     pub orders: Orders,
-    /// Where it starts.
+    /// Start.
     pub start: StartAt,
     /// Limits of the search of start fits and windows.
     pub search: SearchOptions,
-    /// Names of the parameters that move, each with its memory.
+    /// Names of the estimated parameters, each with its memory.
     pub memories: Vec<(String, Memory)>,
-    /// How it forgets.
+    /// Rule of forgetting.
     pub forgetting: ForgettingRule,
     /// P at the start as a multiple of the unit matrix; none for that of the start fit.
     pub covariance: Option<f64>,
-    /// How far P may grow where nothing excites a parameter; none if that follows from the start.
+    /// Limit of P where nothing excites a parameter; none if that follows from the start.
     pub windup_guard: Option<WindupGuard>,
-    /// Multiple of the innovation's standard deviation beyond which an innovation moves the
-    /// estimate no further.
+    /// Limit of an innovation in the update, in standard deviations of the innovation.
     pub limit: f64,
     /// Polynomials that are kept stable.
     pub stable: Stable,
     /// True for a method that needs no start fit.
     pub starts_itself: bool,
-    /// True if the operator's parameters move.
+    /// True if the parameters of the operator are estimated.
     pub is_physical: bool,
     /// Bounds of physical parameters.
     pub bounds: BTreeMap<String, Constraint>,
-    /// Range of tau_e in s that is followed.
+    /// Range of the tracked delay tau_e, s.
     pub track_delay_s: Option<(f64, f64)>,
-    /// Range of tau_e in s where it is one of the parameters that move.
+    /// Range of tau_e in s if it is one of the estimated parameters.
     pub delay_parameter_s: Option<(f64, f64)>,
 }
 
 impl Setup {
-    /// Names of the parameters that move.
+    /// Returns the names of the estimated parameters.
     pub fn names(&self) -> Vec<String> {
         self.memories.iter().map(|(name, _)| name.clone()).collect()
     }
 
-    /// The batch fit from which a recursion starts.
+    /// Returns the batch estimator of the start fit.
     pub fn start_estimator(&self) -> Estimator {
         Estimator {
             search: self.search,
@@ -76,14 +74,13 @@ impl Setup {
         }
     }
 
-    /// Orders of the polynomials that the method reports: a delay between two samples takes one
-    /// coefficient of B more.
+    /// Returns the orders of the reported polynomials: a delay between two samples needs one more coefficient of B.
     pub fn polynomial_orders(&self) -> Orders {
         polynomial_orders(self.orders, self.delay_parameter_s.is_some())
     }
 }
 
-/// Orders of the polynomials: a delay between two samples takes one coefficient of B more.
+/// Orders of the polynomials: a delay between two samples needs one more coefficient of B.
 pub(crate) fn polynomial_orders(orders: Orders, with_delay: bool) -> Orders {
     match with_delay {
         true => Orders { nb: 3, ..orders },
@@ -91,7 +88,7 @@ pub(crate) fn polynomial_orders(orders: Orders, with_delay: bool) -> Orders {
     }
 }
 
-/// Names of the parameters that move.
+/// Names of the estimated parameters.
 pub(crate) fn parameter_names(orders: &Orders, is_physical: bool, with_delay: bool) -> Vec<String> {
     if !is_physical {
         return orders.parameter_names();

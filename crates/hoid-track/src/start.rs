@@ -1,9 +1,9 @@
-//! Where a recursion starts: values, covariance and innovation variance.
+//! Start of a recursion: values, covariance and innovation variance.
 //!
 //! From a batch fit, P is its covariance over sigma^2, which is the inverse of the information
 //! matrix; in physical parameters `P_eta = T^{-1} P_theta T^{-T}` with the Jacobian T of
-//! theta(eta). A multiple of the unit matrix instead (the text's `0.1 I`) is the gain that the user
-//! wants; the error bars then still start with the covariance of the fit.
+//! theta(eta). A multiple of the unit matrix instead (`0.1 I` in the thesis) is the gain that the user chooses; the
+//! error bars then still start with the covariance of the fit.
 
 use std::collections::BTreeMap;
 
@@ -19,8 +19,8 @@ use crate::{
 
 /// Variance of P for a start from nothing, in units of the innovation variance.
 const UNKNOWN: f64 = 1e6;
-/// Operator of a start from nothing: K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm, tau_e (s), those
-/// of the thesis's order.
+/// Operator of a start from nothing: K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm, tau_e (s), of the order of magnitude
+/// in the thesis.
 const TYPICAL_OPERATOR: [f64; 5] = [0.1, 0.05, 10.0, 0.4, 0.25];
 /// First noise pole of a start from nothing.
 const TYPICAL_NOISE_POLE: f64 = -0.8;
@@ -28,14 +28,14 @@ const TYPICAL_NOISE_POLE: f64 = -0.8;
 const SLOWEST_OMEGA: f64 = 0.5;
 const FASTEST_SHARE: f64 = 0.5;
 const DAMPING: [f64; 2] = [0.02, 5.0];
-/// Longest sample time of a tracker, s: beyond it the fastest neuromuscular system that samples can show
-/// is slower than the slowest of people.
+/// Longest sample time of a tracker, s: beyond it the fastest neuromuscular system that the samples can represent is
+/// slower than the slowest of people.
 const LONGEST_SAMPLE_TIME_S: f64 = FASTEST_SHARE * std::f64::consts::PI / SLOWEST_OMEGA;
-/// Factor by which the roots of an unstable noise model are drawn inside, until they are.
+/// Factor by which the roots of an unstable noise model are moved inwards until it is stable.
 const DRAWN_INSIDE: f64 = 0.99;
 
-/// Refuses a sample time with which no operator can be followed, whatever the method: memories, delays
-/// and bounds of all of them are those of people, in seconds.
+/// Checks that an operator can be tracked at this sample time, whatever the method: memories, delays and bounds of all
+/// methods are those of people, in seconds.
 ///
 /// # Errors
 /// [`IdentError::BadOption`] above [`LONGEST_SAMPLE_TIME_S`].
@@ -66,17 +66,17 @@ pub struct StartState {
     pub spread: Vec<f64>,
     /// Innovation variance; zero when unknown.
     pub variance: f64,
-    /// Residuals that gave it.
+    /// Number of residuals from which it was estimated.
     pub residuals: f64,
-    /// True if a fit gave it.
+    /// True for a start from a fit.
     pub from_fit: bool,
-    /// The fit, where it is available.
+    /// The fit, if it is available.
     pub fit: Option<Fit>,
 }
 
 impl StartState {
-    /// The start that the options ask for, from a record of the start span where a fit is wanted,
-    /// and that fit where it is known.
+    /// Computes the start that the options select, from a record of the start span if a fit is needed, and from that
+    /// fit if it is known.
     ///
     /// # Errors
     /// The errors of the batch fit; [`IdentError::BadStart`].
@@ -93,7 +93,7 @@ impl StartState {
         }
     }
 
-    /// From a theta.
+    /// Start from a given theta.
     fn given(setup: &Setup, theta: &[f64], sample_time: SampleTime) -> Result<Self, IdentError> {
         let names = setup.orders.parameter_names();
         if theta.len() != names.len() || theta.iter().any(|t| !t.is_finite()) {
@@ -143,7 +143,7 @@ impl StartState {
         }
     }
 
-    /// From the batch fit of a record.
+    /// Start from the batch fit of a record.
     fn fitted(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Self, IdentError> {
         let FittedStart {
             values,
@@ -193,7 +193,7 @@ pub fn physical_bounds<const N: usize>(setup: &Setup, sample_time: SampleTime) -
     Ok(std::array::from_fn(|i| limits.get(i).copied().unwrap_or(free)))
 }
 
-/// Least and largest value of each physical parameter and of c and d.
+/// Returns the least and largest value of each physical parameter and of c and d.
 ///
 /// # Errors
 /// [`IdentError::UnknownParameter`], [`IdentError::BadOption`].
@@ -239,7 +239,7 @@ fn multiple(size: f64, p: usize) -> Vec<f64> {
     matrix
 }
 
-/// Values with a noise model that is as stable as the options ask.
+/// Makes the noise model as stable as the options require.
 fn stabilised(setup: &Setup, mut values: Vec<f64>) -> Vec<f64> {
     let o = &setup.orders;
     if setup.stable == Stable::Predictor || o.nd == 0 {
@@ -260,7 +260,7 @@ fn stabilised(setup: &Setup, mut values: Vec<f64>) -> Vec<f64> {
     values
 }
 
-/// eta of a theta `[b0, b1, c.., d.., f1, f2]`.
+/// Computes eta from a theta `[b0, b1, c.., d.., f1, f2]`.
 fn physical_values(setup: &Setup, theta: &[f64], sample_time: SampleTime) -> Result<Vec<f64>, IdentError> {
     let model = hoid_model::PolynomialModel::new(setup.structure, setup.orders, sample_time, theta.to_vec())?;
     let operator = model
@@ -283,8 +283,7 @@ fn physical_values(setup: &Setup, theta: &[f64], sample_time: SampleTime) -> Res
     Ok(eta)
 }
 
-/// Result of a fit: the values, their covariance, the fit, and the variance of the innovations of
-/// the model with these values.
+/// Result of a fit: the values, their covariance, the fit, and the innovation variance of the model with these values.
 struct FittedStart {
     values: Vec<f64>,
     covariance: Option<Vec<f64>>,
@@ -292,7 +291,7 @@ struct FittedStart {
     variance: f64,
 }
 
-/// The fit of the start span, made where it is not known.
+/// Returns the fit of the start span; computes it if it is not known.
 fn polynomial_fit(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Fit, IdentError> {
     match known {
         Some(fit) => Ok(fit.clone()),
@@ -300,8 +299,8 @@ fn polynomial_fit(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result
     }
 }
 
-/// The Box-Jenkins fit where it has physical parameters within the bounds, else the grey box, which
-/// always has, with a noise model of the order that was requested.
+/// Returns the Box-Jenkins fit if its physical parameters exist and are within the bounds, else the grey box, for
+/// which they always are, with a noise model of the requested order.
 fn fit_physical(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<FittedStart, IdentError> {
     if setup.delay_parameter_s.is_none()
         && let Some(start) = from_box_jenkins(setup, record, known)?
@@ -333,7 +332,7 @@ fn from_box_jenkins(setup: &Setup, record: &Record, known: Option<&Fit>) -> Resu
             if i < 4 {
                 (0..4).map(|j| (places[j], inverse[i][j])).collect()
             } else {
-                // c and d are behind b.
+                // c and d follow b.
                 vec![(2 + i - 4, 1.0)]
             }
         };
@@ -389,9 +388,9 @@ fn from_grey_box(setup: &Setup, record: &Record) -> Result<FittedStart, IdentErr
     let value = |name: &str| parameters.iter().position(|(n, _)| n == name);
     let operator = if setup.delay_parameter_s.is_some() { 5 } else { 4 };
     let fit = found.polynomial_fit(0).clone();
-    // The remnant of the grey box has one pole. Where D is to have more, it is fitted to what the
-    // operator leaves: a D that is too small colours the innovations, and a bank of hypotheses takes
-    // coloured innovations for changes.
+    // The remnant of the grey box has one pole. If D is to have more, it is fitted to the residual of the operator: a
+    // D of too low order leaves the innovations coloured, and a bank of hypotheses takes coloured innovations for
+    // changes.
     let noise = if o.nd > 1 {
         StartNoise::of(&fit, record, o.nd)
     } else {
@@ -443,8 +442,8 @@ fn from_grey_box(setup: &Setup, record: &Record) -> Result<FittedStart, IdentErr
             }
         }
         for i in 0..p {
-            // What the grey box did not have, or held, is not known: coefficients are of the size
-            // of 1, gains may change as they are.
+            // Parameters that the grey box did not have, or kept fixed, are unknown: coefficients are of the order of
+            // 1, gains may change by their own size.
             if covariance[i * p + i] == 0.0 {
                 let size = if i < operator { eta[i] * eta[i] } else { 1.0 };
                 covariance[i * p + i] = size.max(variance);

@@ -1,5 +1,4 @@
-//! The noise model of a start whose operator is known: D of the part of the output that the operator leaves
-//! unexplained.
+//! The noise model of a start whose operator is known: D of the residual of the operator.
 //!
 //! `v(t) = u(t) - (B/F) q^-nk e(t)` is an autoregression, `D v = eps`, whose coefficients follow from
 //! least squares (L. Ljung, *System Identification*, 1999, section 10.1).
@@ -19,8 +18,8 @@ pub(crate) struct StartNoise {
 }
 
 impl StartNoise {
-    /// Of order nd, from the part that the operator of this fit leaves of a record; `None` if that
-    /// is too short or constant, or the fit is one of another sampling.
+    /// Fits D of order nd to the residual of the operator of this fit in a record; `None` if the record is too short
+    /// or constant, or the fit has another sample time.
     pub fn of(fit: &Fit, record: &Record, nd: usize) -> Option<Self> {
         let simulated = fit.simulate(record).ok()?;
         let output = record.output().get(simulated.first..)?;

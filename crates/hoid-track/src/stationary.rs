@@ -1,24 +1,24 @@
-//! Behaviour of a recursion without a guard while the signals are constant.
+//! A recursion without a guard while the signals are constant.
 //!
-//! Where e and u stay constant the regressor is zero or constant, the innovations vanish, and their variance, a mean of
-//! `eps^2/(1 + h' Sigma h)` with an exponential memory ([`hoid_core::innovation_variance`]), is forgotten to zero: it
-//! falls as `lambda^t`, while the covariance over it grows by `1/lambda` a sample at most, in unexcited directions
-//! alone, and no further than its bound. The error bars, the root of their product, go to zero while nothing is learnt.
-//! Such samples carry no information about parameters or noise, for neither is excited (G. C. Goodwin and K. S. Sin,
-//! *Adaptive Filtering Prediction and Control*, 1984, section 3.4; K. J. Åström and B. Wittenmark, *Adaptive Control*,
-//! 2nd ed. 1995, section 11.5, conditional updating). So they go into the filters alone:
+//! If e and u stay constant the regressor is zero or constant, the innovations vanish, and their variance, a mean of
+//! `eps^2/(1 + h' Sigma h)` with an exponential memory ([`hoid_core::innovation_variance`]), decays to zero as
+//! `lambda^t`, while the covariance over it grows by at most `1/lambda` per sample, in unexcited directions only, and
+//! up to its bound. The error bars, the root of their product, go to zero although nothing is learnt. Such samples
+//! carry no information about parameters or noise, since neither is excited (G. C. Goodwin and K. S. Sin, *Adaptive
+//! Filtering Prediction and Control*, 1984, section 3.4; K. J. Åström and B. Wittenmark, *Adaptive Control*, 2nd ed.
+//! 1995, section 11.5, conditional updating). They therefore enter only the filters:
 //!
-//! - A signal is **stationary** while it stays within [`SHARE`] of its typical size of the value at which the stand
-//!   started. The size is the geometric mean over blocks of a second of the largest distance from the value at the
-//!   start of the block; before ten blocks are known, a stand is of one value.
-//! - **Nothing arrives** where e and u represent [`BOTH_S`], or one of them for [`ONE_S`]: a channel that is frozen, or
-//!   a hand that rests while no answer can be distinguished from none.
-//! - The recursion is then put back to the first sample of the stand, bit for bit (a jump to its position is part of
-//!   it): to the numbers that were kept before it, from which it takes the samples again. Value, covariance and
-//!   innovation variance stay as they are there, however long it lasts.
+//! - A signal is **stationary** while it stays within [`SHARE`] of its typical size about the value at which the
+//!   stationary span started. The size is the geometric mean over blocks of a second of the largest distance from the
+//!   value at the start of the block; before ten blocks are known, a stationary span has a single value.
+//! - There is **no information** if both e and u are stationary for [`BOTH_S`], or one of them for [`ONE_S`]: a frozen
+//!   channel, or a resting hand, whose response cannot be distinguished from none.
+//! - The recursion is then restored to the first sample of the span, bit for bit (a jump to its value belongs to it):
+//!   to the numbers that were stored before it, from which it takes the samples again. Estimate, covariance and
+//!   innovation variance keep their values of that time for the whole span.
 //! - It continues once both signals move and the filters have settled ([`crate::guard`]).
 //!
-//! A recursion that never stays constant has the same digits as without. Samples closer than 40 us are not watched.
+//! Without stationary spans the digits are the same as without this watch. Sample times below 40 us are not watched.
 
 use hoid_core::state::{State, visit_all};
 use hoid_model::SampleTime;
@@ -30,33 +30,33 @@ use crate::{
 
 /// Share of the typical size within which a signal is stationary.
 const SHARE: f64 = 0.02;
-/// Stationary spans of both signals, and of one of them, from which nothing arrives, s, and least samples of one.
+/// Shortest stationary spans of both signals, and of one, without information, s, and their least number of samples.
 pub(crate) const BOTH_S: f64 = 1.0;
 const ONE_S: f64 = 5.0;
 const LEAST: u64 = 20;
-/// Blocks after which the size of a signal is known, and those over which it is averaged.
+/// Number of blocks after which the size of a signal is known, and number over which it is averaged.
 const LEARNT: u32 = 10;
 const AVERAGED: u32 = 60;
-/// Most samples between two snapshots.
+/// Largest number of samples between two snapshots.
 const MOST: u64 = 1 << 17;
 /// e and u.
 const CHANNELS: usize = 2;
 
-/// Action of a recursion on a sample.
+/// Way in which a recursion takes a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Act {
-    /// It takes it.
+    /// Filters and estimate.
     Step,
-    /// The filters take it.
+    /// Only the filters.
     Follow,
-    /// The filters take it, with the prediction of u.
+    /// Only the filters, with the prediction of u.
     Bridge,
 }
 
 impl Act {
     const ALL: [Self; 3] = [Self::Step, Self::Follow, Self::Bridge];
 
-    /// Does it; no innovation where u is missing.
+    /// Takes the sample; no innovation if u is missing.
     #[inline]
     pub fn on(self, recursion: &mut dyn Recursion, sample: Sample) -> Option<StepOutcome> {
         match self {
@@ -91,23 +91,23 @@ impl BufferedSample {
     }
 }
 
-/// How long a signal has been stationary, and how large it usually is.
+/// Duration of the stationary span of a signal, and its typical size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Channel {
-    /// Value at which the stand started, samples after it, and the last samples that are the same number.
+    /// Value at which the span started, number of samples since then, and number of last samples with the same value.
     value: f64,
     stands: u64,
     same: u64,
     last: f64,
-    /// Largest step within the block before and within this one, and whether the signal came to the stand
-    /// and to the number by a larger one.
+    /// Largest step within the previous block and within this one, and whether the signal reached the span and the
+    /// value by a larger step.
     steps: [f64; 2],
     jumped: [bool; 2],
     tolerance: f64,
     /// Value at the start of the block, and the largest distance from it.
     first: f64,
     largest: f64,
-    /// Mean logarithm of these distances, and blocks in it.
+    /// Mean logarithm of these distances, and number of blocks in it.
     size: f64,
     blocks: u32,
 }
@@ -115,7 +115,7 @@ struct Channel {
 hoid_core::state!([] Channel { value, stands, same, last, steps, jumped, tolerance, first, largest, size, blocks });
 
 impl Channel {
-    /// Nothing is known.
+    /// A channel before the first sample.
     const NEW: Self = Self {
         value: f64::NAN,
         stands: 0,
@@ -149,8 +149,8 @@ impl Channel {
         self.largest = self.largest.max((x - self.first).abs());
     }
 
-    /// Samples of a stand of at least so many that are to be taken back: those that repeat one number
-    /// where nearly all do, and the one before them where the signal jumped to it.
+    /// Number of samples of a stationary span that are to be undone, for a span of at least `least` samples: those
+    /// that repeat one value, if nearly all do, and the one before them if the signal jumped to that value.
     fn stood(&self, least: u64) -> (u64, bool) {
         if 4 * self.same >= 3 * least {
             (self.same, self.jumped[1])
@@ -163,7 +163,7 @@ impl Channel {
         self.steps = [self.steps[1], 0.0];
         let distance = std::mem::take(&mut self.largest);
         self.first = x;
-        // For a stand the size is not learnt.
+        // The size is not learnt within a stationary span.
         if distance <= self.tolerance || !distance.is_finite() {
             return;
         }
@@ -175,10 +175,10 @@ impl Channel {
     }
 }
 
-/// The watch of a recursion.
+/// The stationarity watch of a recursion.
 #[derive(Debug, Clone)]
 pub(crate) struct StationaryWatch {
-    /// Lengths in samples of stationary spans of both signals and of one from which nothing arrives, of a block, until
+    /// Numbers of samples: of a stationary span of both signals and of one without information, of a block, and until
     /// the filters have settled.
     both: u64,
     one: u64,
@@ -186,11 +186,12 @@ pub(crate) struct StationaryWatch {
     settle: u64,
     samples: u64,
     channels: [Channel; CHANNELS],
-    /// The recursion before the samples that are kept, and before the last `since` of them.
+    /// The recursion before the stored samples, and before the last `since` of them.
     kept: [Snapshot; 2],
     since: usize,
     ring: Vec<BufferedSample>,
-    /// Samples of the pause so far, and in a row in which both move; zero outside of one.
+    /// Number of samples of the pause so far, and of consecutive samples in which both signals move; zero outside a
+    /// pause.
     paused: u64,
     moving: u64,
     channel: usize,
@@ -227,7 +228,7 @@ impl State for StationaryWatch {
 }
 
 impl StationaryWatch {
-    /// For a recursion with a delay of nk samples; none if samples are too close.
+    /// Builds the watch for a recursion with a delay of nk samples; none if the sample time is too short.
     pub fn new(nk: usize, sample_time: SampleTime) -> Option<Self> {
         let samples = |seconds: f64| ((seconds / sample_time.s()).round() as u64).max(LEAST);
         let one = samples(ONE_S);
@@ -248,7 +249,7 @@ impl StationaryWatch {
         })
     }
 
-    /// Takes a sample to the recursion.
+    /// Passes a sample to the recursion.
     #[inline]
     pub fn take(&mut self, recursion: &mut dyn Recursion, sample: Sample, act: Act) -> Guarded {
         self.event = None;
@@ -284,7 +285,7 @@ impl StationaryWatch {
         }
     }
 
-    /// The channel that has been constant for too long, and the number of samples to undo.
+    /// Returns the channel that has been constant for too long, and the number of samples to undo.
     #[inline]
     fn stationary_channel(&self) -> Option<(GuardChannel, u64)> {
         let [e, u] = self.channels.map(|channel| channel.stands);
@@ -303,8 +304,7 @@ impl StationaryWatch {
         }
     }
 
-    /// Keeps the numbers of the recursion as they are before the next sample, and forgets those of two
-    /// snapshots ago.
+    /// Stores the numbers of the recursion before the next sample, and drops those of two snapshots ago.
     fn keep(&mut self, recursion: &mut dyn Recursion) {
         self.ring.drain(..self.since);
         self.since = self.ring.len();
@@ -315,7 +315,7 @@ impl StationaryWatch {
         }
     }
 
-    /// Back to before the last `stood` samples, all of which then go into the filters.
+    /// Restores the recursion to before the last `stood` samples, all of which then enter the filters.
     #[cold]
     fn begin_pause(
         &mut self,
@@ -326,7 +326,7 @@ impl StationaryWatch {
     ) -> Guarded {
         let last = self.ring.len() - 1;
         let begin = last.checked_sub(stood.saturating_sub(1) as usize);
-        // What was before the ring started, and did not move the estimate there, is left as it is.
+        // Samples from before the ring, which did not move the estimate, are left as they are.
         if let Some(begin) = begin {
             let newer = usize::from(begin >= self.since);
             self.kept[newer].restore(recursion);
@@ -362,7 +362,7 @@ impl StationaryWatch {
         Guarded { outcome, held: true }
     }
 
-    /// True while a stand may still be that of the pause, or is half one of its own.
+    /// True while a stationary span may still be that of the pause, or has half the length of a new one.
     fn stationary_soon(&self) -> bool {
         let [e, u] = self.channels.map(|channel| channel.stands);
         2 * e.min(u) >= self.both || 2 * e >= self.one || 2 * u >= self.one
@@ -383,7 +383,7 @@ impl StationaryWatch {
         });
     }
 
-    /// Findings and actions at the last sample.
+    /// Returns the event at the last sample.
     pub fn event(&self) -> Option<GuardEvent> {
         self.event
     }

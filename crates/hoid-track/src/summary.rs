@@ -6,7 +6,7 @@ use hoid_model::numbers::plain;
 
 use crate::trace::Trace;
 
-/// The method, its memory, its start, the operator at the end, and the changes that were declared.
+/// Prints the method, its memory, its start, the operator at the end, and the declared changes.
 impl fmt::Display for Trace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let options = self.options();

@@ -24,7 +24,7 @@ pub struct Trace {
     pub(crate) times_s: Vec<f64>,
     /// theta by rows.
     pub(crate) theta: Vec<f64>,
-    /// Covariance of theta by rows and the upper triangle of each; NaN if there is none.
+    /// Covariance of theta, the upper triangle of each row; NaN if there is none.
     pub(crate) covariance: Vec<f64>,
     /// The operator itself, for a recursion in physical parameters.
     pub(crate) operator: Vec<OperatorEstimate>,
@@ -32,37 +32,37 @@ pub struct Trace {
     pub(crate) delays: Vec<Delay>,
     /// The responses that are not those of the polynomials, at each frequency of the options.
     pub(crate) responses: Vec<f64>,
-    /// Crossover and margin of such a recursion, and why there are none.
+    /// Crossover and margin of such a recursion, or the reason why there are none.
     pub(crate) open_loops: Vec<f64>,
     pub(crate) no_crossover: Vec<Option<NoCrossover>>,
     pub(crate) innovation: Vec<f64>,
     pub(crate) innovation_variance: Vec<f64>,
     pub(crate) shortened: Vec<u64>,
-    /// Logarithm of the odds of a recent change, where the method has them.
+    /// Logarithm of the odds of a recent change, for methods that compute it.
     pub(crate) change_odds: Vec<f64>,
     /// Times at which changes were declared, s, with the changes.
     pub(crate) changes: Vec<(f64, Change)>,
     pub(crate) counts: Counts,
     /// Events found by the guard.
     pub(crate) faults: Vec<TrackFault>,
-    /// Samples held back up to each row.
+    /// Number of held-back samples up to each row.
     pub(crate) held: Vec<u64>,
     /// True with a guard.
     pub(crate) guarded: bool,
     /// Length of the idle head of the record, s.
     pub(crate) idle_s: f64,
-    /// The batch fit that the recursion started from.
+    /// The batch fit of the start.
     pub(crate) start: Option<Fit>,
     pub(crate) failures: Option<(usize, String)>,
-    /// Finding of the response at the end against the assumed operator.
+    /// Finding from the response at the end against the assumed operator.
     pub(crate) response_doubt: Option<Finding>,
     /// Every crossing of the loop at the end with its controlled element.
     pub(crate) loop_shape: Option<LoopShape>,
     /// True if the response at the end is determined at some frequency, whatever gain and lead are.
     pub(crate) response_is_known: bool,
-    /// Samples between two rows.
+    /// Number of samples between two rows.
     pub(crate) every: usize,
-    /// Rows of the moving average, 1 for none.
+    /// Length of the moving average in rows, 1 for none.
     pub(crate) averaged: usize,
     /// Time from which the estimate moved, s.
     pub(crate) updated_from_s: f64,
@@ -72,7 +72,7 @@ pub struct Trace {
 pub const OPERATOR_COLUMNS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
 
 impl Trace {
-    /// Without rows, with room for some.
+    /// An empty trace, with capacity for some rows.
     pub(crate) fn empty(options: TrackOptions, sample_time: SampleTime, rows: usize, every: usize) -> Self {
         let p = options.polynomial_orders().parameters();
         Self {
@@ -107,7 +107,7 @@ impl Trace {
         }
     }
 
-    /// Replaces the estimates of the rows, each by one.
+    /// Replaces the estimate of each row.
     pub(crate) fn replace(&mut self, rows: Vec<TwoSided>) {
         let p = self.options.polynomial_orders().parameters();
         self.theta.clear();
@@ -123,33 +123,33 @@ impl Trace {
         }
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn len(&self) -> usize {
         self.times_s.len()
     }
 
-    /// True without a row.
+    /// True for a trace without rows.
     pub fn is_empty(&self) -> bool {
         self.times_s.is_empty()
     }
 
-    /// The options that made it.
+    /// Returns the options of the trace.
     pub fn options(&self) -> &TrackOptions {
         &self.options
     }
 
-    /// Sample time of the record.
+    /// Returns the sample time of the record.
     pub fn sample_time(&self) -> SampleTime {
         self.sample_time
     }
 
-    /// Times of the rows, s.
+    /// Returns the times of the rows, s.
     pub fn times_s(&self) -> &[f64] {
         &self.times_s
     }
 
-    /// Names of the coefficients. With the delay as a parameter B has three, from the smallest
-    /// delay that is tracked on.
+    /// Returns the names of the coefficients. With the delay as a parameter B has three, from the smallest tracked
+    /// delay on.
     pub fn parameter_names(&self) -> Vec<String> {
         self.options.polynomial_orders().parameter_names()
     }
@@ -158,7 +158,7 @@ impl Trace {
         self.options.polynomial_orders().parameters()
     }
 
-    /// theta of a row.
+    /// Returns theta of a row.
     ///
     /// # Panics
     /// Beyond the last row, here and below.
@@ -167,7 +167,7 @@ impl Trace {
         &self.theta[row * p..(row + 1) * p]
     }
 
-    /// Covariance of theta in a row, by rows; `None` while there is none.
+    /// Returns the covariance of theta in a row, by rows; `None` while there is none.
     pub fn covariance(&self, row: usize) -> Option<Vec<f64>> {
         let p = self.width();
         let packed = &self.covariance[row * packed_len(p)..(row + 1) * packed_len(p)];
@@ -175,12 +175,12 @@ impl Trace {
         whole.iter().all(|c| c.is_finite()).then_some(whole)
     }
 
-    /// True for a row before the first estimate of a method that starts itself: what is there is none.
+    /// True for a row before the first estimate of a method that starts itself: its numbers are not an estimate.
     pub fn is_before_the_first(&self, row: usize) -> bool {
         self.options.method.starts_itself() && self.covariance(row).is_none()
     }
 
-    /// Each coefficient of a row with its standard error.
+    /// Returns each coefficient of a row with its standard error.
     pub fn parameters(&self, row: usize) -> Vec<Estimate> {
         let p = self.width();
         let packed = &self.covariance[row * packed_len(p)..(row + 1) * packed_len(p)];
@@ -196,7 +196,7 @@ impl Trace {
             .collect()
     }
 
-    /// The operator of a row with standard errors.
+    /// Returns the operator of a row with standard errors.
     ///
     /// # Errors
     /// [`NotConvertible`] with the reason.
@@ -227,7 +227,7 @@ impl Trace {
         )
     }
 
-    /// Orders of the polynomials of a row, with the delay that they have there.
+    /// Orders of the polynomials of a row, with its delay.
     fn orders_of(&self, row: usize) -> Orders {
         let orders = self.options.polynomial_orders();
         self.delays
@@ -235,7 +235,7 @@ impl Trace {
             .map_or(orders, |delay| Orders { nk: delay.nk, ..orders })
     }
 
-    /// The operator of a row without standard errors, which take most of the time of
+    /// Returns the operator of a row without standard errors, which take most of the time of
     /// [`Trace::operator`].
     ///
     /// # Errors
@@ -248,8 +248,8 @@ impl Trace {
         }
     }
 
-    /// The response of a row at the frequency of that place in [`TrackOptions::at_rad_s`]; `None` while
-    /// there is no estimate, and where there is no such frequency.
+    /// Returns the response of a row at the frequency with this index in [`TrackOptions::at_rad_s`]; `None` while
+    /// there is no estimate, and for an index without a frequency.
     pub fn response(&self, row: usize, place: usize) -> Option<Response> {
         let count = self.options.at_rad_s.len();
         let omega_rad_s = *self.options.at_rad_s.get(place)?;
@@ -268,14 +268,14 @@ impl Trace {
         Response::unpacked(&self.responses[from..from + Response::NUMBERS])
     }
 
-    /// Every crossing of the loop of the last row with the controlled element of the options, and whether it is
-    /// stable; `None` without one.
+    /// Returns every crossing of the loop of the last row with the controlled element of the options, and whether the
+    /// loop is stable; `None` without a controlled element.
     pub fn loop_shape(&self) -> Option<&LoopShape> {
         self.loop_shape.as_ref()
     }
 
-    /// Crossover and phase margin of a row with the controlled element of the options; `None` without
-    /// one.
+    /// Returns crossover and phase margin of a row with the controlled element of the options; `None` without a
+    /// controlled element.
     pub fn open_loop(&self, row: usize) -> Option<Result<OpenLoop, NoCrossover>> {
         let element = self.options.controlled_element.as_ref()?;
         if !self.open_loops.is_empty() {
@@ -293,95 +293,94 @@ impl Trace {
         Some(OpenLoop::of(value, whole, element, ts))
     }
 
-    /// A-priori innovation of each row.
+    /// Returns the a-priori innovation of each row.
     pub fn innovation(&self) -> &[f64] {
         &self.innovation
     }
 
-    /// Innovation variance of each row, as tracked.
+    /// Returns the tracked innovation variance of each row.
     pub fn innovation_variance(&self) -> &[f64] {
         &self.innovation_variance
     }
 
-    /// How often stability or a bound had made a step shorter, up to each row.
+    /// Returns the number of steps that stability or a bound had shortened, up to each row.
     pub fn steps_shortened(&self) -> &[u64] {
         &self.shortened
     }
 
-    /// Logarithm of the odds that the person changed within the last four seconds, in each row;
-    /// empty for methods without hypotheses.
+    /// Returns the logarithm of the odds that the person changed within the last four seconds, in each row; empty for
+    /// methods without hypotheses.
     pub fn change_odds(&self) -> &[f64] {
         &self.change_odds
     }
 
-    /// The changes that were declared, each with the time in s at which it was; rows that are not
-    /// kept included.
+    /// Returns the declared changes, each with its time of declaration in s, including those at rows that are not
+    /// kept.
     pub fn changes(&self) -> &[(f64, Change)] {
         &self.changes
     }
 
-    /// Samples that were not as they should be.
+    /// Returns the counts of faulty samples.
     pub fn counts(&self) -> Counts {
         self.counts
     }
 
-    /// Events found by the guard, and what it did.
+    /// Returns the events found by the guard, and its actions.
     pub fn faults(&self) -> &[TrackFault] {
         &self.faults
     }
 
-    /// Samples that the guard had held back, or during which it let the estimate stay constant, up
+    /// Returns the number of samples that the guard had held back, or during which it kept the estimate constant, up
     /// to each row.
     pub fn held(&self) -> &[u64] {
         &self.held
     }
 
-    /// True if a guard was in front of the recursion.
+    /// True if the recursion had a guard.
     pub fn is_guarded(&self) -> bool {
         self.guarded
     }
 
-    /// Length of the idle head of the record, which the default start span leaves out, s.
+    /// Returns the length of the idle head of the record, which the default start span leaves out, s.
     pub fn idle_s(&self) -> f64 {
         self.idle_s
     }
 
-    /// The batch fit that the recursion started from.
+    /// Returns the batch fit of the start.
     pub fn start(&self) -> Option<&Fit> {
         self.start.as_ref()
     }
 
-    /// Number of fits that failed, and why the last did, for the method window.
+    /// Returns the number of failed fits and the reason of the last, for the method window.
     pub fn failures(&self) -> Option<&(usize, String)> {
         self.failures.as_ref()
     }
 
-    /// Time from which the estimate moved, s.
+    /// Returns the time from which the estimate moved, s.
     pub fn updated_from_s(&self) -> f64 {
         self.updated_from_s
     }
 
-    /// Samples between two rows.
+    /// Returns the number of samples between two rows.
     pub fn every(&self) -> usize {
         self.every
     }
 
-    /// Rows of the moving average, 1 for none.
+    /// Returns the length of the moving average in rows, 1 for none.
     pub fn averaged(&self) -> usize {
         self.averaged
     }
 
-    /// Delay of the rows after the estimates by the moving average, s: half its length.
+    /// Returns the delay of the rows due to the moving average, s: half its length.
     pub fn averaging_delay_s(&self) -> f64 {
         (self.averaged - 1) as f64 / 2.0 * self.every as f64 * self.sample_time.s()
     }
 
-    /// The mean of the last `rows` rows in place of each: theta, the operator of a physical
-    /// recursion, and their covariance.
+    /// Replaces each row by the mean of the last `rows` rows: theta, the operator of a physical recursion, and their
+    /// covariance.
     ///
-    /// The mean lags by `(rows - 1)/2`. Estimates of neighbouring samples have nearly the same
-    /// error, so that the mean of the covariances is close to, and never below, the covariance of
-    /// the mean.
+    /// The mean lags by `(rows - 1)/2`. Estimates of neighbouring samples have nearly the same error, so that the mean
+    /// of the covariances is close to, and never below, the covariance of the mean.
     #[must_use]
     pub fn moving_average(mut self, rows: usize) -> Self {
         let p = self.width();
@@ -433,7 +432,7 @@ impl Trace {
     }
 }
 
-/// The operator of a theta, with standard errors where there is a covariance.
+/// Returns the operator of a theta, with standard errors if there is a covariance.
 pub(crate) fn operator_of(
     structure: Structure,
     orders: Orders,
@@ -484,8 +483,7 @@ fn unpack(packed: &[f64], p: usize) -> Vec<f64> {
     whole
 }
 
-/// Mean of each column over the last `rows` rows, over those that there are in the start. NaN stays
-/// within its reach.
+/// Mean of each column over the last `rows` rows, fewer at the start. NaN affects only the means that contain it.
 fn causal_mean(values: &[f64], width: usize, rows: usize) -> Vec<f64> {
     if width == 0 {
         return Vec::new();
@@ -495,7 +493,7 @@ fn causal_mean(values: &[f64], width: usize, rows: usize) -> Vec<f64> {
     for column in 0..width {
         let (mut sum, mut unknown) = (0.0, 0usize);
         for t in 0..n {
-            // The sum starts again with each window, so that rounding does not pile up.
+            // The sum restarts with each window, so that rounding errors do not accumulate.
             if t % rows == 0 {
                 let window = t.saturating_sub(rows - 1)..t;
                 let known = window.map(|s| values[s * width + column]).filter(|v| !v.is_nan());
@@ -520,7 +518,7 @@ fn causal_mean(values: &[f64], width: usize, rows: usize) -> Vec<f64> {
     means
 }
 
-/// Refuses a trace that would have no row.
+/// Refuses a trace without any row.
 pub(crate) fn check_every(every: usize) -> Result<(), IdentError> {
     if every > 0 {
         return Ok(());

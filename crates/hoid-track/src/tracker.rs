@@ -26,12 +26,12 @@ use crate::{
 
 /// Frequency at which the sign of a response is examined, rad/s.
 const LOW_RAD_S: f64 = 0.5;
-/// Frequencies at which a response may be known, rad/s, and the error from which it is, dB.
+/// Frequencies at which a response may be known, rad/s, and its largest error there, dB.
 const KNOWN_AT_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
 const KNOWN_DB: f64 = 2.0;
-/// Phases of people there, deg: a lag and a delay reach -110, two leads 70.
+/// Phases of people at that frequency, deg: a lag and a delay reach -110, two leads 70.
 const PHASES_DEG: (f64, f64) = (-120.0, 75.0);
-/// Standard errors by which a phase lies beyond them.
+/// Least distance of a phase from this range, in standard errors.
 const APART: f64 = 2.0;
 /// Quantile of the normal distribution for 95 %.
 const NORMAL: f64 = 1.96;
@@ -61,16 +61,16 @@ impl std::fmt::Debug for Tracker {
 }
 
 impl Tracker {
-    /// A tracker with filters at rest. `span` is the record of the start fit; without it the
-    /// tracker starts from theta or from nothing, as the options state.
+    /// Builds a tracker with filters at rest. `span` is the record of the start fit; without it the tracker starts
+    /// from theta or from nothing, as the options require.
     ///
     /// # Errors
-    /// [`IdentError`] when options contradict each other, or the start fit fails.
+    /// [`IdentError`] if options contradict each other, or the start fit fails.
     pub fn new(options: &TrackOptions, span: Option<&Record>, sample_time: SampleTime) -> Result<Self, IdentError> {
         Self::from_fit(options, span, None, sample_time)
     }
 
-    /// As [`Tracker::new`], with the fit of the span where it is known.
+    /// As [`Tracker::new`], with the fit of the span if it is known.
     pub(crate) fn from_fit(
         options: &TrackOptions,
         span: Option<&Record>,
@@ -94,15 +94,14 @@ impl Tracker {
         })
     }
 
-    /// Takes a sample: a bounded number of operations, whatever the sample holds and however long the
-    /// run was. On a PC with 100 samples a second `adaptive` takes 33 us in the median and 86 us at 99 of
-    /// 100 samples, without reading the record again (`replay` of 0) 0.5 and 22 us, `rpem` 0.1 and 0.2 us.
+    /// Takes a sample: a bounded number of operations, whatever its values and the length of the run. On a PC with 100
+    /// samples a second `adaptive` takes 33 us in the median and 86 us at 99 of 100 samples, without replays (`replay`
+    /// of 0) 0.5 and 22 us, `rpem` 0.1 and 0.2 us.
     pub fn step(&mut self, e: f64, u: f64) -> Outcome {
         self.update(Sample { e, u, reference: None }, true)
     }
 
-    /// Takes a sample, with the external signal where it is known. With `moves` false only the
-    /// filters follow.
+    /// Takes a sample, with the external signal if it is known. If `moves` is false only the filters are updated.
     pub fn update(&mut self, sample: Sample, moves: bool) -> Outcome {
         self.counts.samples += 1;
         let sound = |v: f64| v.abs() <= self.options.largest;
@@ -151,7 +150,7 @@ impl Tracker {
         }
     }
 
-    /// Outcome of a sample after a guard.
+    /// Outcome of a sample that passed a guard.
     #[inline]
     fn guarded(&mut self, guarded: Guarded, skipped: bool) -> Outcome {
         let taken = guarded.outcome.filter(|_| !guarded.held);
@@ -168,13 +167,13 @@ impl Tracker {
         }
     }
 
-    /// Event of the guard at the last sample.
+    /// Returns the event of the guard at the last sample.
     pub fn event(&self) -> Option<GuardEvent> {
         let of_guard = self.guard.as_ref().and_then(|guard| guard.event());
         of_guard.or_else(|| self.stationary.as_ref()?.event())
     }
 
-    /// True while the estimate stays constant, by the guard or because nothing arrives.
+    /// True while the estimate stays constant, because of the guard or because the samples carry no information.
     pub fn is_paused(&self) -> bool {
         let of_guard = self.guard.as_ref().is_some_and(|guard| guard.is_paused());
         of_guard
@@ -184,29 +183,29 @@ impl Tracker {
                 .is_some_and(|stationary| stationary.is_paused())
     }
 
-    /// Seconds since the guard started the estimate again, where it has.
+    /// Returns the seconds since the last restart by the guard, if there was one.
     pub fn since_restart_s(&self) -> Option<f64> {
         self.guard.as_ref()?.since_restart_s()
     }
 
-    /// theta in the order of [`Tracker::parameter_names`].
+    /// Returns theta in the order of [`Tracker::parameter_names`].
     pub fn theta(&self) -> &[f64] {
         self.recursion.theta()
     }
 
-    /// Names of the coefficients.
+    /// Returns the names of the coefficients.
     pub fn parameter_names(&self) -> Vec<String> {
         self.options.polynomial_orders().parameter_names()
     }
 
-    /// Covariance of theta by rows; `None` while there is none.
+    /// Returns the covariance of theta by rows; `None` while there is none.
     pub fn covariance(&self) -> Option<Vec<f64>> {
         let p = self.theta().len();
         let mut covariance = vec![0.0; p * p];
         self.recursion.covariance(&mut covariance).then_some(covariance)
     }
 
-    /// Each coefficient with its standard error.
+    /// Returns each coefficient with its standard error.
     pub fn parameters(&self) -> Vec<Estimate> {
         let p = self.theta().len();
         let covariance = self.covariance();
@@ -217,7 +216,7 @@ impl Tracker {
         self.theta().iter().enumerate().map(of).collect()
     }
 
-    /// The operator with standard errors.
+    /// Returns the operator with standard errors.
     ///
     /// # Errors
     /// [`NotConvertible`] with the reason.
@@ -236,14 +235,14 @@ impl Tracker {
         }
     }
 
-    /// Orders of the polynomials, with the delay that they have now.
+    /// Orders of the polynomials, with the current delay.
     fn orders(&self) -> Orders {
         let orders = self.options.polynomial_orders();
         let delay = self.recursion.delay();
         delay.map_or(orders, |delay| Orders { nk: delay.nk, ..orders })
     }
 
-    /// The response of the estimate at a frequency in rad/s; `None` while there is no estimate.
+    /// Returns the response of the estimate at a frequency in rad/s; `None` while there is no estimate.
     pub fn response(&self, omega_rad_s: f64) -> Option<Response> {
         if self.options.method.starts_itself() {
             return self.recursion.response(omega_rad_s);
@@ -255,7 +254,7 @@ impl Tracker {
         Some(Response::of_polynomials(&orders, theta, whole, omega_rad_s, ts))
     }
 
-    /// Crossover and phase margin with the controlled element of the options; `None` without one.
+    /// Returns crossover and phase margin with the controlled element of the options; `None` without one.
     pub fn open_loop(&self) -> Option<Result<OpenLoop, NoCrossover>> {
         let element = self.options.controlled_element.as_ref()?;
         let whole = |omega: f64| self.response(omega);
@@ -271,8 +270,8 @@ impl Tracker {
         Some(OpenLoop::of(value, whole, element, self.sample_time))
     }
 
-    /// True if a method whose basis holds more forms than gain and lead knows the current response at some frequency to
-    /// a quarter: gain and lead may be open then.
+    /// True if a method whose basis contains more forms than gain and lead determines the current response at some
+    /// frequency to a quarter: gain and lead may then be undetermined.
     pub(crate) fn response_is_known(&self) -> bool {
         let known = |omega: &f64| {
             let gain = self
@@ -283,7 +282,8 @@ impl Tracker {
         self.options.method.lag_of_basis_s().is_some() && KNOWN_AT_RAD_S.iter().any(known)
     }
 
-    /// Every crossing of the current loop with its controlled element; `None` without one, or without an estimate.
+    /// Returns every crossing of the current loop with its controlled element; `None` without one, or without an
+    /// estimate.
     pub(crate) fn open_loop_shape(&self) -> Option<LoopShape> {
         let element = self.options.controlled_element.as_ref()?;
         self.response(1.0)?;
@@ -304,8 +304,8 @@ impl Tracker {
         LoopShape::of(known, element, self.sample_time)
     }
 
-    /// Finding of the current response against the assumed operator: with a controlled element, the loop that it would
-    /// form ([`LoopShape::doubt`]), without one the sign of the response at low frequencies.
+    /// Returns the finding from the current response against the assumed operator: with a controlled element, the loop
+    /// that it would form ([`LoopShape::doubt`]), without one the sign of the response at low frequencies.
     pub(crate) fn response_doubt(&self) -> Option<Finding> {
         if let Some(element) = &self.options.controlled_element {
             let reach = match self.open_loop()? {
@@ -336,13 +336,13 @@ impl Tracker {
         })
     }
 
-    /// Logarithm of the odds that the person changed within the last four seconds, by
-    /// the bank of `multiple-model`.
+    /// Returns the logarithm of the odds that the person changed within the last four seconds, from the bank of
+    /// `multiple-model`.
     pub fn change_odds(&self) -> Option<f64> {
         self.recursion.change_odds()
     }
 
-    /// The change that was declared at the last sample, if one was.
+    /// Returns the change that was declared at the last sample, if there was one.
     pub fn change(&self) -> Option<Change> {
         if !self.moved {
             return None;
@@ -350,27 +350,27 @@ impl Tracker {
         self.recursion.change()
     }
 
-    /// Innovation variance as tracked.
+    /// Returns the tracked innovation variance.
     pub fn innovation_variance(&self) -> f64 {
         self.recursion.innovation_variance()
     }
 
-    /// Samples that were not as they should be.
+    /// Returns the counts of faulty samples.
     pub fn counts(&self) -> Counts {
         self.counts
     }
 
-    /// Number of fits that failed, and why the last did, for the method window.
+    /// Returns the number of failed fits and the reason of the last, for the method window.
     pub fn failures(&self) -> Option<(usize, String)> {
         self.recursion.failures()
     }
 
-    /// The batch fit that the tracker started from.
+    /// Returns the batch fit of the start.
     pub fn start(&self) -> Option<&Fit> {
         self.start.fit.as_ref()
     }
 
-    /// The options.
+    /// Returns the options.
     pub fn options(&self) -> &TrackOptions {
         &self.options
     }
@@ -382,7 +382,7 @@ fn largest_nk(options: &TrackOptions, sample_time: SampleTime) -> usize {
     options.orders.nk.max((latest.ceil() as usize).saturating_add(1))
 }
 
-/// The watch of a recursion without a guard, but where that was requested.
+/// Builds the watch of a recursion without a guard, unless a recursion without it was requested.
 pub(crate) fn stationary_watch(options: &TrackOptions, sample_time: SampleTime) -> Option<Box<StationaryWatch>> {
     if options.method.guard().is_some() {
         return None;
@@ -390,7 +390,7 @@ pub(crate) fn stationary_watch(options: &TrackOptions, sample_time: SampleTime) 
     StationaryWatch::new(largest_nk(options, sample_time), sample_time).map(Box::new)
 }
 
-/// The guard of a recursion at its start, where the options ask for one.
+/// Builds the guard of a recursion at its start, if the options ask for one.
 pub(crate) fn guard_of(
     options: &TrackOptions,
     recursion: &mut dyn Recursion,

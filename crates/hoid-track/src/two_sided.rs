@@ -1,23 +1,23 @@
-//! The two-sided estimate of a recorded run, as a method that has one gives it.
+//! The two-sided estimate of a recorded run, for methods that compute one.
 
 use hoid_model::uncertainty::OperatorEstimate;
 
 use crate::setup::Setup;
 
-/// The causal run before it, and of which samples estimates are asked.
+/// The causal run, and the samples at which estimates are needed.
 #[derive(Debug, Clone)]
 pub struct Causal {
     /// Components of the recursion.
     pub setup: Setup,
     /// Magnitude beyond which a sample is a fault.
     pub largest: f64,
-    /// The samples of which a trace has rows, ascending.
+    /// The samples at which a trace has rows, ascending.
     pub rows: Vec<usize>,
     /// The operator at the end.
     pub last: Option<OperatorEstimate>,
 }
 
-/// Information of all of a run about the operator at one sample.
+/// The operator at one sample, estimated from the whole run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TwoSided {
     /// The coefficients.

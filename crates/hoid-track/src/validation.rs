@@ -1,29 +1,30 @@
 //! Prediction of another run by a trace, and the choice of the initial covariance by it.
 //!
 //! The thesis measures models by the variance accounted for (eq. 39) and proposes that "the covariance matrix could be
-//! updated based on VAF from a validation data set, in order to reduce the strong oscillations" (section VII); how, it
-//! leaves open. Here: a second run of the same person in the same task, with its own remnant, is simulated with the
-//! estimates of the first as they changed in time,
+//! updated based on VAF from a validation data set, in order to reduce the strong oscillations" (section VII), but not
+//! how. Here a second run of the same person in the same task, with its own remnant, is simulated with the
+//! time-varying estimates of the first,
 //!
 //! `w(t) = sum_j b_j(t) e(t - nk - j) - sum_i g_i(t) w(t - i)`,  `G = A F`,
 //!
 //! `VAF = max(0, 1 - sum (u - w)^2/sum u^2) 100 %`,
 //!
-//! and of a grid of `P_0 = p I` that p is taken whose trace explains most of it. An estimate that
-//! follows the remnant of the first run explains less of the second, for that has another one; one
-//! that is too stiff explains less where the person changes. Runs are laid on one another from their
-//! first samples on, so that what changes in the task has to change at the same time in both.
+//! and of a grid of `P_0 = p I` the p is chosen whose trace explains most of it. An estimate that
+//! follows the remnant of the first run explains less of the second, which has another remnant; one that is too stiff
+//! explains less after a change of the person. The runs are aligned at their first samples, so that changes of the
+//! task have to occur at the same time in both.
 //!
-//! [`track_validated`] takes the proposal by its word: P is updated in course. At regular times the current model and
-//! that of one interval before are both simulated over the last seconds of the second run; where the current one
+//! [`track_validated`] follows the proposal literally: P is updated during the run. At regular times the current model
+//! and that of one interval before are both simulated over the last seconds of the second run; if the current one
 //! explains less,
 //!
 //! `P <- P max(least, ((1 - VAF_before)/(1 - VAF_now))^power)`,
 //!
-//! the estimate moves less until it has forgotten; where it explains more, P stays. What the remnant
-//! leaves unexplained is in both, so that a model that is right is not punished by noise.
+//! the estimate moves less until it has forgotten; if it explains more, P stays constant. The share that the remnant
+//! leaves unexplained is in both, so that noise does not penalise a correct model.
 //!
-//! The VAF removes no mean. The first seconds are left out: the simulation starts at rest, and the person does not.
+//! The VAF removes no mean. The first seconds are left out, since the simulation starts at rest and the person does
+//! not.
 
 use hoid_ident::{IdentError, validation::vaf};
 use hoid_model::{Orders, Record, SampleTime};
@@ -36,30 +37,30 @@ use crate::{
     trace::Trace,
 };
 
-/// Values of p that are tried, in units of the innovation variance; the text's is 0.1.
+/// Values of p that are tried, in units of the innovation variance; the thesis has 0.1.
 pub const COVARIANCES: [f64; 9] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0];
-/// Time after which the simulation has forgotten that it started at rest, s.
+/// Time after which the initial state of the simulation has decayed, s.
 const SETTLING_S: f64 = 2.0;
 /// Shortest span that is compared, s.
 const SHORTEST_S: f64 = 5.0;
-/// Option that is chosen.
+/// Name of the option that is chosen.
 const COVARIANCE: &str = "covariance";
 
-/// A covariance at the start that was chosen by a second run.
+/// An initial covariance chosen by a second run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CovarianceChoice {
-    /// Each p that was tried, ascending, with the VAF of the second run by its trace in %.
+    /// Each p that was tried, ascending, with the VAF of the second run for its trace, %.
     pub candidates: Vec<(f64, f64)>,
-    /// The p that was taken.
+    /// The chosen p.
     pub covariance: f64,
     /// Label of the second run.
     pub label: String,
-    /// Span of the second run that was compared, in s from its first sample.
+    /// Span of the second run that was compared, s from its first sample.
     pub span_s: (f64, f64),
 }
 
 impl CovarianceChoice {
-    /// VAF of the p that was taken, %.
+    /// VAF of the chosen p, %.
     pub fn vaf(&self) -> f64 {
         let taken = self.candidates.iter().find(|(p, _)| *p == self.covariance);
         taken.map_or(f64::NAN, |(_, vaf)| *vaf)
@@ -67,13 +68,12 @@ impl CovarianceChoice {
 }
 
 impl Trace {
-    /// VAF (eq. 39, no mean removed) of another run that is simulated with the estimates of this trace,
-    /// each at its time from the first sample on, in %, and the span that was compared, in s from the
-    /// first sample.
+    /// Returns the VAF (eq. 39, no mean removed) of another run that is simulated with the estimates of this trace,
+    /// each at its time from the first sample on, in %, and the span that was compared, in s from the first sample.
     ///
     /// # Errors
-    /// [`IdentError`] for a run that is sampled otherwise, has no input, or too few samples in common,
-    /// and for a trace whose delay moves.
+    /// [`IdentError`] for a run with another sample time, without an input, or with too few samples in common, and for
+    /// a trace with a tracked delay.
     pub fn vaf_of(&self, other: &Record) -> Result<(f64, (f64, f64)), IdentError> {
         let ts = self.sample_time();
         check(other, self.options(), ts)?;
@@ -124,7 +124,7 @@ fn check(other: &Record, options: &TrackOptions, ts: SampleTime) -> Result<(), I
     Ok(())
 }
 
-/// The response to an input from a sample on, at rest before it, the coefficients as they are at each.
+/// Simulates the response to an input from a sample on, at rest before it, with the coefficients of each sample.
 fn simulated<'t>(o: &Orders, e: &[f64], first: usize, theta_at: impl Fn(usize) -> &'t [f64]) -> Vec<f64> {
     let mut w = vec![0.0; e.len()];
     for k in first..e.len() {
@@ -149,7 +149,7 @@ fn simulated<'t>(o: &Orders, e: &[f64], first: usize, theta_at: impl Fn(usize) -
     w
 }
 
-/// A method whose gain has a covariance.
+/// Checks that the gain of the method has a covariance.
 fn check_method(options: &TrackOptions) -> Result<(), IdentError> {
     let method = &options.method;
     let has_p = method
@@ -168,11 +168,11 @@ fn check_method(options: &TrackOptions) -> Result<(), IdentError> {
     Ok(())
 }
 
-/// The options with the covariance at the start whose trace of the record explains most of a second
-/// run; of two that explain the same, the smaller.
+/// Returns the options with the initial covariance whose trace of the record explains most of a second run; of two
+/// that explain the same, the smaller.
 ///
 /// # Errors
-/// [`IdentError`] for a method without such a covariance, one that is given already, and as
+/// [`IdentError`] for a method without such a covariance, or one that is given already, and as
 /// [`track_from`] and [`Trace::vaf_of`].
 pub fn choose_covariance(
     record: &Record,
@@ -219,20 +219,20 @@ pub fn choose_covariance(
     Ok((options, choice))
 }
 
-/// How P follows the VAF of a second run.
+/// Update of P by the VAF of a second run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CovarianceUpdates {
-    /// Time between two looks at the second run, s.
+    /// Time between two comparisons with the second run, s.
     pub interval_s: f64,
     /// Length of the second run that is examined, s.
     pub window_s: f64,
     /// Smallest factor of P.
     pub least: f64,
-    /// Power of the ratio of what is not explained; 0 leaves P alone.
+    /// Power of the ratio of the unexplained shares; 0 leaves P unchanged.
     pub power: f64,
 }
 
-/// Set on runs of their own (`research/notes/survey-methods.md`).
+/// Chosen on separate runs (`research/notes/survey-methods.md`).
 impl Default for CovarianceUpdates {
     fn default() -> Self {
         Self {
@@ -244,12 +244,12 @@ impl Default for CovarianceUpdates {
     }
 }
 
-/// As [`crate::track()`], with a covariance that shrinks where the estimate has come to explain less of a
-/// second run.
+/// As [`crate::track()`], with a covariance that is reduced when the estimate explains less of a second run than
+/// before.
 ///
 /// # Errors
-/// As [`crate::track()`]; [`IdentError`] for a method without such a covariance or with a delay that moves,
-/// and a second run that is sampled otherwise, shorter, or without an input.
+/// As [`crate::track()`]; [`IdentError`] for a method without such a covariance or with a tracked delay, and for a
+/// second run with another sample time, too few samples, or no input.
 pub fn track_validated(
     record: &Record,
     validation: &Record,
@@ -274,7 +274,7 @@ pub fn track_validated(
     let unexplained = |theta: &[f64], end: usize| -> f64 {
         let first = end.saturating_sub(window);
         let from = first.saturating_sub(settling);
-        // The input of nk before is that of the run too.
+        // The input of the nk samples before belongs to the run.
         let begin = from.saturating_sub(o.nk + o.nb);
         let w = simulated(&o, &e[begin..end], from - begin, |_| theta);
         let error: f64 = (first..end).map(|k| (u[k] - w[k - begin]).powi(2)).sum();

@@ -1,5 +1,5 @@
-//! What `adaptive` states of virtual people in their first seconds: from the second second on, with
-//! bands that hold.
+//! Estimates of `adaptive` for virtual people in their first seconds: from the second second on, with valid error
+//! bands.
 #![allow(clippy::unwrap_used)]
 
 use hoid_model::{Complex64, ContinuousTransferFunction, FamilyOperator, SampleTime};
@@ -78,7 +78,7 @@ fn bands_hold_from_the_second_second_on() {
     for (share, at) in shares(&counts).into_iter().zip(AT_S) {
         assert!((0.85..=1.0).contains(&share), "{at} s: {share}");
     }
-    // Before 8 s few report what their crossover is.
+    // Before 8 s few have a determined crossover.
     for (count, at) in loops.iter().zip(AT_S).skip(3) {
         assert!(count.all >= 30.0, "{at} s: {}", count.all);
         let share = count.inside / count.all;

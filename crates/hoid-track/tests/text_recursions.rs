@@ -1,5 +1,5 @@
-//! The recursions of the thesis as its users get them, against its equations written down once more:
-//! P as a plain matrix, nothing shared with the library.
+//! The recursions of the thesis as available to users, compared with a separate implementation of its equations: P as
+//! a plain matrix, no code shared with the library.
 //!
 //! ```text
 //! RLS, eq. 25 and 5.26:  psi = [-u(t-1) -u(t-2) x(t) x(t-1)],  eps = u - psi' theta
@@ -8,9 +8,8 @@
 //! both:  g = P psi/(lambda + psi' P psi),  theta <- theta + g eps,  P <- (P - g psi' P)/lambda
 //! ```
 //!
-//! with x(t) = e(t - nk); a step after which F or D is not stable is halved; w and v are computed
-//! again with the new theta. Settings are those of the text: lambda = 1 - 1/256, P0 = 0.1 I, from
-//! the batch fit of [0, 30.72] s.
+//! with x(t) = e(t - nk); a step after which F or D is not stable is halved; w and v are computed again with the new
+//! theta. Settings are those of the thesis: lambda = 1 - 1/256, P0 = 0.1 I, from the batch fit of [0, 30.72] s.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
@@ -40,7 +39,7 @@ fn run(condition: Condition, order: usize, noise_level: f64, replication: u64) -
     Simulator::new(&scenario).unwrap().run(seed, false).unwrap()
 }
 
-/// By the settings of the text, and what is set in addition.
+/// Options with the settings of the thesis, and additional ones.
 fn of_the_text(method: Method, besides: &[(&str, &str)]) -> TrackOptions {
     let rpem = method == Method::rpem();
     let options = TrackOptions {
@@ -106,7 +105,7 @@ fn is_stable(theta: &[f64; 5]) -> bool {
 fn rpem(record: &Record, start: &[f64]) -> Vec<Vec<f64>> {
     let mut theta = <[f64; 5]>::try_from(start).unwrap();
     let (mut p, u) = (Plain::new(), record.output());
-    // x, v, w and those behind D/F, of the last two samples.
+    // x, v, w and their versions filtered by D/F, of the last two samples.
     let (mut x_1, mut v_1, mut w, mut x_f, mut w_f) = (0.0, 0.0, [0.0; 2], [0.0; 2], [0.0; 2]);
     let step = |k: usize| {
         let x = delayed(record, k);
@@ -138,7 +137,7 @@ fn difference(trace: &Trace, twin: &[Vec<f64>]) -> f64 {
     twin.iter().enumerate().map(of_row).fold(0.0, f64::max)
 }
 
-/// Largest difference of the text's recursion, as the program has it, from its equations.
+/// Largest difference between the recursion of the program and the equations of the thesis.
 fn from_equations(method: &Method, record: &Record, besides: &[(&str, &str)]) -> f64 {
     let trace = track(record, &of_the_text(method.clone(), besides), 1).unwrap();
     let start = trace.start().unwrap().model().theta();
@@ -172,13 +171,12 @@ fn by_the_settings_of_the_text_they_are_its_equations() {
         "with a guard of 1e4 P0 coefficients differ by {:.1e} (RLS), {:.1e} (RPEM)",
         with_a_guard[0], with_a_guard[1]
     );
-    // The test can fail: with a guard they are other recursions.
+    // The test can fail: with a guard the recursions differ.
     assert!(with_a_guard.iter().all(|most| *most > 1e-5), "{with_a_guard:?}");
 }
 
-/// Nothing excites anything for an hour: P overflows and starts again, and no number is lost.
-/// Least squares comes back. RPEM need not: with a P that has grown for minutes the first samples move
-/// it anywhere, which is what its guard is for.
+/// Nothing is excited for an hour: P overflows and restarts, and all numbers stay finite. Least squares recovers. RPEM
+/// need not: with a P that has grown for minutes the first samples move it anywhere, which its guard prevents.
 #[test]
 fn an_hour_of_silence_leaves_every_number_finite() {
     let run = run(Condition::C1, 1, 0.1, 1);
@@ -240,8 +238,8 @@ fn a_guard_that_is_none_is_refused_with_what_to_do() {
     assert!(of_the_text(Method::rls(), &[("forgetting", "window")]).check().is_ok());
 }
 
-/// What is not the text's recursion keeps its guard: a start with the covariance of its fit, limited
-/// innovations, and structures that the text does not have.
+/// A recursion other than that of the thesis keeps its guard: a start with the covariance of its fit, limited
+/// innovations, and structures that the thesis does not have.
 #[test]
 fn other_settings_keep_their_guard() {
     let words = |options: TrackOptions| options.memory_as_text(hoid_model::SampleTime::HUNDREDTH);

@@ -1,5 +1,5 @@
-//! What does a fault of a recording do to a result, and does the result report it? The numbers of the
-//! page `research/notes/faults.md`.
+//! Effect of a fault of a recording on a result, and whether the result reports it. The numbers of the page
+//! `research/notes/faults.md`.
 //!
 //! `cargo xtask slow faults [--part N] [--clean N] [--only METHOD] [--rows FILE] [--program FILE] [--seed N]`: all
 //! faults in runs of C1, of C2 and of a virtual person, then clean runs (1000 in all by default, evaluated in batch and
@@ -21,9 +21,9 @@ use fault_corpus::{
 };
 use rayon::prelude::*;
 
-/// The value for the page; the tests have others.
+/// The seed of the page; the tests have others.
 const SEED: u64 = 2121;
-/// Numbers of clean runs start here, so that none is the run of a fault.
+/// First number of the clean runs, so that none is also the run of a fault.
 const FIRST_CLEAN: u64 = 100_000;
 
 fn main() {
@@ -55,7 +55,7 @@ fn main() {
         .into_par_iter()
         .flat_map_iter(|(case, fault, who)| outcomes(&program, seed, case, fault, who, &ways).unwrap())
         .collect();
-    // A half of them people, a quarter each of C1 and C2.
+    // Half of them people, a quarter each of C1 and C2.
     let sound: Vec<Outcome> = (0..number)
         .step_by(part)
         .collect::<Vec<_>>()
@@ -63,7 +63,7 @@ fn main() {
         .flat_map_iter(|i| {
             let i = i / part as u64;
             let who = [Who::C1, Who::Person, Who::C2, Who::Person][i as usize % 4];
-            // The case decides what kind of person: each in turn.
+            // The number of the case determines the kind of person, in turn.
             let case = FIRST_CLEAN + i / 2;
             let tracker = [Way::MultipleModel, Way::Physical, Way::Rpem, Way::Rls][i as usize / 4 % 4];
             let batch = [Way::GreyBox, Way::BoxJenkins][i as usize / 4 % 2];
@@ -96,7 +96,7 @@ fn main() {
     );
 }
 
-/// The program in the folder of builds that this example is in.
+/// Path of the program in the build folder of this example.
 fn beside_this() -> PathBuf {
     let here = std::env::current_exe().unwrap();
     let folder = here.parent().unwrap().parent().unwrap();

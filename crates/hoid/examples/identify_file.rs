@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let records = [record];
     let person = identify(&records)?;
     println!("{person}\n");
-    // The same as polynomials, with the tests of its residuals.
+    // The same with polynomials, and the tests of its residuals.
     let choice = identify_box_jenkins(&records)?;
     println!("{}\n", choice.fit);
     match choice.fit.operator() {

@@ -1,4 +1,4 @@
-//! Do the error bars of operators of people hold? The numbers of `research/notes/people-coverage.md`.
+//! Checks the error bars of operators of people. The numbers of `research/notes/people-coverage.md`.
 //!
 //! `cargo xtask slow people-coverage [PEOPLE] [FIRST] [--given] [--lines] [--no-lines] [--rows FILE]`:
 //! 2000 people by default, from the first number on. `--given` leaves out the fits that choose the
@@ -158,7 +158,7 @@ fn report(variant: Variant, of: &[&Outcome]) {
     findings(of);
 }
 
-/// How often each finding was made, doubts and notes alike.
+/// Number of occurrences of each finding, doubts and notes alike.
 fn findings(of: &[&Outcome]) {
     let made: Vec<&Vec<String>> = of.iter().filter_map(|o| Some(&o.found.as_ref().ok()?.kinds)).collect();
     let kinds: BTreeSet<&String> = made.iter().copied().flatten().collect();
@@ -170,7 +170,7 @@ fn findings(of: &[&Outcome]) {
     }
 }
 
-/// Coverage over all quantities that are determined, each once.
+/// Coverage over all determined quantities, each counted once.
 fn over_all(of: &[&Outcome]) -> Share {
     let each = QUANTITIES
         .iter()

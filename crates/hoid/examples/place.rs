@@ -1,5 +1,5 @@
-//! Samples `e,u` on standard input; after each the six parameters of the operator, crossover and phase margin, each
-//! with its standard error, and the nanoseconds that the sample took: a place of `cargo xtask places`.
+//! Samples `e,u` on standard input; after each sample the six parameters of the operator, crossover and phase margin,
+//! each with its standard error, and the time of the sample in ns: a place of `cargo xtask places`.
 #![allow(clippy::print_stdout)]
 
 use std::{

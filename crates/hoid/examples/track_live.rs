@@ -1,8 +1,8 @@
 //! Tracks a person while they act: one sample in, one estimate out.
 //! `cargo run --example track_live`.
 //!
-//! The samples come from a simulated run whose task changes at 40.96 s. The default tracker gets no
-//! information about the person and starts with the first sample.
+//! The samples come from a simulated run whose task changes at 40.96 s. The default tracker has no prior information
+//! about the person and starts with the first sample.
 #![allow(clippy::print_stdout)]
 
 use std::error::Error;

@@ -1,4 +1,4 @@
-//! What faults in a stream do to the trackers: the numbers of `research/notes/guards-evidence.md`.
+//! Effects of faults in a stream on the trackers: the numbers of `research/notes/guards-evidence.md`.
 //!
 //! `cargo xtask slow tracker-faults [SEEDS] [FIRST] [--bare] [METHOD...]`: 4 seeds by default, from
 //! the first on; `--bare` without the guard, for comparison. `--cost` takes the samples of one run
@@ -16,7 +16,7 @@ use hoid::{
 use rayon::prelude::*;
 use tracker_faults::{Effect, Reference, Run, faults};
 
-/// Length of a run, and where the faults are, s.
+/// Length of a run, and times of the faults, s.
 const LENGTH_S: f64 = 330.0;
 const PLACES_S: [f64; 2] = [100.3, 121.77];
 
@@ -56,7 +56,7 @@ fn main() {
                 let condition = [Condition::C1, Condition::C4][(seed % 2) as usize];
                 let remnant_order = 1 + (seed / 2 % 3) as usize;
                 let run = Run::new(condition, remnant_order, seed, LENGTH_S);
-                // The noise model that the method takes, or that of the remnant.
+                // The default noise model of the method, or that of the remnant.
                 let orders = method.default_orders(29);
                 let nd = if orders.nd > 0 { orders.nd.max(remnant_order) } else { 0 };
                 let options = TrackOptions::new(method.clone(), method.default_structure(), Orders { nd, ..orders });

@@ -1,5 +1,5 @@
-//! Human-operator identification: how a person controls a machine, from the tracking error e and
-//! the control output u.
+//! Human-operator identification: a model of how a person controls a machine, from the tracking error e and the
+//! control output u.
 //!
 //! A pilot, driver or surgeon closes a control loop. Near the task they behave like a linear
 //! operator with a remnant,
@@ -10,8 +10,8 @@
 //! method on a Box-Jenkins model `u = (B/F) q^-nk e + (1/D) eps`, sample by sample by recursions,
 //! on recorded and on simulated runs.
 //!
-//! This crate has no code of its own. The prelude has what most programs use, from the file to the
-//! report (feature `report`):
+//! This crate re-exports the others. The prelude contains the items for most programs, from the file to the report
+//! (feature `report`):
 //!
 //! ```no_run
 //! use hoid::prelude::*;
@@ -33,7 +33,7 @@
 //! # }
 //! ```
 //!
-//! The same on a simulated run, where the truth is known:
+//! The same for a simulated run with known true values:
 //!
 //! ```
 //! use hoid::prelude::*;
@@ -59,7 +59,7 @@
 //! | `thesis` | [`thesis`]: the thesis, reproduced; with `report` | |
 //! | `pdf-png` | figures as PDF and PNG; with `report` | |
 //!
-//! With `default-features = false` nothing that reads files is built.
+//! With `default-features = false` the code that reads files is not built.
 
 #[cfg(feature = "io")]
 pub use hoid_analysis as analysis;
@@ -83,7 +83,7 @@ pub use hoid_survey as survey;
 pub use hoid_thesis as thesis;
 pub use hoid_track as track;
 
-/// Functions that most programs use: read, identify, validate, track, report, simulate.
+/// Items for most programs: read, identify, validate, track, report, simulate.
 pub mod prelude {
     #[cfg(feature = "io")]
     pub use hoid_analysis::{Identification, Identified, Recordings, identify};
@@ -106,7 +106,7 @@ pub mod prelude {
     pub use hoid_track::{Memory, Method, Sample, StartAt, Trace, TrackOptions, Tracker, track};
 }
 
-/// The Rust of the book; its other blocks are run by `python/tests/test_book.py`.
+/// The Rust examples of the book; its other blocks are run by `python/tests/test_book.py`.
 #[cfg(doctest)]
 mod book {
     #[doc = include_str!("../../../docs/src/methods/grey-box.md")]

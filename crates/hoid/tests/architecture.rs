@@ -1,11 +1,11 @@
-//! Keeps the directions between the crates as ARCHITECTURE.md draws them.
+//! Checks the dependencies between the crates against ARCHITECTURE.md.
 #![allow(clippy::unwrap_used)]
 
 use std::{collections::BTreeMap, process::Command};
 
 use serde_json::Value;
 
-/// What each crate may depend on within the workspace.
+/// The crates of the workspace on which each crate may depend.
 const ALLOWED: [(&str, &[&str]); 23] = [
     ("hoid-numerics", &[]),
     ("hoid-core", &["hoid-numerics"]),
@@ -196,7 +196,7 @@ fn crates_depend_only_downwards() {
             .unwrap_or_else(|| panic!("{name} needs a line here and in ARCHITECTURE.md"));
         for dependency in package["dependencies"].as_array().unwrap() {
             let to = dependency["name"].as_str().unwrap();
-            // Tests may look at the whole.
+            // Tests may depend on everything.
             let for_tests = dependency["kind"] == "dev";
             if to.starts_with("hoid") && !for_tests {
                 assert!(may.contains(&to), "{name} must not depend on {to}");

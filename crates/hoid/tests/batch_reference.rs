@@ -1,5 +1,5 @@
-//! Batch fits on simulated runs against independently computed values: medians of the relative
-//! error of ARX and Box-Jenkins fits in C1, 100 runs a cell, nk = 29.
+//! Batch fits on simulated runs compared with independently computed values: medians of the relative error of ARX and
+//! Box-Jenkins fits in C1, 100 runs per cell, nk = 29.
 #![allow(clippy::unwrap_used)]
 
 use hoid::{model::remnant_gain::NoiseDefinition, model::scenario::RemnantStrength, prelude::*};
@@ -36,7 +36,7 @@ fn records(condition: Condition, m0: usize, level: f64) -> Vec<Record> {
         .collect()
 }
 
-/// `[f1, f2, b0, b1]` (or a1, a2) of the truth.
+/// True `[f1, f2, b0, b1]` (or a1, a2).
 fn truth(condition: Condition) -> [f64; 4] {
     let d = Scenario::condition(condition)
         .initial
@@ -64,7 +64,7 @@ fn median(values: &[f64]) -> (f64, f64) {
 }
 
 struct Cell {
-    /// Relative errors in %, one row a fit.
+    /// Relative errors in %, one row per fit.
     a1: Vec<f64>,
     b0: Vec<f64>,
     omega_nm: Vec<f64>,
@@ -224,7 +224,7 @@ fn a_start_from_rest_biases_the_gains_and_estimated_states_do_not() {
         median(&errors(InitialState::Estimate)),
     );
     println!("median error of b0 in %: {zero:.2?} from rest, {estimated:.2?} with estimated states");
-    // The record starts in the middle of the motion. An independent trial found -4.5 %.
+    // The record starts in the middle of the motion. An independent study found -4.5 %.
     assert!(
         zero.0 < -2.0 && estimated.0.abs() < 3.0 * estimated.1,
         "{zero:?} {estimated:?}"

@@ -1,5 +1,4 @@
-//! A person who changes: the two-sided estimate against the causal one, and the methods that stand
-//! next to for comparison.
+//! A person who changes: the two-sided estimate compared with the causal one, and with the methods for comparison.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
@@ -34,8 +33,7 @@ fn options(method: Method) -> TrackOptions {
     }
 }
 
-/// RMS relative error of K_e, T_L ... after the start fit, and the share of samples that 1.96
-/// standard errors cover.
+/// RMS relative error of K_e, T_L ... after the start fit, and the share of samples within 1.96 standard errors.
 fn errors(record: &Record, options: &TrackOptions) -> [[f64; 5]; 2] {
     let trace = track(record, options, 8).unwrap();
     let (mut squares, mut covered, mut count) = ([0.0; 5], [0.0; 5], 0.0);
@@ -80,9 +78,9 @@ fn the_two_sided_estimate_is_closer_and_its_bands_hold() {
         let [before, after] = [&causal, &smooth].map(|all| mean(all, 0, i));
         let covered = mean(&smooth, 1, i);
         println!("{name}: {before:.4} {after:.4}, covered {covered:.3}");
-        // The page has .7 for K_e, T_L and K_e_dot; of twelve runs the ratio is known to a tenth.
+        // The page has .7 for K_e, T_L and K_e_dot; from twelve runs the ratio is known to a tenth.
         assert!(after < if i < 3 { 0.85 } else { 1.1 } * before, "{name}");
-        // 90 to 99 % is what is asked of many runs; twelve have some three independent errors each.
+        // 90 to 99 % is required of many runs; twelve have some three independent errors each.
         assert!(covered > 0.8, "{name}: {covered}");
     }
 }
@@ -151,7 +149,7 @@ fn a_delay_that_changes_is_followed_and_named() {
             assert!(error.abs() < 4.0 * se && se < 0.02, "{t}: {tau:?}");
         }
     }
-    // A start outside what is tracked, a range that is invalid, and two sides.
+    // A start outside the tracked range, an invalid range, and two-sided estimates.
     let refused = |options: TrackOptions| {
         track(&run(Condition::C1, 1, 0.1, 0), &options, 8)
             .unwrap_err()

@@ -3,7 +3,7 @@
 
 use std::process::Command;
 
-/// What an example prints; cargo has built it next to this test.
+/// Returns the output of an example; cargo has built it next to this test.
 fn printed(name: &str) -> String {
     let here = std::env::current_exe().unwrap();
     let built = here.parent().unwrap().parent().unwrap().join("examples").join(name);

@@ -1,7 +1,7 @@
-//! The corpus of faults keeps what it promises: `cargo xtask slow faults` is the whole of it.
+//! Tests of the corpus of faults: `cargo xtask slow faults` runs all of it.
 #![allow(clippy::unwrap_used)]
 
-// The study uses the rest of it.
+// The study uses the other parts.
 #[allow(dead_code)]
 #[path = "common/fault_corpus/mod.rs"]
 mod fault_corpus;
@@ -17,7 +17,7 @@ use fault_corpus::{
 };
 use serde_json::json;
 
-/// Not that of the page.
+/// Other than that of the page.
 const SEED: u64 = 77;
 
 fn two_runs() -> (Table, Table) {
@@ -59,7 +59,7 @@ fn runs_and_faults_are_the_same_each_time() {
     assert_ne!(person(3).truth, person(4).truth);
 }
 
-/// Outside its rows a recording is what it was, inside it is not; what the fault does not touch stays.
+/// Outside the rows of the fault a recording is unchanged, inside it is not; other channels are unchanged.
 #[test]
 fn each_fault_is_where_it_says_and_nowhere_else() {
     let (clean, second) = two_runs();
@@ -85,7 +85,7 @@ fn each_fault_is_where_it_says_and_nowhere_else() {
             if !touched {
                 assert_eq!(others, 0, "{fault:?}");
             } else if added == 0 && fault.kind.what != What::Milliseconds {
-                // A value that is frozen, held or rounded may be what it was.
+                // A frozen, held or rounded value may be unchanged.
                 assert!(others * 50 > to - from, "{fault:?}: {others} of {}", to - from);
             }
         }
@@ -195,7 +195,7 @@ fn fits_are_judged() {
     let told = judged(&fit(1.5, Some(0.1), "doubtful"));
     assert!(told.wrong && told.flagged() && !told.silently_wrong());
     assert!(!judged(&fit(1.39, Some(0.1), "trustworthy")).wrong);
-    // What has no standard error claims nothing, except for a delay on the grid.
+    // A value without a standard error makes no claim, except for a delay on the grid.
     let open = judged(&fit(9.0, None, "trustworthy"));
     assert!(!open.wrong && matches!(&open.worst, Some((name, z)) if name == "tau_e" && (z - 1.0).abs() < 1e-9));
     let mut late = fit(1.0, Some(0.1), "trustworthy");
@@ -253,7 +253,7 @@ fn traces_are_judged_at_the_end_and_on_the_way() {
     assert!(never.wrong && never.recovery_s.unwrap().is_infinite());
     let short = of_trace(&json, &off_until(13.0), &known);
     assert!(short.lasting.unwrap() < 2.0, "{short:?}");
-    // Another person from 10 s on: the trace that follows them is right.
+    // Another person from 10 s on: a trace that follows them is right.
     let other = CaseTruth {
         then: Some(vec![("K_e".to_owned(), 2.0)]),
         span_s: Some((10.0, 10.0)),
@@ -281,7 +281,7 @@ fn tables_count() {
     assert!(by_way(&[]).contains("| C1, C2 | grey-box | 0 | – |"));
 }
 
-/// The gate: no number that is wrong goes unflagged.
+/// Acceptance test: no wrong number is unflagged.
 #[test]
 #[ignore = "not all faults are found yet; it runs the program `hoid`, which must be built next to this test"]
 fn nothing_is_wrong_and_not_flagged() {
@@ -298,8 +298,8 @@ fn nothing_is_wrong_and_not_flagged() {
         .collect();
     let silent: Vec<String> = all
         .iter()
-        // Where clean runs are wrong too no fault is to blame: rls has a noise model of its own, and
-        // trackers, whose start has 13 s, are off on clean runs of people (the page has how often).
+        // If clean runs are wrong too, the fault is not the cause: rls has its own noise model, and trackers, whose
+        // start has 13 s, are off on clean runs of people (the page has how often).
         .filter(|o| o.way != Way::Rls && (o.who != Who::Person || !o.way.tracks()))
         .filter(|o| o.judged.silently_wrong())
         .map(|o| {

@@ -37,7 +37,7 @@ fn grey_box(m: usize) -> GreyBox {
     GreyBox::new(m..=m)
 }
 
-/// Estimates with their truth, in the order of [`NAMES`].
+/// Estimates with their true values, in the order of [`NAMES`].
 fn pairs(fit: &GreyBoxFit, record: &Record, condition: Condition) -> [(Estimate, f64); 8] {
     let truth = Scenario::condition(condition).initial.operator;
     let (o, r) = (fit.operator(0).unwrap(), fit.remnant(0).unwrap());
@@ -232,7 +232,7 @@ fn every_person_is_found_from_the_own_starts() {
         replication: 0,
     }
     .white_noise(5 * 200);
-    // Uniform in (0, 1), near enough.
+    // Approximately uniform in (0, 1).
     let share = |z: f64| 1.0 / (1.0 + (-1.7 * z).exp());
     let (mut lost, mut singular) = (Vec::new(), 0);
     for (i, z) in draws.chunks_exact(5).enumerate() {
@@ -295,13 +295,13 @@ fn constraints_hold_and_cost_no_variance() {
     assert!(fit.termination().converged(), "{:?}", fit.termination());
     let (o, reference) = (fit.operator(0).unwrap(), free.operator(0).unwrap());
     assert_eq!((o.t_l_s, o.tau_e_s), (Estimate::fixed(0.4), Estimate::fixed(0.25)));
-    // K_e_dot = K_e T_L moves with K_e.
+    // K_e_dot = K_e T_L changes with K_e.
     let ratio = o.k_e_dot.standard_error.unwrap() / o.k_e.standard_error.unwrap();
     assert!((ratio - 0.4).abs() < 1e-12);
     assert!(o.k_e.standard_error.unwrap() < reference.k_e.standard_error.unwrap());
     assert!(fit.loss() > free.loss());
     assert_eq!((fit.parameter_count(), free.parameter_count()), (5, 6));
-    // A lead time that is free within bounds is the same fit in other coordinates.
+    // A lead time that is free within bounds gives the same fit in other coordinates.
     let mut bounded = grey_box(2);
     bounded
         .constraints
@@ -410,7 +410,7 @@ fn what_cannot_be_fitted_is_told() {
     }
     for samples in [75, 80, 120] {
         let short = [record[0].span(0.0, 0.01 * f64::from(samples)).unwrap()];
-        // Whatever is found is a fit or a reasoned refusal, never a panic.
+        // The result is a fit or a refusal with a reason, never a panic.
         for order in [0..=4, 2..=2] {
             if let Ok(fit) = GreyBox::new(order).fit(&short) {
                 assert!(fit.loss().is_finite());

@@ -1,9 +1,8 @@
-//! No circle of imports between the files of a crate.
+//! Checks that there is no circle of imports between the files of a crate.
 //!
-//! An arrow goes from a file to another file of which it names an item, by `use` or by a path.
-//! `mod` lines and re-exports (`pub use`) are the doors of a room and draw no arrow, and tests may
-//! look at everything. Names are resolved as the compiler does: through modules, imports and
-//! re-exports, to the file that defines the item.
+//! An arrow goes from a file to another file of which it names an item, by `use` or by a path. `mod` lines and
+//! re-exports (`pub use`) are interfaces and make no arrow, and tests may use everything. Names are resolved as by the
+//! compiler: through modules, imports and re-exports, to the file that defines the item.
 #![allow(clippy::unwrap_used)]
 
 use std::{
@@ -18,14 +17,14 @@ use syn::{
     visit::{self, Visit},
 };
 
-/// A module: its position, what it defines, and what it imports.
+/// A module: its file, its definitions, and its imports.
 #[derive(Default)]
 struct Module {
     file: PathBuf,
     parent: Option<usize>,
     children: BTreeMap<String, usize>,
     items: BTreeSet<String>,
-    /// Local name, the path that it represents, and whether it is a re-export.
+    /// Local name, its path, and whether it is a re-export.
     imports: Vec<(String, Vec<String>, bool)>,
     globs: Vec<(Vec<String>, bool)>,
     /// Paths in the code.
@@ -62,7 +61,7 @@ fn attributes(item: &Item) -> &[Attribute] {
     }
 }
 
-/// The name that an item gives to its module.
+/// Returns the name that an item defines in its module.
 fn name(item: &Item) -> Option<String> {
     let name = match item {
         Item::Const(i) => &i.ident,
@@ -110,7 +109,7 @@ impl Module {
     }
 }
 
-/// Gathers the paths of a module's code, also those within the arguments of macros.
+/// Collects the paths of a module's code, also those within the arguments of macros.
 struct Paths<'m>(&'m mut Module);
 
 impl<'ast> Visit<'ast> for Paths<'_> {
@@ -132,7 +131,7 @@ impl<'ast> Visit<'ast> for Paths<'_> {
     }
 }
 
-/// Names of the types that a macro declares, or would where it is used.
+/// Names of the types that a macro declares, or would declare if it were used.
 fn declared(stream: TokenStream, found: &mut BTreeSet<String>) {
     let mut declares = false;
     for token in stream {
@@ -181,7 +180,7 @@ impl Crate {
         all
     }
 
-    /// `folder` is where the files of child modules lie.
+    /// `folder` is the folder of the files of child modules.
     fn module(&mut self, file: &Path, folder: &Path, parent: Option<usize>, items: &[Item]) -> usize {
         let at = self.modules.len();
         self.modules.push(Module {
@@ -220,11 +219,11 @@ impl Crate {
         at
     }
 
-    /// The module that defines the item at the end of a path; none for paths that lead out of the
-    /// crate, or to a module.
+    /// Returns the module that defines the item at the end of a path; none for paths that leave the crate, or end at a
+    /// module.
     fn resolve(&self, from: usize, path: &[String], depth: usize) -> Option<usize> {
         let (first, rest) = path.split_first()?;
-        // Circles of re-exports, and names that lead nowhere.
+        // Circles of re-exports, and names that do not exist.
         if depth > 12 {
             return None;
         }
@@ -258,7 +257,7 @@ impl Crate {
         })
     }
 
-    /// The files that each file names.
+    /// Returns the files that each file names.
     fn arrows(&self) -> BTreeMap<&Path, BTreeSet<&Path>> {
         let mut arrows: BTreeMap<&Path, BTreeSet<&Path>> = BTreeMap::new();
         for (at, module) in self.modules.iter().enumerate() {
@@ -277,7 +276,7 @@ impl Crate {
     }
 }
 
-/// Groups of files each of which reaches all others of its group.
+/// Returns groups of files each of which reaches all others of its group.
 fn circles<'p>(arrows: &BTreeMap<&'p Path, BTreeSet<&'p Path>>) -> Vec<Vec<&'p Path>> {
     let reached = |from: &'p Path| {
         let (mut seen, mut open) = (BTreeSet::new(), vec![from]);

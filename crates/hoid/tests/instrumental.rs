@@ -1,6 +1,6 @@
-//! Instrumental variables: open loop against the truth and the prediction error method, the closed
-//! loops of the reference task and a faster one in which the input is strongly correlated with the
-//! noise, and the refused input.
+//! Instrumental variables: open loop compared with the true values and with the prediction error method, the closed
+//! loops of the reference task and a faster one in which the input is strongly correlated with the noise, and the
+//! refused input.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid::{
@@ -276,7 +276,7 @@ fn assert_unbiased(label: &str, samples: &[Sample], errors: f64, share: f64) {
     }
 }
 
-/// Delay 0.05 s and a remnant of time constant 0.3 s: what the operator sees still holds the noise
+/// Delay 0.05 s and a remnant of time constant 0.3 s: the error that the operator responds to still contains the noise
 /// that acts now.
 #[test]
 fn fast_loop_biases_simulated_instruments_but_not_external_ones() {
@@ -399,7 +399,7 @@ fn a_missing_or_useless_channel_is_told() {
 #[test]
 fn instruments_that_vanish_where_they_count_are_told() {
     let record = open_loop(&[], 1.0, 2000, 0);
-    // Zero except for one sample near the end: no instrument is left in the rows that count.
+    // Zero except for one sample near the end: no instrument is nonzero in the rows that count.
     let mut late = vec![0.0; 2000];
     late[1999] = 1.0;
     let record = record.with_channel(Channel::new("late", "", late)).unwrap();

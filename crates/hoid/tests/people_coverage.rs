@@ -1,7 +1,7 @@
 //! A small sample of the study of the error bars of people: `cargo xtask slow people-coverage`.
 #![allow(clippy::unwrap_used)]
 
-// The study uses the rest of it.
+// The study uses the other parts.
 #[allow(dead_code)]
 #[path = "common/people_coverage/mod.rs"]
 mod people_coverage;

@@ -1,5 +1,4 @@
-//! Fits on records that were prepared: what alignment, units and another rate do to the parameters
-//! of the operator.
+//! Fits on prepared records: the effect of alignment, units and another rate on the parameters of the operator.
 #![allow(clippy::unwrap_used)]
 
 use hoid::{
@@ -18,7 +17,7 @@ fn run(replication: u64) -> Record {
     simulator.run(run_seed, false).unwrap()
 }
 
-/// A record of e and u alone, the output `late` samples behind.
+/// A record of e and u alone, with the output `late` samples late.
 fn bare(record: &Record, late: usize) -> Record {
     let n = record.len();
     let channel = |name: &str, values: &[f64]| Channel::new(name, "", values.to_vec());
@@ -39,7 +38,7 @@ fn prepared(record: Record, change: impl FnOnce(&mut Preparation)) -> Record {
 #[test]
 fn an_offset_gives_the_fit_of_the_aligned_record() {
     let whole = run(1);
-    // u is stationary three samples late in the file.
+    // u is recorded three samples late in the file.
     let late = bare(&whole, 3);
     let aligned = prepared(late, |p| {
         p.offset.insert("u".into(), Offset::Samples(3.0));
@@ -74,8 +73,8 @@ fn units_change_the_gains_and_nothing_else() {
 fn a_fit_of_every_fourth_sample_is_the_same_person() {
     const RUNS: u64 = 12;
     const FACTOR: usize = 4;
-    // Gain, lead, frequency and damping of the muscles, and the delay: the longer hold would make it
-    // shorter by .015 s, and the input is taken so much later.
+    // Gain, lead, frequency and damping of the muscles, and the delay: the longer hold would make it shorter by .015
+    // s, and the input is shifted by as much.
     let expected = [0.09, 0.4, 11.25, 0.35, 0.28];
     let mut sums = [[0.0; 2]; 5];
     let mut worst = 0.0_f64;

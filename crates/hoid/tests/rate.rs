@@ -1,4 +1,4 @@
-//! People who are recorded at high rates: decimated, they are who they are.
+//! People who are recorded at high rates: decimation does not change their parameters.
 #![allow(clippy::unwrap_used)]
 
 use hoid::{
@@ -10,7 +10,7 @@ use hoid::{
     prelude::*,
 };
 
-/// C1 with so much remnant.
+/// C1 with this level of the remnant.
 fn run(hz: f64, noise_level: f64, seed: u64) -> Record {
     let mut scenario = Scenario::condition(Condition::C1);
     scenario.sample_time = SampleTime::new(1.0 / hz).unwrap();
@@ -27,7 +27,7 @@ fn run(hz: f64, noise_level: f64, seed: u64) -> Record {
 
 #[test]
 fn the_delay_is_that_of_the_old_rate() {
-    // With little remnant a millisecond shows; the longer hold alone would take 2.7 to 4.8 of them.
+    // With little remnant a millisecond is visible; the longer hold alone would add 2.7 to 4.8 ms.
     for (hz, factor) in [(250.0, 3), (1000.0, 10), (2000.0, 20)] {
         let (record, done) = Decimation::Auto.of(run(hz, 0.001, 0)).unwrap();
         let done = done.unwrap();

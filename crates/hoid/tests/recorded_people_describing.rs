@@ -152,7 +152,7 @@ fn describing_functions_are_those_of_the_table() {
             row.off_line_share,
             0.005 + 1e-9,
         );
-        // With the plant as it answered, after its hold of half a tick.
+        // With the plant as it responded, after its hold of half a tick.
         let (by_ratio, by_phase) = (measured.crossover_rad_s.unwrap(), measured.phase_margin_deg.unwrap());
         println!("  with the plant measured: {}, {}", shown(by_ratio), shown(by_phase));
         println!("  noise ratio {}, misfit {:.3}", shown(h.noise_ratio), fit.misfit);

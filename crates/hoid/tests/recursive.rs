@@ -1,5 +1,4 @@
-//! Recursive identification against its batch twin, by Monte Carlo, and with samples that are not
-//! as they should be.
+//! Recursive identification compared with its batch counterpart, by Monte Carlo, and with faulty samples.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
@@ -132,10 +131,9 @@ fn with_an_infinite_memory_it_comes_to_the_batch_fit_from_several_starts() {
         ..with_memory(Method::rpem(), "inf")
     };
     let span = |to: f64| from(StartAt::Span(Some((0.0, to))), None);
-    // With filters that are warm. The memory grows at the start, so that the way from there is
-    // forgotten. The covariance is ten times the text's: with 10 the first steps throw the estimate
-    // to the border of stability, and two of these starts are still .6 standard errors away at the
-    // end (the cascade forgot that faster).
+    // With settled filters. The memory grows at the start, so that the initial steps are forgotten. The covariance is
+    // ten times that of the thesis: with 10 the first steps move the estimate to the border of stability, and two of
+    // these starts still differ by .6 standard errors at the end (the cascade forgot that faster).
     let theta = |theta: Vec<f64>| {
         let from = from(StartAt::Theta(theta), Some(4.0));
         from.with(&[("covariance", "1")]).unwrap()
@@ -321,15 +319,14 @@ fn hostile_samples_are_skipped_counted_and_forgotten() {
         }
         assert_eq!(tracker.counts().skipped, faults);
         assert_eq!(tracker.counts().samples, record.len() as u64);
-        // Two per cent of the samples are missing: the estimate is another one, but none that its
-        // error bars exclude.
+        // Two per cent of the samples are missing: the estimate differs, but is consistent with its error bars.
         for (a, b) in clean.parameters().iter().zip(tracker.parameters()) {
-            // The rule of this one has no covariance.
+            // The rule of this method has no covariance.
             if method.name() == "linear-network" {
                 assert_eq!(a.standard_error, None);
                 continue;
             }
-            // What a method holds is the same.
+            // Fixed parameters of a method are the same.
             let distance = (a.value - b.value).abs() / a.standard_error.unwrap();
             assert!(distance < 3.0 || a.value == b.value, "{method:?}: {distance}");
         }
@@ -377,7 +374,7 @@ fn the_texts_own_settings_are_there() {
     // K_e_dot rises from .036 to .084 s.
     assert!((before.k_e_dot.value - 0.036).abs() < 0.012, "{:?}", before.k_e_dot);
     assert!((after.k_e_dot.value - 0.084).abs() < 0.02, "{:?}", after.k_e_dot);
-    // By default nothing counts twice: the estimate stays until the span of its fit is over.
+    // By default no sample counts twice: the estimate stays constant until the end of the span of its fit.
     let default = track(&record, &options(Method::rpem()), 1).unwrap();
     assert_eq!(default.theta(0), default.theta(3071));
     assert_ne!(default.theta(3071), default.theta(3200));

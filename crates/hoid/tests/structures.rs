@@ -1,5 +1,4 @@
-//! All structures of Table 5.1 find the truth from their own starts, and each option does what it
-//! reports.
+//! All structures of Table 5.1 find the true values from their own starts, and each option works as documented.
 #![allow(clippy::unwrap_used)]
 
 #[path = "common/textbook.rs"]
@@ -116,14 +115,14 @@ fn fixed_and_bounded_coefficients_keep_their_word() {
     assert_eq!((of("f2").value, of("f2").standard_error), (0.65, None));
     assert!(of("f1").standard_error.is_some() && fit.loss() > free.loss());
     assert_eq!(fit.free_count(), truth.theta().len() - 2);
-    // A bound that does not bind changes nothing.
+    // A bound that is not active changes nothing.
     e.constraints.clear();
     e.constraints.insert("f2".into(), Constraint::Between(0.0, 0.99));
     let loose = e.fit(std::slice::from_ref(&record)).unwrap();
     for (a, b) in loose.model().theta().iter().zip(free.model().theta()) {
         assert!((a - b).abs() < 1e-6);
     }
-    // Linear structures obey as well.
+    // Linear structures respect bounds as well.
     let mut arx = estimator(Structure::Arx);
     arx.constraints.insert("b1".into(), Constraint::Fixed(0.0));
     let fit = arx.fit(&[Truth::of(Structure::Arx).record(500, 0.5, 5)]).unwrap();
@@ -279,8 +278,7 @@ fn the_focus_on_simulation_minimises_the_simulation_error_and_its_bars_cover() {
 
 #[test]
 fn a_stable_model_can_be_asked_for() {
-    // The output grows: least squares reports unstable, and with `stable` the best stable model is
-    // given.
+    // The output grows: least squares reports an unstable model, and with `stable` the best stable model is returned.
     let ts = SampleTime::HUNDREDTH;
     let mut draw = Draw(5);
     let e: Vec<f64> = (0..120).map(|_| draw.normal()).collect();
@@ -367,7 +365,6 @@ fn roots_of_c_near_the_circle_do_not_stop_the_search() {
             (all_higher, all_stuck) = (all_higher + higher, all_stuck + stuck);
         }
     }
-    // Before the search followed the border, 180 of these 360 fits stopped on it. Some minima on it
-    // are minima of their own.
+    // Before the search followed the border, 180 of these 360 fits stopped on it. Some minima are on the border.
     assert!(all_higher <= 12 && all_stuck <= 12, "{all_higher} {all_stuck}");
 }

@@ -18,7 +18,7 @@ const FIVE_DIGITS: f64 = 5e-6;
 const REFERENCE: f64 = 1e-6;
 /// Tolerance of the search at which `sqrt(tolerance n)` = 2e-7 standard errors are left.
 const TO_THE_END: f64 = 1e-16;
-/// What the default tolerance leaves, in standard errors: `sqrt(1e-12 n)` = 3e-5 for 1000 samples.
+/// Distance from the minimum with the default tolerance, in standard errors: `sqrt(1e-12 n)` = 3e-5 for 1000 samples.
 const BY_DEFAULT: f64 = 1e-4;
 /// The loss differs by the square of that over n.
 const LOSS: f64 = 1e-10;

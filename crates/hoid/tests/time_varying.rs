@@ -1,5 +1,5 @@
-//! The fit of an operator who changes once: recovery without noise, bias, spread and coverage over
-//! simulated runs, and the report when nothing changes.
+//! The fit of an operator that changes once: recovery without noise, bias, spread and coverage over simulated runs,
+//! and the report if nothing changes.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::collections::BTreeMap;
@@ -105,8 +105,7 @@ fn a_change_without_noise_is_recovered() {
     }
 }
 
-/// Runs of one condition, every parameter printed; what must hold is asserted with the Monte Carlo
-/// error in mind.
+/// Runs of one condition, every parameter printed; the assertions allow for the Monte Carlo error.
 fn study(condition: Condition, n: u64) {
     let truth = truth(condition);
     let mut errors = vec![Vec::new(); truth.len()];
@@ -277,8 +276,7 @@ fn several_records_sharpen_the_change() {
     assert_eq!((single.state_count(), all.state_count()), (2, 8));
     for name in ["K_e1", "K_e2", "T_L1", "T_L2", "t_M", "omega_nm", "tau_e"] {
         let ratio = value(&single, name).standard_error.unwrap() / value(&all, name).standard_error.unwrap();
-        // Four times the data halve the error; that of t_M hangs on the error signal around the
-        // change.
+        // Four times the data halve the error; that of t_M depends on the error signal around the change.
         assert!((1.3..3.2).contains(&ratio), "{name}: {ratio}");
     }
 }
@@ -404,7 +402,7 @@ fn what_cannot_be_fitted_is_refused() {
     )
     .unwrap();
     assert!(matches!(error(quick(), one(&silent)), IdentError::NoExcitation { .. }));
-    // A few seconds only: whatever results, it is reported.
+    // A few seconds only: the result is reported in any case.
     let brief = record.span(39.0, 44.0).unwrap();
     if let Ok(fit) = SigmoidChange::default().fit(one(&brief)) {
         assert!(fit.parameters().iter().all(|p| p.estimate.value.is_finite()));

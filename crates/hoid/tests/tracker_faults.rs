@@ -1,5 +1,5 @@
-//! Faults in streams: a seeded sample of the study `cargo xtask slow tracker-faults`, on other seeds
-//! than those on which the limits of the guard were set.
+//! Faults in streams: a seeded sample of the study `cargo xtask slow tracker-faults`, on other seeds than those with
+//! which the limits of the guard were set.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
@@ -32,7 +32,7 @@ fn effects(references: &[(Run, Reference)], fault: &Fault, at_s: f64) -> Vec<Eff
     references.iter().map(of).collect()
 }
 
-/// Half a standard error is what is promised.
+/// The specification is half a standard error.
 #[test]
 fn an_outlier_moves_no_parameter_by_half_a_standard_error_for_a_second() {
     use Signal::{E, U};

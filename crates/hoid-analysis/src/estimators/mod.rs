@@ -29,17 +29,17 @@ use crate::{
 pub trait BatchEstimator: Sized + 'static {
     /// Its result.
     type Fit: Answers;
-    /// Whose records it judges: of a person, who answers an error within a second, one without a response is reported.
+    /// Whose records it judges: for those of a person, who responds to an error within a second, a missing response is
+    /// reported.
     const OF: Of = Of::Person;
 
-    /// Entries of the registry: one entry, or one for each of its methods.
+    /// Its entries in the registry: one, or one for each of its methods.
     fn specs() -> Vec<MethodSpec>;
 
-    /// Its options and those of the analysis around it that it has use for, in the order in which they are set
-    /// and printed.
+    /// Its options and those of the analysis that apply to it, in the order in which they are set and printed.
     fn options_of_analysis() -> Vec<AnalysisOption<Self>>;
 
-    /// Whether orders and delay are numbers of samples, so that a high rate is kept.
+    /// True if orders and delay count samples, so that a high rate is kept.
     fn counts_samples(&self) -> bool {
         false
     }
@@ -47,10 +47,10 @@ pub trait BatchEstimator: Sized + 'static {
     /// Method and limits of its search.
     fn search(&self) -> &SearchOptions;
 
-    /// The report about initial states.
+    /// Returns the name of its treatment of initial states.
     fn initial_state(&self) -> &'static str;
 
-    /// The same estimator with its defaults.
+    /// Returns the same estimator with its defaults.
     fn by_default(&self) -> Self;
 
     /// Its name among the printed settings.
@@ -58,43 +58,44 @@ pub trait BatchEstimator: Sized + 'static {
         Setting::new("structure", OPERATOR)
     }
 
-    /// A printed setting that no option of its own sets.
+    /// A printed setting that is not set by an option.
     fn beside_options(&self) -> Option<Setting> {
         None
     }
 
-    /// Fits recordings that have been repaired and are at their rate; takes out of them what it fits without.
+    /// Fits recordings that have been repaired and decimated; removes their means or level if the fit is made without
+    /// them.
     ///
     /// # Errors
-    /// [`AnalysisError`] where there is no fit.
+    /// [`AnalysisError`] if there is no fit.
     fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<Self::Fit>, AnalysisError>;
 
-    /// The verdict of all that is known, for a fit that carries it.
+    /// Stores the final verdict, for a fit that contains one.
     fn judged(_fit: &mut Self::Fit, _verdict: &Verdict) {}
 }
 
-/// A fit, and the prior knowledge of it before the recordings are asked.
+/// A fit, before the findings of the recordings.
 #[derive(Debug, Clone)]
 pub struct Fitted<F> {
     /// The fit.
     pub fit: F,
-    /// Its self-description, and what a second opinion reports.
+    /// Its own verdict, with that of a second opinion.
     pub verdict: Verdict,
-    /// The describing function that is next to it.
+    /// The describing function that accompanies it.
     pub described: Option<Description>,
-    /// Trend removed from e and u for it.
+    /// Trend that was removed from e and u.
     pub taken_out: Detrend,
-    /// The settings of the estimator as it was used.
+    /// The settings of the estimator that were used.
     pub used: Vec<Setting>,
-    /// Findings about what was left open.
+    /// Values that were found for open settings.
     pub found: Vec<Setting>,
 }
 
 impl<E: BatchEstimator> Identification<E> {
-    /// Sets an option of the registry by its name; false for one of another estimator.
+    /// Sets an option of the registry by its name; false for an option of another estimator.
     ///
     /// # Errors
-    /// [`AnalysisError`] for a text that is not a value of it, or out of its bounds.
+    /// [`AnalysisError`] for a text that is not a valid value, or a value out of its bounds.
     pub fn set(&mut self, name: &str, text: &str) -> Result<bool, AnalysisError> {
         let option = E::options_of_analysis()
             .into_iter()
@@ -102,7 +103,7 @@ impl<E: BatchEstimator> Identification<E> {
         option.map_or(Ok(false), |option| option.set(self, text).map(|()| true))
     }
 
-    /// The settings of the estimator as they are printed, at a sample time.
+    /// Returns the printed settings of the estimator at a sample time.
     pub(crate) fn settings(&self, sample_time: SampleTime) -> Vec<Setting> {
         let options = E::options_of_analysis();
         let own = options.iter().filter_map(|option| option.words(self, sample_time));
@@ -112,7 +113,7 @@ impl<E: BatchEstimator> Identification<E> {
     }
 }
 
-/// The settings of options.
+/// Returns the settings of options.
 fn known<E: 'static>(options: Vec<AnalysisOption<E>>) -> Vec<hoid_ident::settings::Setting> {
     options.into_iter().map(|option| option.setting).collect()
 }

@@ -1,4 +1,4 @@
-//! The operator of a person, its form by evidence: next to the lines of a recorded excitation, with the loop in its
+//! The operator of a person, its form by evidence, with the lines of a recorded excitation, and with the loop in its
 //! verdict.
 
 use hoid_ident::{
@@ -41,7 +41,7 @@ impl BatchEstimator for FamilyEstimator {
         all
     }
 
-    /// Straight lines are those between the samples as they were recorded.
+    /// A first-order hold is that between the samples as recorded.
     fn counts_samples(&self) -> bool {
         self.intersample == Intersample::Foh
     }
@@ -63,21 +63,21 @@ impl BatchEstimator for FamilyEstimator {
     }
 
     fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<FamilyFit>, AnalysisError> {
-        // A line of an excitation has one ratio of u and e, which more than one input has made.
+        // A line of an excitation has one ratio of u and e, which more than one input may have caused.
         let alone = with.estimator.channels.is_empty();
         let described = match alone {
             true => data.described(&with.excitation, with.period_s, with.faults),
             false => Ok(None),
         };
         let channel = match &described {
-            // The findings, or the named channel: instruments need no lines.
+            // The channel that was found or named: instruments need no lines.
             Ok(Some(found)) => found.channel.clone(),
             _ => with.excitation.named().filter(|_| alone).map(str::to_owned),
         };
         let estimator = Self {
             excitation: channel,
             period_s: with.period_s,
-            // What was requested in reading has been done.
+            // The detrending requested in reading has been done.
             detrend: if data.were_detrended() {
                 Detrend::None
             } else {

@@ -1,5 +1,5 @@
 //! Options of a polynomial structure: the fields of [`Polynomials`], and the names under which texts set them. An
-//! option is declared here and nowhere else.
+//! option is declared only here.
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
@@ -11,31 +11,31 @@ use hoid_ident::{
 };
 use hoid_model::{Orders, SampleTime, Structure};
 
-/// Standard deviations from which a robust loss is linear where no number is given: 95 % efficient for normal
-/// noise (Huber 1981).
+/// Default limit of a robust loss, in standard deviations, beyond which it is linear: 95 % efficient for normal noise
+/// (Huber 1981).
 const HUBER: f64 = 1.345;
 
-/// A polynomial structure and how it is fitted.
+/// A polynomial structure and its estimation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Polynomials {
-    /// Structure, initial states, search, constraints, loss, focus. Its orders and its start are those below.
+    /// Structure, initial states, search, constraints, loss, focus. Orders and start are those below.
     pub template: Estimator,
-    /// Orders that are given or searched in a range, by name; the others are the operator's.
+    /// Orders that are given, or searched in a range, by name; the others are those of the operator.
     pub orders: NamedOrders,
     /// Shortest and longest dead time in s, in place of an order nk.
     pub delay_s: Option<(f64, f64)>,
     /// Criterion that chooses between candidates.
     pub criterion: Criterion,
-    /// Where the search starts: all coefficients, by name.
+    /// Start of the search: all coefficients, by name.
     pub start: Option<BTreeMap<String, f64>>,
-    /// Instrumental variables in place of the prediction error method, at the orders that this one chose.
+    /// Instrumental variables in place of the prediction error method, for orders chosen by the latter.
     pub method: Option<IvMethod>,
-    /// Components of the instruments; by default the forcing function where it is recorded.
+    /// Components of the instruments; by default the forcing function, if it is recorded.
     pub instruments: Option<Instruments>,
 }
 
 impl Polynomials {
-    /// The operator's orders, by the prediction error method.
+    /// Returns the defaults: the operator's orders, by the prediction error method.
     pub fn new(structure: Structure) -> Self {
         Self {
             template: Estimator::new(structure, Orders::default()),
@@ -58,7 +58,7 @@ impl Polynomials {
     }
 }
 
-/// The names of the options that the prediction error method alone has, and of those of instrumental variables alone.
+/// Names of the options of the prediction error method alone, and of those of instrumental variables alone.
 pub(super) fn names_of_methods() -> [Vec<&'static str>; 2] {
     [by_prediction(), by_instruments()].map(|options| options.iter().map(|option| option.setting.name).collect())
 }

@@ -1,5 +1,5 @@
-//! A polynomial structure by the prediction error method or by instruments, its orders and its delay given
-//! or searched.
+//! A polynomial structure by the prediction error method or by instrumental variables, with orders and delay given or
+//! searched.
 
 use hoid_ident::{
     Choice, Estimator, Fit, IdentError, InitialState, InstrumentalVariable, Instruments, IvMethod, Loss, SearchOptions,
@@ -27,7 +27,7 @@ use crate::{
     settings::Setting,
 };
 
-/// A polynomial model, and the table that it was chosen from where something was searched.
+/// A polynomial model, and the table of candidates if something was searched.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct PolynomialFit {
     /// The model.
@@ -43,7 +43,7 @@ impl Answers for PolynomialFit {
 }
 
 impl Polynomials {
-    /// Search ranges at a sample time.
+    /// Returns the search ranges at a sample time.
     ///
     /// # Errors
     /// [`AnalysisError`] for orders that the structure does not have, or that are too many.
@@ -145,7 +145,7 @@ impl BatchEstimator for Polynomials {
     }
 
     fn structure(&self) -> Setting {
-        // The default is not a polynomial structure: the caller that has one asked for it.
+        // The default is not a polynomial structure: this one was requested.
         Setting::new("structure", self.template.structure.name()).given(true)
     }
 
@@ -156,7 +156,7 @@ impl BatchEstimator for Polynomials {
         let sample_time = records[0].sample_time();
         let ranges = how.ranges(sample_time)?;
         let combinations = ranges.combinations()?;
-        // Instruments have the means alone.
+        // With instrumental variables the means are removed, and no level is estimated.
         let mut estimator = Estimator {
             level: !level.is_kept() && how.method.is_none(),
             ..how.estimator(&combinations)?
@@ -166,8 +166,8 @@ impl BatchEstimator for Polynomials {
         let told = progress::counter("candidates", combinations.len());
         let search = |estimator: &Estimator| fit_or_choose(estimator, &ranges, how.criterion, records, &told);
         let (mut fit, choice) = match search(&estimator) {
-            // What is not distinguished from a level, as e that stays constant, is fitted next to
-            // the means.
+            // If a regressor cannot be distinguished from a level, as for a constant e, the means are removed and no
+            // level is estimated.
             Err(IdentError::SingularRegressors { .. }) if estimator.level => {
                 estimator.level = false;
                 search(&estimator)?
@@ -197,17 +197,17 @@ impl BatchEstimator for Polynomials {
         let mut verdict = fit.verdict(records, choice.as_ref())?;
         let steps = records.iter().all(steps_from_level_to_level);
         if steps {
-            // What happens after the steps is all that such data determine.
+            // Such data determine only the response after the steps.
             let others = verdict.findings().iter().filter(|finding| finding.kind != "stretch");
             verdict = Verdict::of(others.cloned().collect());
         }
-        // What is asked again is the prediction error, and the loss of squares.
+        // The second fit is by the prediction error method with a squared loss.
         let is_asked_again =
             how.method.is_none() && estimator.loss == Loss::Quadratic && !steps && fit.rounding().is_none();
         if with.faults != FaultHandling::Keep && is_asked_again {
             let element = with.controlled_element.as_ref();
             verdict = verdict.append(second_opinion::of_polynomials(&estimator, &fit, records, element));
-            // Where the level is not estimated it may matter.
+            // A level that is not estimated may matter.
             if level.is_kept() && !data.were_detrended() {
                 verdict = verdict.append(second_opinion::of_level(&estimator, &fit, records));
             }

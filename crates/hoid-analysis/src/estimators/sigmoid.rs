@@ -1,5 +1,5 @@
-//! An operator whose gains change once, by a sigmoid. A level of u is an unknown of it: the mean of e is that
-//! of two persons.
+//! An operator whose gains change once, by a sigmoid. The level of u is one of its unknowns: the mean of e is that of
+//! two operators.
 
 use hoid_ident::{
     InitialState, SearchOptions, SigmoidChange, SigmoidFit, diagnostics::second_opinion, settings::MethodSpec,

@@ -68,7 +68,7 @@ impl BatchAnswer for SigmoidFit {
     }
 }
 
-/// The operator before or after the change.
+/// Returns the operator before or after the change as JSON.
 fn operator(of: &ChangedOperator) -> Value {
     if let Some(lead) = of.lead() {
         return of_gain_and_lead(&Ok(lead));

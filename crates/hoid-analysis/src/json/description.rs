@@ -7,7 +7,7 @@ use super::{envelope, estimate, margin_estimates, number, optional};
 use crate::describing::Described;
 
 impl Described {
-    /// Crossover and margins with the controlled element.
+    /// Returns crossover and margins with the controlled element.
     pub fn margins(&self) -> Option<MarginEstimates> {
         self.found.margins.as_ref().map(|m| MarginEstimates {
             crossover_rad_s: m.crossover_rad_s,
@@ -17,7 +17,7 @@ impl Described {
         })
     }
 
-    /// The object of the contract.
+    /// Returns the JSON object.
     pub fn json(&self) -> Map<String, Value> {
         let (found, function, data) = (&self.found, &self.found.function, &self.data);
         let mut map = envelope(
@@ -92,7 +92,7 @@ impl Described {
         map
     }
 
-    /// The same as text, indented.
+    /// Returns the JSON object as indented text.
     pub fn to_json(&self) -> String {
         format!("{:#}", Value::Object(self.json()))
     }

@@ -1,9 +1,9 @@
-//! Results as JSON objects, the contract with other programs, and back.
+//! Results as JSON objects, the interface to other programs, and back.
 //!
-//! Every result has the same envelope: `hoid` (the version), `kind`, `records`, `data` (the processing of the records),
-//! `settings` (each with its value, given or not) and `verdict`; the rest is of its kind. Definition of a batch fit, so
-//! that it can predict again without its recordings, is in `state` ([`state`]). Values are those of `serde_json`, which
-//! keeps the order of keys.
+//! Every result has the same envelope: `hoid` (the version), `kind`, `records`, `data` (the processing of the
+//! records), `settings` (each with its value, given or not) and `verdict`; the rest depends on the kind. The complete
+//! numbers of a batch fit, with which it can predict again without its recordings, are in `state` ([`state`]). Values
+//! are those of `serde_json`, which keeps the order of keys.
 //!
 //! | file | kind |
 //! |---|---|
@@ -42,7 +42,7 @@ pub use trace::{change, open_loop, responses, track_fault, tracked_operator};
 
 use crate::{found::FoundFault, recordings::Account, settings::Setting};
 
-/// The envelope of a result: version, kind, records, the processing of them, settings, verdict.
+/// Returns the envelope of a result: version, kind, records, their processing, settings, verdict.
 pub fn envelope(
     kind: &str,
     files: &[String],
@@ -61,36 +61,36 @@ pub fn envelope(
         "data",
         json!({"faults": faults(files, accounts), "warnings": warnings(files, accounts)}),
     );
-    // Earlier names, for one release.
+    // Earlier names, kept for one release.
     set("warnings", warnings(files, accounts));
     set("faults", faults(files, accounts));
     set("settings", settings(settings_of));
     map
 }
 
-/// Settings, each with its value, and whether it was given.
+/// Returns the settings, each with its value, and whether it was given.
 pub fn settings(all: &[Setting]) -> Value {
     all.iter()
         .map(|one| json!({"name": one.name, "value": one.value, "given": one.given}))
         .collect()
 }
 
-/// A number, or null if there is none: JSON has no NaN.
+/// Returns a number, or null if it is not finite: JSON has no NaN.
 pub fn number(value: f64) -> Value {
     serde_json::Number::from_f64(value).map_or(Value::Null, Value::Number)
 }
 
-/// A number, or null.
+/// Returns a number, or null.
 pub fn optional(value: Option<f64>) -> Value {
     value.map_or(Value::Null, number)
 }
 
-/// An estimate with its standard error.
+/// Returns an estimate with its standard error.
 pub fn estimate(e: &Estimate) -> Value {
     json!({"value": number(e.value), "standard_error": optional(e.standard_error)})
 }
 
-/// The same with its interval of 95 %, null if there is none.
+/// Returns an estimate with its standard error and its 95 % interval, null if there is none.
 pub fn estimate_within(e: &Estimate, interval: Option<(f64, f64)>) -> Value {
     json!({
         "value": number(e.value),
@@ -99,8 +99,8 @@ pub fn estimate_within(e: &Estimate, interval: Option<(f64, f64)>) -> Value {
     })
 }
 
-/// Reliability of a result: the level, the findings against it, additional notes, and all of it
-/// with its names for programs.
+/// Returns the verdict on a result: the level, the findings against it, the notes, and all findings with their names
+/// for programs.
 pub fn verdict(v: &Verdict) -> Value {
     json!({
         "level": v.level.name(),
@@ -110,7 +110,7 @@ pub fn verdict(v: &Verdict) -> Value {
     })
 }
 
-/// Reliability of each answer, by its name.
+/// Returns the verdict on each answer, by its name.
 pub fn answers(all: &[(String, Verdict)]) -> Map<String, Value> {
     let one = |v: &Verdict| {
         let reasons = v.findings().iter().filter(|finding| finding.severity > Severity::Note);
@@ -119,17 +119,17 @@ pub fn answers(all: &[(String, Verdict)]) -> Map<String, Value> {
     all.iter().map(|(name, verdict)| (name.clone(), one(verdict))).collect()
 }
 
-/// Findings that make a result doubtful, or is worth knowing.
+/// Returns a finding: a reason for doubt, or a note.
 pub fn finding(f: &Finding) -> Value {
     json!({"kind": f.kind, "severity": f.severity.name(), "message": f.message, "words": f.message})
 }
 
-/// Orders by name.
+/// Returns orders by name.
 pub fn orders(o: &Orders) -> Value {
     json!({"na": o.na, "nb": o.nb, "nc": o.nc, "nd": o.nd, "nf": o.nf, "nk": o.nk})
 }
 
-/// The operator, or why there is none.
+/// Returns the operator, or the reason why there is none.
 pub fn operator(found: &Result<OperatorEstimate, NotConvertible>) -> Value {
     match found {
         Ok(o) => {
@@ -141,13 +141,13 @@ pub fn operator(found: &Result<OperatorEstimate, NotConvertible>) -> Value {
             }
             Value::Object(map)
         }
-        // Another order has no meaning as an operator at all.
+        // A model of other orders does not represent an operator at all.
         Err(NotConvertible::OtherOrders { .. } | NotConvertible::PolesInBoth { .. }) => Value::Null,
         Err(reason) => json!({"convertible": false, "reason": reason.to_string()}),
     }
 }
 
-/// Crossover and margins of a loop that is known.
+/// Returns crossover and margins of a known loop.
 pub fn margins(all: &Crossings) -> Map<String, Value> {
     let m = all.margins();
     let mut map = Map::new();
@@ -161,8 +161,8 @@ pub fn margins(all: &Crossings) -> Map<String, Value> {
     map
 }
 
-/// Every crossing of a loop that was estimated, the phase margin nearest to zero, the gain margin, and whether the closed
-/// loop is stable.
+/// Returns every crossing of an estimated loop, the phase margin nearest to zero, the gain margin, and whether the
+/// closed loop is stable.
 pub fn loop_shape(shape: &LoopShape) -> Map<String, Value> {
     let crossing = |(omega, margin): &(Estimate, Estimate)| json!({"crossover_rad_s": estimate(omega), "phase_margin_deg": estimate(margin)});
     let mut map = Map::new();
@@ -183,7 +183,7 @@ pub fn loop_shape(shape: &LoopShape) -> Map<String, Value> {
     map
 }
 
-/// The same of a loop that was estimated.
+/// Returns crossover and margins of an estimated loop.
 pub fn margin_estimates(m: &MarginEstimates) -> Value {
     let or_null = |e: &Option<Estimate>| e.as_ref().map_or(Value::Null, estimate);
     json!({
@@ -194,7 +194,7 @@ pub fn margin_estimates(m: &MarginEstimates) -> Value {
     })
 }
 
-/// A test of whiteness.
+/// Returns a test of whiteness.
 pub fn ljung_box(test: Option<&LjungBox>) -> Value {
     test.map_or(Value::Null, |t| {
         json!({
@@ -205,7 +205,7 @@ pub fn ljung_box(test: Option<&LjungBox>) -> Value {
     })
 }
 
-/// How well a model predicts the records that it was fitted to, or others.
+/// Returns the goodness of fit on the records that were fitted, or on others.
 pub fn goodness(q: &GoodnessOfFit) -> Map<String, Value> {
     let rows = [
         ("vaf_simulation", q.vaf_simulation),
@@ -218,13 +218,13 @@ pub fn goodness(q: &GoodnessOfFit) -> Map<String, Value> {
         .collect()
 }
 
-/// The same on another file.
+/// Returns the goodness of fit on another file.
 pub fn validation(file: &str, q: &GoodnessOfFit) -> Value {
     let file = std::iter::once(("file".to_owned(), json!(file)));
     Value::Object(file.chain(goodness(q)).collect())
 }
 
-/// How a search ended.
+/// Returns how a search ended.
 pub fn termination(t: &Termination) -> Value {
     json!({
         "reason": t.reason.to_string(),
@@ -233,12 +233,12 @@ pub fn termination(t: &Termination) -> Value {
     })
 }
 
-/// A parameter with its name.
+/// Returns a parameter with its name.
 pub fn named(name: &str, e: &Estimate) -> Value {
     json!({"name": name, "value": number(e.value), "standard_error": optional(e.standard_error)})
 }
 
-/// Files and sampling of the records, and the processing of them.
+/// Returns files and sampling of the records, and their processing.
 pub fn records(files: &[String], records: &[Record], accounts: &[Account]) -> Value {
     let record = |((file, r), account): ((&String, &Record), &Account)| {
         let mut one = json!({
@@ -260,7 +260,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account]) -> Va
     files.iter().zip(records).zip(accounts).map(record).collect()
 }
 
-/// Problems with the sampling, as text.
+/// Returns the problems of the sampling, as text.
 pub fn warnings(files: &[String], accounts: &[Account]) -> Value {
     let all = files.iter().zip(accounts);
     all.flat_map(|(file, account)| {
@@ -272,22 +272,22 @@ pub fn warnings(files: &[String], accounts: &[Account]) -> Value {
     .collect()
 }
 
-/// All faults of the records, and the problems of their files, one object each.
+/// Returns all faults of the records, and the problems of their files, one object each.
 pub fn faults(files: &[String], accounts: &[Account]) -> Value {
     let all = files.iter().zip(accounts);
     all.flat_map(|(file, account)| account.found().into_iter().map(move |found| fault(file, &found)))
         .collect()
 }
 
-/// One of them as an object.
+/// Returns one fault as an object.
 pub fn fault(record: &str, found: &FoundFault) -> Value {
     let mut object = json!(found);
     object["record"] = json!(record);
     object
 }
 
-/// List of serialised items, one object each.
+/// Returns a list of serialised items, one object each.
 pub fn list<T: Serialize>(items: &[T]) -> Value {
-    // Numbers that JSON does not have become null; nothing else can fail.
+    // Numbers that JSON does not have become null; no other failure is possible.
     serde_json::to_value(items).unwrap_or(Value::Null)
 }

@@ -110,7 +110,7 @@ impl BatchAnswer for FamilyFit {
     }
 }
 
-/// The responses to all inputs, that to the error first.
+/// Returns the responses to all inputs, that to the error first.
 fn channels(found: &Identified) -> Value {
     let fit = &found.fit;
     let sampling = (fit.sample_time, fit.intersample);
@@ -144,7 +144,7 @@ fn channels(found: &Identified) -> Value {
     std::iter::once(feedback).chain(further).collect()
 }
 
-/// Gain and phase with their errors, as those of the lines of a describing function.
+/// Returns gain and phase with their errors, in the form of the lines of a describing function.
 pub(crate) fn response(points: &[ResponsePoint]) -> Value {
     let one = |p: &ResponsePoint| {
         json!({
@@ -226,12 +226,12 @@ fn agreement(found: &Identified) -> Value {
     })
 }
 
-/// For a method that gave nothing: the reason, where there is one.
+/// Returns the reason why a method gave nothing, if there is one.
 fn why_not(reason: Option<&String>) -> Value {
     reason.map_or(Value::Null, |why| json!({"reason": why}))
 }
 
-/// Estimates in the order of the form, each with its name.
+/// Returns estimates in the order of the form, each with its name.
 fn all_named(parameters: &[(&'static str, Estimate)]) -> Value {
     parameters.iter().map(|(name, e)| named(name, e)).collect()
 }
@@ -250,7 +250,7 @@ fn parameter(p: &Parameter) -> Value {
     })
 }
 
-/// The operator by the names of its parameters.
+/// Returns the operator by the names of its parameters.
 fn operator(of: &OperatorOfRecord) -> Value {
     let mut map = Map::new();
     map.insert("convertible".to_owned(), json!(true));
@@ -292,7 +292,7 @@ fn form_figures(f: &FormFigures) -> Value {
     })
 }
 
-/// Coordinates with their names and the rows of their covariance.
+/// Returns coordinates with their names and the rows of their covariance.
 fn covariance(operator: &FamilyOperator, covariance: Option<&[f64]>) -> Value {
     let coordinates = operator.form().coordinates(operator.has_neuromuscular());
     let p = coordinates.len();

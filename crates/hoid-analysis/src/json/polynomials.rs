@@ -61,23 +61,23 @@ fn quality(q: &GoodnessOfFit, fit: &Fit) -> Value {
     Value::Object(map)
 }
 
-/// A fit of polynomials, and what follows from it and its records.
+/// A fit of polynomials, and the quantities that follow from it and its records.
 pub struct PolynomialAnswer<'a> {
     /// The verdict on it.
     pub verdict: &'a Verdict,
     /// Names of the records.
     pub files: &'a [String],
-    /// The records as they were fitted.
+    /// The records that were fitted.
     pub records: &'a [Record],
-    /// Processing applied to them.
+    /// The processing of each.
     pub accounts: &'a [Account],
     /// The settings that were used.
     pub settings: &'a [Setting],
     /// The model.
     pub fit: &'a Fit,
-    /// The table that it was chosen from.
+    /// The table of candidates.
     pub choice: Option<&'a Choice>,
-    /// The fit in physical parameters that it is written from.
+    /// The fit in physical parameters from which the polynomials were computed.
     pub grey_box: Option<&'a GreyBoxFit>,
     /// VAF and NRMSE over all records.
     pub quality: GoodnessOfFit,
@@ -87,18 +87,18 @@ pub struct PolynomialAnswer<'a> {
     pub family: Option<Result<FamilyConversion, NotConvertible>>,
     /// Its noise model as a remnant filter.
     pub remnant: Option<Result<RemnantEstimate, NotConvertible>>,
-    /// The loop, where the controlled element is given.
+    /// The loop, if the controlled element is given.
     pub margins: Option<MarginEstimates>,
     /// Residual tests on each record.
     pub validations: Vec<Validation>,
-    /// Horizon, VAF and NRMSE of the prediction that far ahead.
+    /// Horizon in samples, VAF and NRMSE of the prediction.
     pub ahead: Option<(usize, f64, f64)>,
-    /// How well it predicts another file.
+    /// Goodness of fit on another file.
     pub validation: Option<(&'a str, GoodnessOfFit)>,
 }
 
 impl<'a> PolynomialAnswer<'a> {
-    /// A model that was identified, with what follows from it.
+    /// Collects the quantities that follow from an identified model.
     ///
     /// # Errors
     /// The errors of a prediction of the records.
@@ -107,7 +107,7 @@ impl<'a> PolynomialAnswer<'a> {
         let validations = data.records.iter().map(|record| fit.validate(record));
         let validations = validations.collect::<Result<Vec<_>, _>>()?;
         let operator = fit.operator();
-        // Three poles or one are not a gain with a lead, but may be another form.
+        // Three poles, or one, do not represent a gain with a lead, but may represent another form.
         let family = match &operator {
             Err(NotConvertible::OtherOrders { poles: 1..=3, .. }) if with_input => Some(fit.family_operator(None)),
             _ => None,
@@ -135,13 +135,13 @@ impl<'a> PolynomialAnswer<'a> {
         })
     }
 
-    /// Whether the parameters of an operator were found, of a gain with a lead or of another form.
+    /// True if the parameters of an operator were found, of a gain with a lead or of another form.
     pub fn has_operator(&self) -> bool {
         let of_family = self.family.as_ref().map(Result::is_ok);
         of_family.unwrap_or(self.operator.is_ok()) && self.fit.model().structure().has_input()
     }
 
-    /// The object of the contract.
+    /// Returns the JSON object.
     pub fn object(&self) -> Map<String, Value> {
         let fit = self.fit;
         let parameters: Vec<Value> = fit.parameters().iter().map(|(name, e)| named(name, e)).collect();
@@ -178,7 +178,7 @@ impl<'a> PolynomialAnswer<'a> {
         }
         let ts = fit.model().sample_time().s();
         set("roots", fit.roots().iter().map(|r| root(r, ts)).collect());
-        // Residuals that are rounding carry no information.
+        // Residuals at the level of rounding errors carry no information.
         let tested = if fit.covariance().is_some() {
             self.validations.as_slice()
         } else {
@@ -289,8 +289,8 @@ fn remnant(found: &Result<RemnantEstimate, NotConvertible>) -> Value {
     }
 }
 
-/// The operator of the family that polynomials represent: form, parameters by name, what the real poles are, how well
-/// it is met.
+/// Returns the operator of the family that polynomials represent: form, parameters by name, the meaning of the real
+/// poles, and the misfit.
 pub fn of_family(found: &Result<FamilyConversion, NotConvertible>) -> Value {
     let found = match found {
         Ok(found) => found,

@@ -1,4 +1,4 @@
-//! A result to its JSON and back.
+//! A result as JSON and back.
 
 use hoid_ident::{GreyBoxFit, SigmoidFit};
 use hoid_io::{QualityIssue, QualityIssueKind, RowSpan};
@@ -22,12 +22,12 @@ pub(super) const OPERATOR: &str = "operator";
 /// Kind of a polynomial model.
 pub(super) const POLYNOMIAL: &str = "polynomial";
 
-/// A fit that writes itself.
+/// A fit that can be written as JSON.
 pub trait BatchAnswer: Answers + Serialize + DeserializeOwned {
-    /// Its estimator in the registry.
+    /// Name of its estimator in the registry.
     const ESTIMATOR: &'static str;
 
-    /// The object of the contract, without the state.
+    /// Returns the JSON object, without the state.
     ///
     /// # Errors
     /// The errors of a prediction of its records.
@@ -68,7 +68,7 @@ impl BatchResult {
     }
 }
 
-/// Stored data of the account of a record.
+/// Serialised form of the findings in an account.
 #[derive(Serialize, Deserialize)]
 struct FoundIn {
     faults: Vec<Fault>,
@@ -77,7 +77,7 @@ struct FoundIn {
     level: Option<Estimate>,
 }
 
-/// Trouble of a channel with all its fields; printed it is shorter.
+/// A quality issue with all its fields; the printed form is shorter.
 #[derive(Serialize, Deserialize)]
 struct Issue(#[serde(with = "IssueFields")] QualityIssue);
 
@@ -145,7 +145,7 @@ impl FoundIn {
 }
 
 impl<F: BatchAnswer> Identified<F> {
-    /// The result as an object: the contract with other programs, and its state.
+    /// Returns the result as an object: the interface to other programs, and its state.
     ///
     /// # Errors
     /// The errors of a prediction of its records.
@@ -160,7 +160,7 @@ impl<F: BatchAnswer> Identified<F> {
         Ok(self.with_state(map))
     }
 
-    /// An object of the contract of this result, with the state from which the result is made again.
+    /// Adds to an object of this result the state from which the result can be restored.
     pub fn with_state(&self, mut map: Map<String, Value>) -> Map<String, Value> {
         map.insert("estimator".to_owned(), json!(F::ESTIMATOR));
         let state = Written {
@@ -181,7 +181,7 @@ impl<F: BatchAnswer> Identified<F> {
         map
     }
 
-    /// The same as text, indented.
+    /// Returns the object as indented text.
     ///
     /// # Errors
     /// As [`Self::json`].
@@ -189,17 +189,17 @@ impl<F: BatchAnswer> Identified<F> {
         Ok(format!("{:#}", Value::Object(self.json()?)))
     }
 
-    /// Reads the output of [`Self::to_json`]: everything but the samples of its recordings. The model predicts,
+    /// Reads the output of [`Self::to_json`]: everything except the samples of its recordings. The model predicts,
     /// simulates and validates as before, on records that are given to it.
     ///
     /// # Errors
-    /// [`AnalysisError::NotAResult`] for a text that is invalid, is damaged, is of another version or estimator.
+    /// [`AnalysisError::NotAResult`] for a text that is invalid, damaged, or of another version or estimator.
     pub fn from_json(text: &str) -> Result<Self, AnalysisError> {
         restored(parsed(text)?)
     }
 }
 
-/// Results are equal when all that is written of them is.
+/// Results are equal if their written forms are.
 impl<F: BatchAnswer> PartialEq for Identified<F> {
     fn eq(&self, other: &Self) -> bool {
         matches!((self.json(), other.json()), (Ok(one), Ok(two)) if one == two)

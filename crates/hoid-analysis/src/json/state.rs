@@ -1,15 +1,15 @@
-//! Definition of a result, as text: so that it comes back as it was and predicts again.
+//! Complete state of a result, as text: a restored result is identical and can predict again.
 //!
-//! The numbers of the contract are for people and other programs; a model has more (covariances of what is not printed,
-//! states, fixed parameters). All of it is written as TOML, which has what JSON lacks, infinite numbers and NaN, and is
-//! in JSON as one text; floats are written with as many digits as give back every bit. The first eight bytes of its
-//! SHA-256 are before it: a file that was cut or changed by hand is refused. They guard against damage, not against a
-//! person who means to deceive.
+//! The numbers of the JSON object are for people and other programs; a model has more (covariances of numbers that are
+//! not printed, states, fixed parameters). All of it is written as TOML, which has infinite numbers and NaN where JSON
+//! has neither, and is one text in JSON; floats are written with as many digits as restore every bit. The first eight
+//! bytes of its SHA-256 precede it: a text that was cut or changed by hand is refused. They protect against damage,
+//! not against deliberate forgery.
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use sha2::{Digest, Sha256};
 
-/// Digits of the sum.
+/// Digits of the checksum.
 const DIGITS: usize = 16;
 
 /// A value of any type as a table.
@@ -18,13 +18,13 @@ struct Table<T> {
     value: T,
 }
 
-/// A value as text; none if it cannot be written.
+/// Returns a value as text; none if it cannot be written.
 pub fn written<T: Serialize>(value: &T) -> Option<String> {
     let text = toml::to_string(&Table { value }).ok()?;
     Some(format!("{}{text}", sum(&text)))
 }
 
-/// The value of a text, or why there is none.
+/// Returns the value of a text, or the reason why there is none.
 ///
 /// # Errors
 /// For a text that was cut or changed, or is of another version.

@@ -1,4 +1,4 @@
-//! A trace as JSON, and what a tracker reports at a moment.
+//! A trace as JSON, and the report of a tracker at one moment.
 
 use hoid_ident::Fit;
 use hoid_model::{
@@ -13,7 +13,7 @@ use super::{PolynomialAnswer, envelope, estimate, loop_shape, number, operator, 
 use crate::{AnalysisError, settings::Setting, tracking::Tracked};
 
 impl Tracked {
-    /// The object as text.
+    /// Returns the object as text.
     ///
     /// # Errors
     /// As [`Tracked::json`].
@@ -21,7 +21,7 @@ impl Tracked {
         Ok(format!("{:#}\n", Value::Object(self.json()?)))
     }
 
-    /// The object of the contract.
+    /// Returns the JSON object.
     ///
     /// # Errors
     /// The errors of the quality of the start fit.
@@ -92,7 +92,7 @@ impl Tracked {
         Ok(map)
     }
 
-    /// The start fit as `identify` gives it.
+    /// Returns the start fit as `identify` writes it.
     fn start_json(&self, fit: &Fit, span: &Record) -> Result<Value, AnalysisError> {
         let records = std::slice::from_ref(span);
         let validation = fit.validate(span)?;
@@ -149,7 +149,7 @@ impl Tracked {
     }
 }
 
-/// Gain and phase at frequencies in rad/s, each where there is an estimate.
+/// Returns gain and phase at frequencies in rad/s, wherever there is an estimate.
 pub fn responses(at_rad_s: &[f64], of: impl Fn(usize, f64) -> Option<Response>) -> Value {
     let each = at_rad_s.iter().enumerate().map(|(place, omega)| {
         let response = of(place, *omega);
@@ -162,7 +162,7 @@ pub fn responses(at_rad_s: &[f64], of: impl Fn(usize, f64) -> Option<Response>) 
     Value::Array(each.collect())
 }
 
-/// Crossover and phase margin of a recursion, or why there are none.
+/// Returns crossover and phase margin of a recursion, or the reason why there are none.
 pub fn open_loop(found: &Result<OpenLoop, NoCrossover>) -> Value {
     match found {
         Ok(found) => json!({
@@ -173,7 +173,7 @@ pub fn open_loop(found: &Result<OpenLoop, NoCrossover>) -> Value {
     }
 }
 
-/// The operator of a recursion, which reports about each parameter whether the data determine it.
+/// Returns the operator of a recursion, with the information for each parameter whether the data determine it.
 pub fn tracked_operator(
     found: &Result<OperatorEstimate, NotConvertible>,
     determined: impl Fn(&OperatorEstimate) -> Vec<Determined>,
@@ -185,7 +185,7 @@ pub fn tracked_operator(
     whole
 }
 
-/// A span that the guard of a recursion found.
+/// Returns a span that the guard of a recursion found.
 pub fn track_fault(fault: &TrackFault) -> Value {
     json!({
         "kind": fault.kind.name(),
@@ -197,7 +197,7 @@ pub fn track_fault(fault: &TrackFault) -> Value {
     })
 }
 
-/// A change of the person, declared at a time in s.
+/// Returns a change of the person, declared at a time in s.
 pub fn change(declared_at: Option<f64>, c: &Change) -> Value {
     let before_and_after = |pair: &[Estimate; 2]| json!({"before": estimate(&pair[0]), "after": estimate(&pair[1])});
     let numbers = |pair: &[f64; 2]| json!({"before": number(pair[0]), "after": number(pair[1])});

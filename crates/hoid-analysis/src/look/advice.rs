@@ -1,18 +1,18 @@
-//! How a file is to be read, and the command to type: as text, since nothing is chosen silently.
+//! Advice on how to read a file, and the command to type: as text, since nothing is chosen silently.
 
 use hoid_ident::frequency::COMMON_EXCITATIONS;
 use hoid_io::{TimeChoice, TrialChoice};
 
 use super::{columns::Role, file::Look};
 
-/// How a file is to be read: what differs from the defaults.
+/// Advice on how to read a file: the differences from the defaults.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Advice {
     /// Column of the input, or a difference.
     pub input: Option<String>,
     /// Column of the output.
     pub output: Option<String>,
-    /// The column of the time and its unit.
+    /// The column of the time, and its unit.
     pub time: Option<TimeChoice>,
     /// The trials of the file.
     pub trial: Option<TrialChoice>,
@@ -22,7 +22,7 @@ pub struct Advice {
     pub from_s: Option<f64>,
     /// Its end, s.
     pub to_s: Option<f64>,
-    /// Samples by which the output was recorded late.
+    /// Number of samples by which the output was recorded late.
     pub late_samples: Option<f64>,
     /// Column of the excitation.
     pub excitation: Option<String>,
@@ -31,13 +31,13 @@ pub struct Advice {
 }
 
 impl Look {
-    /// How the file is to be read; `None` if it is not certain which columns are error and control. For one that makes
-    /// no record yet the columns are known alone.
+    /// Returns the advice; `None` if it is not certain which columns are error and control. If the file does not make
+    /// a record yet, only the columns are known.
     pub fn advice(&self) -> Option<Advice> {
         if !self.roles.are_certain() {
             return None;
         }
-        // Both where one is not the default: a command is easier to read with both.
+        // Both, if one is not the default: a command with both is easier to read.
         let (input, output) = (&self.roles.input, &self.roles.output);
         let default = input.column == "e" && output.column == "u";
         let named = |role: &Role| (!default).then(|| role.column.clone());
@@ -73,7 +73,7 @@ impl Look {
 }
 
 impl Advice {
-    /// As options of the command line.
+    /// Returns the options of the command line.
     pub fn arguments(&self) -> Vec<String> {
         let number = |value: Option<f64>| value.map(|value| value.to_string());
         let all = [
@@ -94,7 +94,7 @@ impl Advice {
             .collect()
     }
 
-    /// The command that reads the file so, to be typed.
+    /// Returns the command that reads the file in this way.
     pub fn command(&self, verb: &str, file: &str) -> String {
         let mut words = vec!["hoid".to_owned(), verb.to_owned(), file.to_owned()];
         words.extend(self.arguments());
@@ -102,7 +102,7 @@ impl Advice {
     }
 }
 
-/// Words as they are typed in a shell.
+/// Joins words as they are typed in a shell.
 pub fn typed(words: &[String]) -> String {
     let plain = |word: &str| {
         let is_plain = |c: char| c.is_alphanumeric() || "-_./=:,+%@".contains(c);

@@ -1,20 +1,20 @@
-//! Error and control by the names that people give them.
+//! Error and control by their common names.
 
 use hoid_io::{control_among, error_among};
 
-/// Names of the tracked signals.
+/// Common names of the tracked signals.
 const TARGETS: [&str; 7] = ["r", "ref", "reference", "target", "track", "setpoint", "f_t"];
-/// Names of the steered quantities.
+/// Common names of the controlled variables.
 const OUTPUTS: [&str; 7] = ["y", "output", "position", "state", "cursor", "response", "x"];
 
-/// A column in its role, and why.
+/// The column of a signal, and the reason for the choice.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Role {
     /// The column, or a difference of two.
     pub column: String,
-    /// Why it is this one.
+    /// Reason for the choice.
     pub why: String,
-    /// Whether no other column is as likely.
+    /// True if no other column is as likely.
     pub certain: bool,
 }
 
@@ -38,8 +38,8 @@ impl Role {
 }
 
 impl Roles {
-    /// Input and output among columns; the request is taken as it is. Where nothing is known the common names are kept,
-    /// to be replaced by hand.
+    /// Finds input and output among the columns; requested columns are kept. If no name is known the common names are
+    /// used, to be replaced by hand.
     pub fn of(columns: &[&str], input: Option<&str>, output: Option<&str>) -> Self {
         let known = |names: &[&str]| -> Vec<&str> {
             let all = names.iter();
@@ -75,7 +75,7 @@ impl Roles {
         Self { input, output }
     }
 
-    /// Whether both are.
+    /// True if both are certain.
     pub fn are_certain(&self) -> bool {
         self.input.certain && self.output.certain
     }

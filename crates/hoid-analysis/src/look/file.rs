@@ -1,4 +1,4 @@
-//! Contents of a file, and what it looks like.
+//! Contents of a file, and what was recognised in it.
 
 use std::path::Path;
 
@@ -12,14 +12,14 @@ use super::{
     periods::{self, Periods},
 };
 
-/// Result of a look at a file.
+/// Result of the examination of a file.
 #[derive(Debug)]
 pub struct Look {
-    /// Its columns, sampling and trouble.
+    /// Its columns, sampling and problems.
     pub survey: FileSurvey,
     /// Error and control.
     pub roles: Roles,
-    /// Contents of these columns; why they make no record where they make none.
+    /// Contents of these columns, or the reason why they make no record.
     pub seen: Result<RecordSummary, IoError>,
     pub(super) known: LookOptions,
 }
@@ -27,17 +27,17 @@ pub struct Look {
 /// Summary of the record of a file.
 #[derive(Debug)]
 pub struct RecordSummary {
-    /// The record, as it was recorded.
+    /// The record, as recorded.
     pub record: Record,
-    /// The excitation and its span of whole periods, or why there is none.
+    /// The excitation and its span of whole periods, or the reason why there is none.
     pub periods: Result<Periods, String>,
-    /// Amount by which the control was recorded late, or why that is not known; `None` if no controlled element is
-    /// known, or the lag is.
+    /// Number of samples by which the control was recorded late, or the reason why it is unknown; `None` if no
+    /// controlled element is known, or the lag is given.
     pub lag: Option<Result<Lag, String>>,
 }
 
 impl Look {
-    /// Looks at a file.
+    /// Examines a file.
     ///
     /// # Errors
     /// The errors of [`survey`], where the file cannot be read at all.
@@ -52,7 +52,7 @@ impl Look {
         })
     }
 
-    /// The columns that report their unit, and it: next to the name, or in it as in `Stick [V]`.
+    /// Returns the columns with a unit, and the unit: next to the name, or in it as in `Stick [V]`.
     pub fn units(&self) -> Vec<(&str, &str)> {
         let all = self.survey.columns.iter();
         all.filter_map(|column| Some((column.path.as_str(), unit_of(column)?)))
@@ -60,12 +60,12 @@ impl Look {
     }
 }
 
-/// The names of the columns.
+/// Names of the columns.
 pub(super) fn names(found: &FileSurvey) -> Vec<&str> {
     found.columns.iter().map(|column| column.path.as_str()).collect()
 }
 
-/// The unit of a column, next to its name or at its end in brackets.
+/// Unit of a column, next to its name or at its end in brackets.
 fn unit_of(column: &ColumnSurvey) -> Option<&str> {
     let beside = Some(column.unit.as_str()).filter(|unit| !unit.is_empty());
     beside.or_else(|| {
@@ -86,7 +86,7 @@ fn seen(path: &Path, roles: &Roles, known: &LookOptions) -> Result<RecordSummary
         sampling_hz: known.sampling_hz,
         ..ReadOptions::default()
     };
-    // For several trials the first is examined.
+    // Of several trials the first is examined.
     let record = match read_record(path, &options) {
         Err(IoError::SeveralTrials { by, trials, .. }) => {
             let first = trials.first().map_or("", String::as_str);

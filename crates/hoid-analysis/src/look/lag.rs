@@ -8,8 +8,8 @@
 //! Y - b D = g H exp(-j omega Ts/2) (U exp(j omega N Ts) + a D)
 //! ```
 //!
-//! The whole N and the case (a, b) that leave the smallest part of the power of the output unexplained by a real gain g
-//! decide; nothing is reported where none explains it.
+//! The integer N and the case (a, b) that leave the smallest share of the power of the output unexplained by a real
+//! gain g are chosen; nothing is reported if none explains it.
 
 use std::f64::consts::TAU;
 
@@ -17,25 +17,25 @@ use hoid_model::{Complex64, ContinuousTransferFunction, Record};
 
 use super::periods::Periods;
 
-/// Names of the output of the controlled element.
+/// Common names of the output of the controlled element.
 const OUTPUTS: [&str; 4] = ["y", "output", "position", "x"];
-/// Largest part of the power of the output that a case may leave unexplained.
+/// Largest share of the power of the output that a case may leave unexplained.
 const UNEXPLAINED: f64 = 0.02;
-/// Samples that a recorder may be late: a person takes longer.
+/// Possible lags of a recorder in samples: the delay of a person is longer.
 const SAMPLES: [i32; 8] = [-2, -1, 0, 1, 2, 3, 4, 5];
 
-/// Amount by which the control was recorded late.
+/// Lag of the recorded control.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lag {
     /// In samples.
     pub samples: f64,
     /// In s.
     pub seconds: f64,
-    /// How it was found.
+    /// Description of how it was found.
     pub words: String,
 }
 
-/// How a disturbance enters: name, and its part at the control and at the output.
+/// Points at which a disturbance enters: name, and its share at the control and at the output.
 const CASES: [(&str, f64, f64); 5] = [
     ("no disturbance", 0.0, 0.0),
     ("the excitation added to the control", 1.0, 0.0),
@@ -44,8 +44,8 @@ const CASES: [(&str, f64, f64); 5] = [
     ("the excitation taken from the output", 0.0, -1.0),
 ];
 
-/// The lag of the control by the controlled element, or why it is not known: no column holds the output of
-/// the element, or nothing explains it.
+/// Returns the lag of the control, from the controlled element, or the reason why it is unknown: no column contains
+/// the output of the element, or no case explains it.
 pub(super) fn of_control(
     record: &Record,
     found: &Periods,
@@ -76,7 +76,7 @@ pub(super) fn of_control(
     })
 }
 
-/// Case and number of samples that explain most of the output, and the share of its power that is left.
+/// Returns the case and the number of samples that explain most of the output, and the unexplained share of its power.
 fn best(
     record: &Record,
     found: &Periods,
@@ -122,7 +122,7 @@ fn coefficients(values: &[f64], found: &Periods) -> Vec<Complex64> {
     found.excitation.harmonics().iter().map(of).collect()
 }
 
-/// The part of the power of the output that the input times a real gain leaves unexplained.
+/// Share of the power of the output that the input times a real gain leaves unexplained.
 fn unexplained(input: &[Complex64], output: &[Complex64]) -> Option<f64> {
     let cross: f64 = input.iter().zip(output).map(|(x, y)| (x.conj() * y).re).sum();
     let power = |all: &[Complex64]| all.iter().map(|x| x.norm_sqr()).sum::<f64>();

@@ -1,8 +1,8 @@
-//! One look at a file: what its columns are, what excites the loop and in which span of whole periods, and
-//! by how much the control was recorded late.
+//! Examination of a file: the meaning of its columns, the excitation of the loop and its span of whole periods, and
+//! the lag of the recorded control.
 //!
-//! Command line, groups and Python look at a file by this alone, and nothing is chosen silently: what is found is
-//! shown, with the evidence, as [`Advice`] on how to read the file. What was requested is not searched for.
+//! Command line, groups and Python all use this module, and nothing is chosen silently: the findings are shown, with
+//! the evidence, as [`Advice`] on how to read the file. Requested values are not searched for.
 //!
 //! | file | contents |
 //! |---|---|

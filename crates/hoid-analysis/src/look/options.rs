@@ -12,18 +12,18 @@ pub struct LookOptions {
     pub output: Option<String>,
     /// Column of the excitation; `none` if there is none.
     pub excitation: Option<String>,
-    /// The controlled element, as it was typed, and as it is meant.
+    /// The controlled element, as typed and as parsed.
     pub controlled_element: Option<(String, ContinuousTransferFunction)>,
-    /// The column of the time and its unit; found automatically where it is left out.
+    /// The column of the time and its unit; found automatically if not given.
     pub time: Option<TimeChoice>,
-    /// The trials of a file; known by a time that starts again where they are left out.
+    /// The trials of a file; found from a time that restarts if not given.
     pub trial: Option<TrialChoice>,
-    /// Sampling frequency, Hz; that of the column t where it is left out.
+    /// Sampling frequency, Hz; that of the column t if not given.
     pub sampling_hz: Option<f64>,
-    /// Start of the span that counts, s.
+    /// Start of the span that is used, s.
     pub from_s: Option<f64>,
-    /// End of the span that counts, s.
+    /// End of the span that is used, s.
     pub to_s: Option<f64>,
-    /// Samples by which the output is recorded later than the input that it answers.
+    /// Number of samples by which the output is recorded later than the input that causes it.
     pub offset_samples: Option<f64>,
 }

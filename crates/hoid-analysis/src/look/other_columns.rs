@@ -1,5 +1,5 @@
-//! A file without the columns that were requested, in which error and control are found all the same: nothing is chosen
-//! silently, the reader is shown what to ask for.
+//! A file without the requested columns in which error and control are nevertheless recognised: nothing is chosen
+//! silently, the user is shown which columns to request.
 
 use std::path::Path;
 
@@ -8,15 +8,15 @@ use thiserror::Error;
 
 use super::{advice::typed, columns::Roles, file::names};
 
-/// A file without the columns that were requested, in which error and control are found all the same.
+/// A file without the requested columns in which error and control are nevertheless recognised.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error("{}: {}", self.found(), self.as_keys())]
 pub struct OtherColumns {
     /// The file.
     pub file: String,
-    /// The missing request.
+    /// The requested column that is missing.
     pub missing: String,
-    /// The columns that there are.
+    /// The existing columns.
     pub available: String,
     /// The error; `None` if none is wanted.
     pub input: Option<String>,
@@ -25,7 +25,7 @@ pub struct OtherColumns {
 }
 
 impl OtherColumns {
-    /// The request, what there is, and what it looks like.
+    /// Describes the request, the existing columns, and the recognised ones.
     pub fn found(&self) -> String {
         let Self {
             file,
@@ -40,14 +40,14 @@ impl OtherColumns {
         format!("there is no column {missing} in {file} (columns: {available}). It looks like {error}u = {output}")
     }
 
-    /// The remedy as keys and values, as in a manifest and in Python.
+    /// Returns the remedy as keys and values, as in a manifest and in Python.
     pub fn as_keys(&self) -> String {
         let input = self.input.as_ref().map(|input| format!("input=\"{input}\""));
         let all = input.into_iter().chain([format!("output=\"{}\"", self.output)]);
         all.collect::<Vec<_>>().join(", ")
     }
 
-    /// The remedy as a command: that which was typed, its program left out, with these columns.
+    /// Returns the remedy as a command: the typed one, without its program, with these columns.
     pub fn command(&self, typed_words: impl IntoIterator<Item = String>) -> String {
         let mut words = vec!["hoid".to_owned()];
         let mut all = typed_words.into_iter();
@@ -69,7 +69,7 @@ impl OtherColumns {
     }
 }
 
-/// The columns that a file has in place of e and u; `None` if the error is another one, or that is not certain.
+/// Returns the columns that a file has in place of e and u; `None` for another error, or if they are not certain.
 pub fn other_columns(error: &IoError, path: &Path, options: &ReadOptions) -> Option<OtherColumns> {
     let IoError::NoSuchColumn {
         file,
@@ -82,7 +82,7 @@ pub fn other_columns(error: &IoError, path: &Path, options: &ReadOptions) -> Opt
     };
     let found = survey(path).ok()?;
     let names = names(&found);
-    // Only the common names represent unknown quantities; another name was meant as it was typed.
+    // Only the common names are replaced; any other name was typed deliberately.
     let of = |column: &ColumnExpression, default: &str| {
         let found = column.is_among(&names).then(|| column.to_string());
         (found.is_some() || column.to_string() == default).then_some(found)

@@ -12,14 +12,14 @@ use hoid_numerics::statistics::variance;
 
 use super::options::LookOptions;
 
-/// Longest part of a record at either end that a span may leave out, s, and its share of the record.
+/// Longest part that a span may leave out at either end of a record, s, and as a share of the record.
 const MOST_CUT_S: f64 = 20.0;
 const MOST_CUT_SHARE: f64 = 0.4;
-/// Fewest lines that excite a person: of a sine a person knows what comes.
+/// Least number of lines of an excitation: people predict a sine.
 const FEWEST_LINES: usize = 3;
-/// Shares of the power next to the lines that are no more than so many times another are alike.
+/// Largest ratio of two shares of the power next to the lines that count as equal.
 const LEAKS_ALIKE: f64 = 3.0;
-/// Share of the power that rounding to five digits or so may leave next to the lines.
+/// Share of the power next to the lines that rounding to about five digits may cause.
 const ROUNDING: f64 = 1e-9;
 
 /// The excitation of a run.
@@ -37,15 +37,14 @@ pub struct Periods {
     pub words: String,
 }
 
-/// The excitation in the channel that was named, else in the first of the common ones that has
-/// lines, else in any other.
+/// Finds the excitation in the named channel, else in the first of the common ones that has lines, else in any other.
 pub(super) fn search(record: &Record, known: &LookOptions) -> Result<Periods, String> {
     let channels: Vec<&str> = record.channels().map(|channel| channel.name.as_str()).collect();
     let candidates: Vec<&str> = match known.excitation.as_deref() {
         Some("none") => return Err("as requested".to_owned()),
         Some(name) => vec![name],
         None => {
-            // Error, control and output follow the excitation: they have its lines, and more.
+            // Error, control and output follow the excitation: they contain its lines, and more.
             let answers = channels.iter().take(2).copied().chain(["y", "x", "n", "e", "u"]);
             let answers: Vec<&str> = answers.collect();
             let default = COMMON_EXCITATIONS.into_iter().filter(|name| channels.contains(name));
@@ -72,8 +71,8 @@ pub(super) fn search(record: &Record, known: &LookOptions) -> Result<Periods, St
     })
 }
 
-/// The longest span of whole periods of a channel. A span that is some samples too long leaks little, and
-/// would pass: of those that are shorter by less than a second the one counts that leaks least.
+/// Finds the longest span of whole periods of a channel. A span that is some samples too long leaks little, and would
+/// pass: of those that are shorter by less than a second the one with the least leakage is chosen.
 fn in_channel(record: &Record, channel: &str, known: &LookOptions) -> Option<Periods> {
     let all = spans(record, known);
     let longest = all.iter().position(|span| lines_in(record, channel, *span).is_some())?;
@@ -84,7 +83,7 @@ fn in_channel(record: &Record, channel: &str, known: &LookOptions) -> Option<Per
         .filter_map(|span| lines_in(record, channel, *span).map(|(excitation, leak)| (*span, excitation, leak)))
         .collect();
     let least = near.iter().map(|(.., leak)| *leak).fold(f64::INFINITY, f64::min);
-    // For those that leak alike the first, which is the longest.
+    // Of those with equal leakage the first, which is the longest.
     let limit = LEAKS_ALIKE * least.max(ROUNDING);
     let ((from_s, to_s), excitation, _) = near.into_iter().find(|(.., leak)| *leak <= limit)?;
     let (omega, period_s) = (excitation.omega_rad_s(), excitation.period_s());
@@ -103,8 +102,8 @@ fn in_channel(record: &Record, channel: &str, known: &LookOptions) -> Option<Per
     })
 }
 
-/// The lines of a channel over a span, where they hold nearly all of its power, and the share of the
-/// power next to them.
+/// Returns the lines of a channel over a span, if they contain nearly all of its power, and the share of the power
+/// next to them.
 fn lines_in(record: &Record, channel: &str, (from_s, to_s): (f64, f64)) -> Option<(Excitation, f64)> {
     let span = record.span(from_s, to_s).ok()?;
     let excitation = Excitation::found_in(&span, channel, &LineSearch::default()).ok()?;
@@ -127,7 +126,7 @@ fn lines_in(record: &Record, channel: &str, (from_s, to_s): (f64, f64)) -> Optio
     Some((excitation, (1.0 - of_lines / power).max(0.0)))
 }
 
-/// The spans that are tried, the longest first, of equal ones the latest: a person settles in.
+/// Spans that are tried: the longest first, of equal ones the latest, since a person needs time to settle.
 fn spans(record: &Record, known: &LookOptions) -> Vec<(f64, f64)> {
     let (begin, end) = (record.time_s(0), record.time_s(record.len()));
     let most = MOST_CUT_S.min(MOST_CUT_SHARE * (end - begin));
@@ -189,8 +188,8 @@ mod tests {
         assert_eq!(found.excitation.harmonics(), [1, 3, 7, 12]);
     }
 
-    /// Samples after the last period, as of a recorder that is stopped late: the span that ends with the record leaks
-    /// little, and is not a whole period.
+    /// Samples after the last period, as from a recorder that was stopped late: the span to the end of the record
+    /// leaks little, but is not a whole period.
     #[test]
     fn a_period_is_not_drawn_out_by_samples_at_the_end() {
         let whole = record(&[1.0, 2.0, 3.0]);

@@ -4,8 +4,8 @@ use hoid_model::{NotConvertible, Record, uncertainty::OperatorEstimate};
 use hoid_numerics::statistics::mean;
 use hoid_track::{Trace, value_of};
 
-/// Root of the mean square of the relative error, of the rows from `first` on that converted, for
-/// each parameter whose truth the record holds.
+/// Returns the root mean square of the relative error, over the rows from `first` on that have an operator, for each
+/// parameter whose true value the record contains.
 pub fn relative_errors(
     record: &Record,
     trace: &Trace,

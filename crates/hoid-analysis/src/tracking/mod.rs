@@ -1,12 +1,12 @@
-//! From a recording to a trace and its reliability: what is done, in its order.
+//! From a recording to a trace and its verdict: the steps in their order.
 //!
 //! ```text
 //! file -- Reading --> Recordings -- Tracking { options }.run --> Tracked { trace, verdict, data, settings }
 //! ```
 //!
-//! A high rate is lowered; orders that are open are searched on the start span; the recursion goes over the record,
-//! with a second run that chooses its covariance where one is given; the verdict is that of the trace after what the
-//! recording shows. Faults are the guard's, sample by sample: a recording is not repaired before.
+//! A high rate is lowered; open orders are searched on the start span; the recursion processes the record, with a
+//! second run that chooses its covariance if one is given; the verdict is that of the trace together with the findings
+//! of the recording. Faults are handled by the guard, sample by sample: a recording is not repaired before.
 
 mod errors;
 mod run;

@@ -1,4 +1,4 @@
-//! The run: from a recording to a trace and its reliability.
+//! The run: from a recording to a trace and its verdict.
 
 use hoid_ident::IdentError;
 use hoid_model::{Decimation, Record, SampleTime};
@@ -17,7 +17,7 @@ use crate::{
     recordings::Recordings,
 };
 
-/// A recursion over a recording, as it is requested.
+/// A requested recursion over a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tracking {
     /// The recursion.
@@ -26,13 +26,13 @@ pub struct Tracking {
     pub start_span_s: Option<(f64, f64)>,
     /// Time from which the estimate moves, s.
     pub update_from_s: Option<f64>,
-    /// The trace is the mean over a given number of seconds.
+    /// Length of the moving average of the trace, s.
     pub moving_average_s: Option<f64>,
-    /// Every n samples of the recording give a row.
+    /// Number of samples of the recording per row.
     pub every: usize,
-    /// The rate at which it is tracked.
+    /// Treatment of a high sample rate.
     pub rate: Decimation,
-    /// The second run makes P smaller in course, in place of choosing it at the start.
+    /// True if the second run reduces P during the run, instead of choosing it at the start.
     pub update_covariance: bool,
 }
 
@@ -43,7 +43,7 @@ impl Default for Tracking {
 }
 
 impl Tracking {
-    /// A recursion, and all else by default.
+    /// Requests a recursion, with defaults for everything else.
     pub fn of(recursion: TrackRequest) -> Self {
         Self {
             recursion,
@@ -56,7 +56,7 @@ impl Tracking {
         }
     }
 
-    /// The plan for a recording, at the rate at which it is tracked.
+    /// Returns the plan for a recording, at the rate at which it is tracked.
     ///
     /// # Errors
     /// [`AnalysisError::Options`] for contradictory options.
@@ -74,11 +74,11 @@ impl Tracking {
         plan_of(&self.recursion, SampleTime::new(rate.factor(read) as f64 * read.s())?)
     }
 
-    /// Tracks the one recording; `validation` is a second run of the same person, `each` is called after every
-    /// candidate of a search.
+    /// Tracks the recording; `validation` is a second run of the same person, `each` is called after every candidate
+    /// of a search.
     ///
     /// # Errors
-    /// [`AnalysisError`] where there is no trace. One that is doubtful is none: see [`Tracked::verdict`].
+    /// [`AnalysisError`] if there is no trace. A doubtful trace is not an error: see [`Tracked::verdict`].
     pub fn run(
         &self,
         recordings: Recordings,
@@ -96,7 +96,7 @@ impl Tracking {
         let (record, account) = (&data.records[0], &data.accounts[0]);
         let every = match named_rate {
             true => self.every,
-            // Rows as far apart as samples of the file were to be.
+            // The distance of rows in time is that of the requested samples of the file.
             false => (self.every as f64 * read_ts.s() / record.sample_time().s()).round() as usize,
         }
         .max(1);
@@ -163,7 +163,7 @@ impl Tracking {
         })
     }
 
-    /// Checks for contradictions in the plan and with the record.
+    /// Checks the plan and the record for contradictions.
     fn check(&self, plan: &TrackPlan, record: &Record) -> Result<(), AnalysisError> {
         let method = &plan.options().method;
         if self.start_span_s.is_some() && matches!(self.recursion.start, RequestedStart::Coefficients(_)) {
@@ -185,7 +185,7 @@ impl Tracking {
         }
     }
 
-    /// Rows of the moving average.
+    /// Length of the moving average in rows.
     fn averaged_rows(&self, every: usize, record: &Record) -> Result<usize, AnalysisError> {
         let Some(length) = self.moving_average_s else {
             return Ok(1);
@@ -200,7 +200,7 @@ impl Tracking {
     }
 }
 
-/// The plan of a recursion; its errors are reported as errors of its options.
+/// Returns the plan of a recursion; its errors are reported as errors of its options.
 ///
 /// # Errors
 /// [`AnalysisError::Options`].

@@ -1,4 +1,4 @@
-//! The settings of a recursion as they are printed.
+//! The settings of a recursion, as printed.
 
 use hoid_ident::{Choice, settings::DelayRange};
 use hoid_model::Decimation;
@@ -7,7 +7,7 @@ use hoid_track::{Method, StartAt, Trace, TrackOptions, TrackPlan, TrackRequest};
 use super::tracked::Covariance;
 use crate::{recordings::Recordings, settings::Setting};
 
-/// Every option that shapes a recursion, defaults included, with units.
+/// Every option of a recursion, defaults included, with units.
 pub fn settings_of_recursion(
     asked: &TrackRequest,
     plan: &TrackPlan,
@@ -37,7 +37,7 @@ pub fn settings_of_recursion(
     }
     list.push(Setting::new("memory", options.memory_as_text(plan.sample_time())).given(memory_given));
     for one in &listed {
-        // The memory is above with the defaults of all parameters.
+        // The memory is printed above, with the defaults of all parameters.
         if let Some(text) = value(one.name) {
             let given = text != one.default;
             list.push(Setting::new(one.name.replace('_', " "), text).given(given));
@@ -68,15 +68,15 @@ pub(super) struct OwnSettings<'a> {
     pub covariance: Option<&'a Covariance>,
     pub start_given: bool,
     pub update_given: bool,
-    /// Rows of the moving average.
+    /// Length of the moving average in rows.
     pub rows: usize,
-    /// Samples from row to row, and whether they were given.
+    /// Number of samples per row, and whether it was given.
     pub every: (usize, bool),
     pub rate: Decimation,
 }
 
 impl OwnSettings<'_> {
-    /// These, and how the file was read.
+    /// Returns these settings, and how the file was read.
     pub fn list(&self, data: &Recordings) -> Vec<Setting> {
         let Self {
             trace,

@@ -13,29 +13,29 @@ use crate::{
     settings::Setting,
 };
 
-/// Covariance from a second run, and the name of that run.
+/// Covariance from a second run, and the label of that run.
 #[derive(Debug, Clone)]
 pub enum Covariance {
-    /// The one at the start.
+    /// The covariance at the start.
     Chosen(String, CovarianceChoice),
-    /// That in course.
+    /// The covariance during the run.
     Updated(String),
 }
 
-/// All results.
+/// Result of a recursion over a record.
 #[derive(Debug, Clone)]
 pub struct Tracked {
     /// The estimate over the record.
     pub trace: Trace,
-    /// The verdict on it, of all that is known.
+    /// The final verdict on it.
     pub verdict: Verdict,
-    /// The one recording as it was tracked, and the processing of it.
+    /// The recording that was tracked, and its processing.
     pub data: Recordings,
-    /// The span of the start fit, where there was one.
+    /// The span of the start fit, if there was one.
     pub span: Option<Record>,
     /// The operator in each row.
     pub operators: Vec<Result<OperatorEstimate, NotConvertible>>,
-    /// The search for the orders, where there was one.
+    /// The search for the orders, if there was one.
     pub choice: Option<Choice>,
     /// Result of a second run.
     pub covariance: Option<Covariance>,
@@ -46,29 +46,29 @@ pub struct Tracked {
 /// Rows without an operator and their most frequent reason.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NotConverted {
-    /// How many.
+    /// Their number.
     pub rows: usize,
-    /// Why most of them.
+    /// Most frequent reason.
     pub reason: Option<String>,
 }
 
 impl Tracked {
-    /// The record as it was tracked.
+    /// Returns the record that was tracked.
     pub fn record(&self) -> &Record {
         &self.data.records[0]
     }
 
-    /// Processing applied to it.
+    /// Returns its processing.
     pub fn account(&self) -> &Account {
         &self.data.accounts[0]
     }
 
-    /// Its name.
+    /// Returns its name.
     pub fn name(&self) -> &str {
         &self.data.names[0]
     }
 
-    /// The start covariance that a second run chose, and the name of that run.
+    /// Returns the start covariance that a second run chose, and the label of that run.
     pub fn chosen_covariance(&self) -> Option<(&str, &CovarianceChoice)> {
         match &self.covariance {
             Some(Covariance::Chosen(file, choice)) => Some((file, choice)),
@@ -76,7 +76,7 @@ impl Tracked {
         }
     }
 
-    /// The columns of the trace.
+    /// Returns the columns of the trace.
     pub fn table(&self) -> OutputTable {
         let trace = &self.trace;
         let mut columns = Vec::new();
@@ -128,7 +128,7 @@ impl Tracked {
         OutputTable { comments, columns }
     }
 
-    /// True if the coefficients represent an operator at all.
+    /// True if the coefficients represent an operator.
     pub fn has_operator(&self) -> bool {
         self.operators.iter().any(|o| {
             !matches!(
@@ -138,9 +138,9 @@ impl Tracked {
         })
     }
 
-    /// The first row in which the estimate has moved.
+    /// Returns the first row in which the estimate has moved.
     pub fn first_moved_row(&self) -> usize {
-        // Half a sample, so that rounding of the times does not decide.
+        // Half a sample is added, so that rounding of the times has no effect.
         let from = self.trace.updated_from_s() - self.record().sample_time().s() / 2.0;
         let first = self.trace.times_s().partition_point(|t| *t < from);
         let first = first
@@ -150,7 +150,7 @@ impl Tracked {
         first.min(self.trace.len().saturating_sub(1))
     }
 
-    /// Rows that have no operator.
+    /// Returns the rows without an operator.
     pub fn not_converted(&self) -> NotConverted {
         let mut kinds: BTreeMap<&'static str, (usize, String)> = BTreeMap::new();
         let rows = self.operators.iter().enumerate();
@@ -175,7 +175,8 @@ impl Tracked {
         }
     }
 
-    /// Rows without a crossover and their most frequent reason; `None` without a controlled element.
+    /// Returns the number of rows without a crossover and their most frequent reason; `None` without a controlled
+    /// element.
     pub fn without_crossover(&self) -> Option<(usize, Option<NoCrossover>)> {
         self.trace.options().controlled_element.as_ref()?;
         let mut kinds: BTreeMap<NoCrossover, usize> = BTreeMap::new();
@@ -186,7 +187,7 @@ impl Tracked {
         Some((kinds.values().sum(), most))
     }
 
-    /// Errors against the truth in the record; see [`relative_errors`].
+    /// Returns the errors relative to the true values in the record; see [`relative_errors`].
     pub fn relative_errors(&self) -> Vec<(&'static str, f64)> {
         relative_errors(
             self.record(),

@@ -86,10 +86,10 @@ mod tests {
         other[2] = 13.0;
         all.put(0, other, 0.0, 100);
         assert!((all.scatter(&about, 100, 150)[2][2] - 2.0).abs() < 1e-12);
-        // When half of what is read is new, it is one of weight 1/4; when all is, of none.
+        // If half of the replayed samples are new, its weight is 1/4; if all are, it is zero.
         assert!((all.scatter(&about, 175, 150)[2][2] - 0.8).abs() < 1e-12);
         assert_eq!(all.scatter(&about, 250, 150)[2][2], 0.0);
-        // The same again, far behind.
+        // The same again, much less likely.
         all.put(0, other, 300.0, 200);
         assert!(all.scatter(&about, 200, 150)[2][2] < 1e-9);
         all.put(STARTS, other, 0.0, 200);

@@ -64,7 +64,7 @@ pub struct Point {
 crate::state!([] Point { tau, omega, zeta, lag });
 
 impl Point {
-    /// The point plus corrections of omega, zeta and tau.
+    /// Returns the point plus corrections of omega, zeta and tau.
     pub fn moved(self, [omega, zeta, tau]: [f64; DYNAMICS]) -> Self {
         Self {
             tau: self.tau + tau,
@@ -89,7 +89,7 @@ pub struct Regressors {
 pub struct Basis {
     point: Point,
     sample_time: f64,
-    /// Columns of Phi, and T_0 to T_2, each followed by a zero, so that they are as long as the signals.
+    /// Columns of Phi, and T_0 to T_2, each followed by a zero to the length of the signals.
     columns: [Paired; N],
     taps: [Paired; 3],
     monic: [f64; N],
@@ -102,8 +102,8 @@ pub struct Basis {
 crate::state!([] Basis { point, columns, taps, monic, delay, part, scale, z });
 
 impl Basis {
-    /// The filter at rest. Ts in s. `None` for numbers that are not positive (the delay: negative)
-    /// or not finite, and for poles so fast that their response vanishes.
+    /// Builds the filter at rest. Ts in s. `None` for numbers that are not positive (the delay: negative) or not
+    /// finite, and for poles so fast that their response vanishes.
     pub fn new(point: Point, sample_time: f64) -> Option<Self> {
         let positive = |x: f64| x > 0.0 && x < 1e6;
         let Point { tau, omega, zeta, lag } = point;
@@ -179,9 +179,9 @@ impl Basis {
         (self.delay, self.part) = (whole as usize, part);
     }
 
-    /// The filter at another point with the same lag and scale, which continues the slow mode:
-    /// `g = 1/(s + a) e` is `Q^2 z_0` in the states of both. The fast modes start at rest and settle
-    /// within some `1/(zeta omega)`. `error` is the current delayed error.
+    /// Returns the filter at another point with the same lag and scale, which continues the slow mode:
+    /// `g = 1/(s + a) e` is `Q^2 z_0` in the states of both. The fast modes start at rest and settle within some
+    /// `1/(zeta omega)`. `error` is the current delayed error.
     pub fn moved(&self, point: Point, error: f64) -> Option<Self> {
         let sound = point.omega > 0.0 && point.zeta > 0.0 && point.tau >= 0.0 && point.lag == self.point.lag;
         if !sound {
@@ -213,29 +213,29 @@ impl Basis {
             .then_some(other)
     }
 
-    /// The point.
+    /// Returns the point.
     pub fn point(&self) -> Point {
         self.point
     }
 
-    /// Whole samples of the delay: the signals of a sample need the error `delay` samples ago and
-    /// the two before it.
+    /// Returns the whole samples of the delay: the signals of a sample need the error `delay` samples ago and the two
+    /// before it.
     pub fn delay(&self) -> usize {
         self.delay
     }
 
-    /// Factor of each response, one over its gain at [`REFERENCE`].
+    /// Returns the factor of each response, one over its gain at [`REFERENCE`].
     pub fn scale(&self) -> [f64; GAINS] {
         self.scale
     }
 
-    /// The delayed error, from those of `delay` and `delay + 1` samples ago.
+    /// Returns the delayed error, from those of `delay` and `delay + 1` samples ago.
     #[inline(always)]
     pub fn delayed(&self, [now, before]: [f64; 2]) -> f64 {
         now * (1.0 - self.part) + before * self.part
     }
 
-    /// The signals of a sample from the errors of `delay`, `delay + 1` and `delay + 2` samples ago.
+    /// Returns the signals of a sample from the errors of `delay`, `delay + 1` and `delay + 2` samples ago.
     #[inline(always)]
     pub fn step(&mut self, errors: [f64; 3]) -> Signals {
         let mut sums = [F64x2::ZERO; SIGNALS / 2];
@@ -257,7 +257,7 @@ impl Basis {
         signals
     }
 
-    /// The responses and their derivatives from the signals.
+    /// Returns the responses and their derivatives from the signals.
     #[inline(always)]
     pub fn regressors(&self, z: &Signals) -> Regressors {
         let Point { omega, zeta, .. } = self.point;
@@ -277,7 +277,7 @@ impl Basis {
         r
     }
 
-    /// The weights of the signals in `sum_i theta_i (r_i + sum_j c_j dr_i/dj)`, theta and c in a state.
+    /// Returns the weights of the signals in `sum_i theta_i (r_i + sum_j c_j dr_i/dj)`, theta and c in a state.
     pub fn weights(&self, state: &[f64; STATES]) -> Signals {
         let Point { omega, zeta, .. } = self.point;
         let (p, q) = (2.0 * zeta * omega, omega * omega);
@@ -294,12 +294,13 @@ impl Basis {
         weights
     }
 
-    /// Factors that bring the gains into the units of another basis.
+    /// Returns the factors that convert the gains to the units of another basis.
     pub(super) fn units_of(&self, to: &Self) -> [f64; GAINS] {
         core::array::from_fn(|i| self.scale[i] / to.scale[i])
     }
 
-    /// A state in the coordinates of another basis: the same gains in its units, and corrections from its point.
+    /// Converts a state to the coordinates of another basis: the same gains in its units, and corrections from its
+    /// point.
     pub(super) fn carried(&self, to: &Self, state: &[f64; STATES]) -> [f64; STATES] {
         let mut carried = *state;
         for (s, unit) in carried.iter_mut().zip(self.units_of(to)) {
@@ -318,7 +319,7 @@ impl Basis {
         self.z = [0.0; N];
     }
 
-    /// Frequency response of each r_i at a frequency in rad/s, for the point `at`.
+    /// Returns the frequency response of each r_i at a frequency in rad/s, for the point `at`.
     pub fn response(&self, omega_rad_s: f64, at: Point) -> [Complex; GAINS] {
         let w = omega_rad_s;
         let square = at.omega * at.omega;
@@ -339,8 +340,8 @@ impl Basis {
         })
     }
 
-    /// K_e and K_e_dot of the gain and lead that is nearest to `N(s)/(s + a)` at some frequencies in rad/s, by least
-    /// squares in `K_e + K_e_dot j omega`: linear in the gains and independent of poles and delay.
+    /// Returns K_e and K_e_dot of the gain and lead that are nearest to `N(s)/(s + a)` at some frequencies in rad/s,
+    /// by least squares in `K_e + K_e_dot j omega`: linear in the gains and independent of poles and delay.
     pub fn gain_and_lead(&self, at_rad_s: &[f64]) -> [[f64; GAINS]; 2] {
         let (a, count) = (1.0 / self.point.lag, at_rad_s.len() as f64);
         let squares: f64 = at_rad_s.iter().map(|w| w * w).sum();

@@ -32,7 +32,7 @@ pub(super) const MODEL_ONLY: f64 = 0.0;
 /// Lower limit of the share of the remaining degrees of freedom.
 const LEAST_FREE: f64 = 0.3;
 
-/// A difference of the present from the past: gains, level, natural frequency, damping, delay.
+/// A difference between present and past: gains, level, natural frequency, damping, delay.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Contrast {
     /// Present minus past.
@@ -92,7 +92,8 @@ impl Contrast {
         })
     }
 
-    /// Mean ratio of the covariance to another, `tr(C_other^-1 C)/N`. `None` if the other is not positive definite.
+    /// Returns the mean ratio of the covariance to another, `tr(C_other^-1 C)/N`. `None` if the other is not positive
+    /// definite.
     pub(super) fn dispersion(&self, other: &Self) -> Option<f64> {
         let mut factor = other.covariance;
         if !cholesky::factor(&mut factor, STATES) {
@@ -107,7 +108,7 @@ impl Contrast {
         Some(trace / STATES as f64)
     }
 
-    /// The same with both covariances times a factor.
+    /// Returns the same with both covariances times a factor.
     pub(super) fn times(&self, factor: f64) -> Self {
         Self {
             covariance: self.covariance.map(|row| row.map(|c| factor * c)),
@@ -116,8 +117,7 @@ impl Contrast {
         }
     }
 
-    /// The Wald statistic `d' C^-1 d` of some components; `None` if their C is not positive
-    /// definite.
+    /// Returns the Wald statistic `d' C^-1 d` of some components; `None` if their C is not positive definite.
     pub(super) fn wald_statistic<const N: usize>(&self, places: [usize; N]) -> Option<f64> {
         let d = places.map(|i| self.difference[i]);
         let mut factor = places.map(|i| places.map(|j| self.covariance[i][j]));

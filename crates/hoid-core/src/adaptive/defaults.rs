@@ -14,7 +14,7 @@ use super::{
     sizes::{DYNAMICS, STARTS},
 };
 
-/// Lag T_I in s, natural frequency in rad/s and damping of the default person.
+/// Lag T_I of the default person, s.
 pub const LAG_S: f64 = 3.0;
 /// Natural frequency of the neuromuscular system, rad/s.
 pub const OMEGA_RAD_S: f64 = 11.0;
@@ -96,7 +96,8 @@ pub struct DefaultOperator {
 }
 
 impl DefaultOperator {
-    /// Defaults with this delay, s, for an error that is linear between samples; a held error adds half a sample.
+    /// Returns the defaults with this delay, s, for an error that is linear between samples; a held error adds half a
+    /// sample.
     pub fn with_delay(tau: f64) -> Self {
         Self {
             point: Point {
@@ -112,12 +113,12 @@ impl DefaultOperator {
         }
     }
 
-    /// Threshold of the detector.
+    /// Returns the threshold of the detector.
     fn threshold(&self) -> f64 {
         (THRESHOLD - SLOPE * libm::log(self.false_alarms)).max(1.0)
     }
 
-    /// The prior for a sample time in s.
+    /// Returns the prior for a sample time in s.
     pub fn prior(&self, sample_time: f64) -> AdaptivePrior {
         let blocks = |seconds: f64| libm::round(seconds / BLOCK_S) as usize;
         let given = self.spread[2] < SPREAD[2];

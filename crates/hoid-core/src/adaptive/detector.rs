@@ -137,7 +137,7 @@ pub struct Detector {
 crate::state!([] Detector { statistics, since, declared, declared_contrast, innovation_variances, difference, ago });
 
 impl Detector {
-    /// The detector before the first block. `None` if there is no room for the blocks.
+    /// Builds the detector before the first block. `None` if the capacity for blocks is too small.
     pub fn new(settings: Detection) -> Option<Self> {
         let [short, long] = settings.recent;
         let present = short > 0 && short <= long;
@@ -227,27 +227,28 @@ impl Detector {
         Contrast::between(sides, shown, |sum| sum.with_prior(dynamics, deviations))
     }
 
-    /// Time from the last declared change to its declaration, s.
+    /// Returns the time from the last declared change to its declaration, s.
     pub fn ago_s(&self) -> f64 {
         self.ago as f64 * BLOCK_S
     }
 
-    /// Log significance at the last block, nats: the larger of both statistics; zero while there are too few blocks.
+    /// Returns the log significance at the last block, nats: the larger of both statistics; zero while there are too
+    /// few blocks.
     pub fn log_significance(&self) -> f64 {
         self.statistics.iter().fold(0.0, |most, s| s.log_significance.max(most))
     }
 
-    /// Ratio of T to a chi-square without a change: the larger of both statistics.
+    /// Returns the ratio of T to a chi-square without a change: the larger of both statistics.
     pub fn typical_level(&self) -> f64 {
         self.statistics.iter().fold(1.0, |most, s| s.scale().max(most))
     }
 
-    /// The difference at the last declared change.
+    /// Returns the difference at the last declared change.
     pub fn contrast(&self) -> &Contrast {
         &self.declared_contrast
     }
 
-    /// Mean square of the innovations before and after the last declared change.
+    /// Returns the mean square of the innovations before and after the last declared change.
     pub fn innovation_variances(&self) -> [f64; 2] {
         self.innovation_variances
     }
@@ -257,7 +258,7 @@ impl Detector {
         self.declared
     }
 
-    /// Parameters that changed at the last declared change.
+    /// Returns the parameters that changed at the last declared change.
     pub fn difference(&self) -> &Difference {
         &self.difference
     }

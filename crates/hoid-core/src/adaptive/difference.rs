@@ -1,4 +1,4 @@
-//! Which parameters changed: the difference of the present from the past, by groups of parameters.
+//! Selection of the changed parameters: the difference between present and past, by groups of parameters.
 //!
 //! Gains, level and dynamics differ by d with the covariance C (`contrast`), `W = C^-1`. Not all components can be
 //! distinguished: a longer delay resembles a turned gain vector, and seconds of data hardly separate them. Each group (the
@@ -121,12 +121,11 @@ mod tests {
 
     #[test]
     fn the_simplest_set_that_explains_is_told() {
-        // Along the delay alone: neither gains nor delay differ by much compared with their own
-        // errors.
+        // Along the delay only: neither gains nor delay differ by much compared with their own errors.
         let told = Difference::of(&contrast([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.5])).unwrap();
         assert_eq!(told.changed, [false, false, true]);
         assert!((told.value[6] - 1.5).abs() < 1e-9 && told.value[0] == 0.0);
-        // What is known of the delay once the gains are: far less than its marginal variance, 1.82.
+        // The variance of the delay for known gains: far less than its marginal variance, 1.82.
         assert!(told.covariance[6][6] < 0.1, "{}", told.covariance[6][6]);
         let told = Difference::of(&contrast([0.0, 1.5, 0.0, 0.0, 2.0, 0.0, 0.0])).unwrap();
         assert_eq!(told.changed, [true, true, false]);

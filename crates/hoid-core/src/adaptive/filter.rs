@@ -95,7 +95,7 @@ impl<E: AsMut<[f64]>> State for AdaptiveFilter<E> {
 }
 
 impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
-    /// The recursion at rest. `memory` holds [`memory_needed`] numbers, or fewer for no replays, at least
+    /// Builds the recursion at rest. `memory` holds [`memory_needed`] numbers, or fewer for no replays, at least
     /// [`least_memory`]. `None` for invalid numbers or too little memory.
     pub fn new(prior: AdaptivePrior, memory: E) -> Option<Self> {
         let ts = prior.sample_time;
@@ -146,7 +146,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         })
     }
 
-    /// Starts immediately at an earlier estimate of the person. `None` for invalid numbers.
+    /// Starts immediately from an earlier estimate of the person. `None` for invalid numbers.
     pub fn with_initial_estimate(mut self, known: &InitialEstimate) -> Option<Self> {
         if !known.is_sound() || !known.apply_to_noise(&mut self.prior_noise, self.prior.sample_time) {
             return None;
@@ -282,8 +282,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
     }
 
-    /// While neither signal changes there is no update: the recorder has stopped or the person rests, and the
-    /// innovation variance would go to zero.
+    /// True while neither signal changes. There is then no update: the recorder has stopped or the person rests, and
+    /// the innovation variance would go to zero.
     #[inline(always)]
     fn is_stationary(&mut self, u: f64) -> bool {
         let samples = self.history.samples();
@@ -323,15 +323,14 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
     }
 
-    /// As [`AdaptiveFilter::step`], but the estimate stays: only the filters move on.
+    /// As [`AdaptiveFilter::step`], but the estimate stays constant: only the filters move on.
     pub fn step_without_update(&mut self, e: f64, u: f64) -> Step {
         self.respond(e);
         self.detector.pass_over();
         self.pass(u, Use::FilterOnly)
     }
 
-    /// As [`AdaptiveFilter::step_without_update`] where the output is missing: the one-step
-    /// prediction takes its place.
+    /// As [`AdaptiveFilter::step_without_update`] for a missing output, which the one-step prediction replaces.
     pub fn bridge(&mut self, e: f64) {
         self.respond(e);
         self.detector.pass_over();
@@ -378,7 +377,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.started
     }
 
-    /// Number of samples that have updated the estimate.
+    /// Returns the number of samples that have updated the estimate.
     pub fn samples(&self) -> u64 {
         self.age
     }
@@ -388,12 +387,12 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.initial.is_some()
     }
 
-    /// s.
+    /// Returns the sample time, s.
     pub fn sample_time(&self) -> f64 {
         self.prior.sample_time
     }
 
-    /// The basis.
+    /// Returns the basis.
     pub fn basis(&self) -> &Basis {
         self.live.basis()
     }
@@ -412,48 +411,48 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         &self.live
     }
 
-    /// The current basis point with its corrections, limited to the range of the basis.
+    /// Returns the current basis point with its corrections, limited to the range of the basis.
     pub fn dynamics(&self) -> Point {
         self.live.point()
     }
 
-    /// The response of each gain at a frequency in rad/s, at the current point.
+    /// Returns the response of each gain at a frequency in rad/s, at the current point.
     pub fn responses(&self, omega_rad_s: f64) -> [Complex; GAINS] {
         self.live.responses(omega_rad_s)
     }
 
-    /// Y at a frequency in rad/s.
+    /// Returns Y at a frequency in rad/s.
     pub fn response(&self, omega_rad_s: f64) -> Complex {
         self.live.response(omega_rad_s)
     }
 
-    /// Y at a frequency in rad/s, with the derivatives of its real and its imaginary part by gains,
-    /// level and corrections: exact by the gains, differences by the corrections.
+    /// Returns Y at a frequency in rad/s, with the derivatives of its real and its imaginary part with respect to
+    /// gains, level and corrections: exact for the gains, finite differences for the corrections.
     pub fn response_with_derivatives(&self, omega_rad_s: f64) -> (Complex, [[f64; STATES]; 2]) {
         self.live.response_with_derivatives(omega_rad_s)
     }
 
-    /// The detector.
+    /// Returns the detector.
     pub fn detector(&self) -> &Detector {
         &self.detector
     }
 
-    /// Coefficients of D after the 1.
+    /// Returns the coefficients of D after the 1.
     pub fn d(&self) -> &[f64] {
         self.live.d()
     }
 
-    /// The noise model.
+    /// Returns the noise model.
     pub fn noise(&self) -> &NoiseModel {
         &self.live.noise
     }
 
-    /// Variance of eps.
+    /// Returns the variance of eps.
     pub fn variance(&self) -> f64 {
         self.live.mixture.variance()
     }
 
-    /// How often a signal overflowed and the filters were reset.
+    /// Returns the number of overflows after which the filters were reset.
     pub fn restarts(&self) -> u64 {
         self.restarts
     }
@@ -491,12 +490,12 @@ fn trusted(point: Point) -> [f64; DYNAMICS] {
     [omega * point.omega, zeta * point.zeta, tau].map(|s| s * s)
 }
 
-/// Number of past errors for the longest delay, for a sample time in s.
+/// Returns the number of past errors for the longest delay, for a sample time in s.
 pub fn errors_needed(sample_time: f64) -> usize {
     libm::ceil(LATEST_S / sample_time) as usize + 4
 }
 
-/// Least number of memory entries, for a sample time in s.
+/// Returns the least number of memory entries, for a sample time in s.
 pub fn least_memory(sample_time: f64) -> usize {
     3 * errors_needed(sample_time)
 }
@@ -504,7 +503,7 @@ pub fn least_memory(sample_time: f64) -> usize {
 /// Largest number of samples of a replay.
 const MOST_REPLAYED: f64 = 12_000.0;
 
-/// Number of memory entries for replays over `seconds`, for a sample time in s.
+/// Returns the number of memory entries for replays over `seconds`, for a sample time in s.
 pub fn memory_needed(sample_time: f64, seconds: f64) -> usize {
     let samples = (seconds / sample_time).clamp(0.0, MOST_REPLAYED);
     3 * (2 * errors_needed(sample_time) + libm::ceil(samples) as usize)

@@ -1,4 +1,4 @@
-//! When did the operator last change? A mixture of hypotheses about the time of the last change.
+//! A mixture of hypotheses about the time of the last change of the operator.
 //!
 //! After each block the likeliest hypotheses have children: a child assumes that the operator changed in this block. It has
 //! the estimate of its parent before the block, with the covariance of a jump added to that of the gains (A. S. Willsky and
@@ -344,13 +344,12 @@ impl Mixture {
             })
     }
 
-    /// `x^ = sum_j mu_j x^_j`.
+    /// Returns `x^ = sum_j mu_j x^_j`.
     pub fn mean(&self) -> &[f64; STATES] {
         &self.mean
     }
 
-    /// `P = sum_j mu_j (P_j + (x^_j - x^)(x^_j - x^)')`: the second term is the spread of the
-    /// means.
+    /// Returns `P = sum_j mu_j (P_j + (x^_j - x^)(x^_j - x^)')`: the second term is the spread of the means.
     pub fn covariance(&self) -> Covariance {
         let mut c = [[0.0; STATES]; STATES];
         for h in self.all() {
@@ -365,7 +364,7 @@ impl Mixture {
         c
     }
 
-    /// The mean of a function of state and covariance over the hypotheses.
+    /// Returns the mean of a function of state and covariance over the hypotheses.
     pub fn mean_of(&self, what: impl Fn(&[f64; STATES], &Covariance) -> f64) -> f64 {
         self.all()
             .iter()
@@ -373,12 +372,13 @@ impl Mixture {
             .sum()
     }
 
-    /// Innovation variance.
+    /// Returns the innovation variance.
     pub fn variance(&self) -> f64 {
         self.all().iter().map(|h| h.weight() * h.variance).sum()
     }
 
-    /// The segments of the likeliest hypothesis: the states before its changes, the oldest first, and the current one.
+    /// Returns the segments of the likeliest hypothesis: the states before its changes, the oldest first, and the
+    /// current one.
     pub fn segments(&self) -> Segments {
         let mut segments = Segments::NONE;
         if let Some(best) = self.likeliest(|_| true) {
@@ -453,7 +453,7 @@ impl Segments {
         }
     }
 
-    /// The segments with another first block and in other coordinates.
+    /// Returns the segments with another first block and in other coordinates.
     pub fn carried(mut self, later: u64, to: impl Fn(&[f64; STATES]) -> [f64; STATES]) -> Self {
         for segment in &mut self.all {
             *segment = Segment {
@@ -464,7 +464,7 @@ impl Segments {
         self
     }
 
-    /// The state of a block.
+    /// Returns the state of a block.
     pub fn at(&self, block: u64) -> Option<&[f64; STATES]> {
         let all = &self.all[..self.count.min(SEGMENTS + 1)];
         all.iter()

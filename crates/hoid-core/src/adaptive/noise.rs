@@ -54,7 +54,7 @@ pub struct NoiseModel {
 crate::state!([] NoiseModel { products, fade, weight, squares, samples, d });
 
 impl NoiseModel {
-    /// The prior noise model. Ts and memory in s. `None` for an order below 2 or above
+    /// Builds the prior noise model. Ts and memory in s. `None` for an order below 2 or above
     /// [`LARGEST_ORDER`].
     pub fn new(order: usize, memory: f64, ts: f64) -> Option<Self> {
         if !(2..=LARGEST_ORDER).contains(&order) || memory.is_nan() || memory <= 0.0 {
@@ -98,17 +98,17 @@ impl NoiseModel {
         true
     }
 
-    /// Coefficients after the 1.
+    /// Returns the coefficients after the 1.
     pub fn d(&self) -> &[f64] {
         &self.d[..self.order]
     }
 
-    /// Largest lag.
+    /// Returns the largest lag.
     pub fn order(&self) -> usize {
         self.order
     }
 
-    /// D at frequency zero.
+    /// Returns D at frequency zero.
     pub fn sum(&self) -> f64 {
         1.0 + self.d().iter().sum::<f64>()
     }
@@ -264,7 +264,7 @@ mod tests {
     #[test]
     fn a_steep_remnant_is_whitened_to_the_end() {
         // Four poles at .85: v has 1.6e4 times the power of eps, and its spectrum falls by 5e8 up to half the sampling
-        // frequency. A supposition that grew with the power of v would be whiter there than the remnant is.
+        // frequency. With a prior that scales with the power of v, D would be whiter there than the remnant.
         let (mut model, mut seed) = (NoiseModel::new(8, 100.0, 0.01).unwrap(), 3);
         let (mut v, mut poles, mut power) = ([0.0; WIDTH], [0.0; 4], 0.0);
         for t in 0..20_000 {
@@ -332,7 +332,7 @@ mod tests {
             model.update(&v, eps, 1.0);
         }
         model.solve();
-        // Ten memories of 4000 samples: what was supposed is gone, d1 has a standard error of .01.
+        // Ten memories of 4000 samples: the prior is forgotten, d1 has a standard error of .01.
         assert!((model.d()[0] + 0.5).abs() < 0.05, "{:?}", model.d());
         let mut other = NoiseModel::new(6, 40.0, 0.01).unwrap();
         assert!(!other.set_prior(&[0.0; WIDTH], 1.0, 2000.0) && !other.set_prior(&lags, 1.0, f64::NAN));

@@ -18,7 +18,7 @@ use super::{
 const SETTLING_S: f64 = 4.0;
 
 impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
-    /// K_e, K_e_dot, omega_nm in rad/s, zeta_nm, and tau_e in s.
+    /// Returns K_e, K_e_dot, omega_nm in rad/s, zeta_nm, and tau_e in s.
     pub fn operator(&self) -> [f64; PARAMETERS] {
         let [k_e, k_e_dot, omega, zeta, tau] = self.live().operator();
         // The error of a sample is held: half a sample of the delay belongs to the zero-order hold.
@@ -26,7 +26,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         [k_e, k_e_dot, omega, zeta, (tau - hold).max(0.0)]
     }
 
-    /// Their covariance, with the scatter of other operators that predict u about as well.
+    /// Returns their covariance, with the scatter of other operators that predict u about as well.
     pub fn operator_covariance(&self) -> [[f64; PARAMETERS]; PARAMETERS] {
         let mut rows = [[0.0; STATES]; PARAMETERS];
         for (row, gains) in rows.iter_mut().zip(self.gain_and_lead()) {
@@ -42,9 +42,10 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         core::array::from_fn(|i| core::array::from_fn(|j| own[i][j] + scatter[i][j]))
     }
 
-    /// T_L in s and its variance. Each hypothesis has the T with the least `E (K_e_dot - T K_e)^2`; T_L is their mean,
-    /// and its variance that of `K_e_dot - T_L K_e` for the covariance of the mixture. The T of the mixture itself
-    /// would be far too short if unlikely hypotheses, such as those of the last second, leave K_e undetermined.
+    /// Returns T_L in s and its variance. Each hypothesis has the T with the least `E (K_e_dot - T K_e)^2`; T_L is
+    /// their mean, and its variance that of `K_e_dot - T_L K_e` for the covariance of the mixture. The T of the
+    /// mixture itself would be far too short if unlikely hypotheses, such as those of the last second, leave K_e
+    /// undetermined.
     pub fn lead_time(&self) -> [f64; 2] {
         let map = self.gain_and_lead();
         let pair = |state: &[f64; STATES]| map.map(|row| (0..GAINS).map(|k| row[k] * state[k]).sum::<f64>());
@@ -66,12 +67,12 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         [lead, variance.max(0.0) / square]
     }
 
-    /// The matrix from the gains of the basis to K_e and K_e_dot.
+    /// Returns the matrix from the gains of the basis to K_e and K_e_dot.
     pub fn gain_and_lead(&self) -> [[f64; GAINS]; 2] {
         self.basis().gain_and_lead(&NEAR_RAD_S)
     }
 
-    /// Covariance of gains, level and corrections, as it is reported.
+    /// Returns the reported covariance of gains, level and corrections.
     pub fn state_covariance(&self) -> [[f64; STATES]; STATES] {
         let mut c = self.live().mixture.covariance();
         if !self.has_initial_estimate() {
@@ -83,7 +84,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     }
 }
 
-/// `M C M'`.
+/// Returns `M C M'`.
 pub fn through<const K: usize>(rows: &[[f64; STATES]; K], c: &[[f64; STATES]; STATES]) -> [[f64; K]; K] {
     let of = |a: &[f64; STATES], b: &[f64; STATES]| -> f64 {
         let each = (0..STATES).map(|i| a[i] * (0..STATES).map(|j| c[i][j] * b[j]).sum::<f64>());

@@ -12,7 +12,7 @@ use super::{
 pub struct AdaptivePrior {
     /// Point of the basis, and its prior standard deviations: relative for omega and zeta, in s for the delay.
     pub person: Point,
-    /// See `person`.
+    /// Prior standard deviations; see `person`.
     pub spread: [f64; DYNAMICS],
     /// Ts, s.
     pub sample_time: f64,
@@ -22,7 +22,7 @@ pub struct AdaptivePrior {
     pub noise_memory: f64,
     /// Time after which the estimate starts, s: the ratio of u to e in it gives the prior of the gains.
     pub hold: f64,
-    /// How the operator changes.
+    /// Prior of the changes of the operator.
     pub changes: ChangePrior,
     /// Starting points of the first estimate; their lags are that of the person.
     pub starts: [Point; STARTS],

@@ -23,7 +23,7 @@ pub(super) struct Saturation {
 crate::state!([] Saturation { lowest, highest, last, known });
 
 impl Saturation {
-    /// At rest.
+    /// No limits are known yet.
     pub const fn new() -> Self {
         Self {
             lowest: 0.0,

@@ -11,7 +11,7 @@ use crate::state::State;
 /// Signals in pairs.
 pub(super) type Paired = [F64x2; SIGNALS / 2];
 
-/// In pairs.
+/// Returns the signals in pairs.
 #[inline(always)]
 pub(super) fn paired(signals: &[f64; SIGNALS]) -> Paired {
     core::array::from_fn(|i| F64x2([signals[2 * i], signals[2 * i + 1]]))
@@ -31,7 +31,7 @@ impl SignalHistory {
         newest: 0,
     };
 
-    /// The newest first.
+    /// Returns the signals, the newest first.
     #[inline(always)]
     pub fn newest_first(&self) -> &[Paired] {
         self.twice[self.newest..]
@@ -39,7 +39,7 @@ impl SignalHistory {
             .map_or(&[], |past| past)
     }
 
-    /// Takes the signals of a sample in the place of the oldest.
+    /// Takes the signals of a sample, in place of the oldest.
     #[inline(always)]
     pub fn push(&mut self, signals: &[f64; SIGNALS]) {
         self.newest = self.newest.checked_sub(1).unwrap_or(LARGEST_ORDER - 1);
@@ -49,14 +49,14 @@ impl SignalHistory {
 }
 
 impl PartialEq for SignalHistory {
-    /// Wherever the ring starts.
+    /// Equality does not depend on where the ring starts.
     fn eq(&self, other: &Self) -> bool {
         self.newest_first() == other.newest_first()
     }
 }
 
 impl State for SignalHistory {
-    /// The newest first, wherever the ring starts: it is turned to its start.
+    /// Visits the newest first, wherever the ring starts: it is rotated to its start.
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         self.twice[..LARGEST_ORDER].rotate_left(self.newest);
         self.newest = 0;

@@ -1,4 +1,4 @@
-//! How unevenly the innovations are distributed in time.
+//! Dispersion of the power of the innovations in time.
 //!
 //! For a remnant of constant power the block energies are chi-square: the logarithm of the energy of n samples has the
 //! variance 2/n. People who act in pulses have innovations in bursts, with a variance tens of times larger. A likelihood
@@ -72,7 +72,7 @@ impl Volatility {
         (self.taken, self.energy, self.samples) = (0, 0.0, 0.0);
     }
 
-    /// Number of samples that count as one.
+    /// Returns the number of samples that count as one.
     pub fn dispersion(&self) -> f64 {
         let root = (self.steps + PRIOR_DIFFERENCES) / (self.differences + PRIOR_DIFFERENCES);
         libm::pow((root * root).clamp(1.0, LARGEST), POWER)

@@ -1,38 +1,36 @@
 //! Guard of one signal: limits for its next sample.
 //!
-//! **Prediction.** With `nabla x(t) = x(t) - x(t-1)`, the polynomial of degree j-1 through the last j samples goes on
-//! to a value from which x(t) differs by exactly `r_j(t) = nabla^j x(t)` (Newton's backward formula). The backward
-//! differences of order 1 to 4 are therefore the errors of holding the last sample, of a line, of a parabola and of a
-//! cubic, at one subtraction each. The order with the smallest scale is used: 1 for a signal like white noise after one
-//! lag, 3 or 4 for a smooth one.
+//! **Prediction.** With `nabla x(t) = x(t) - x(t-1)`, the polynomial of degree j-1 through the last j samples
+//! extrapolates to a value from which x(t) differs by exactly `r_j(t) = nabla^j x(t)` (Newton's backward formula). The
+//! backward differences of order 1 to 4 are therefore the errors of holding the last sample, of a line, of a parabola
+//! and of a cubic, at one subtraction each. The order with the smallest scale is used: 1 for a signal like white noise
+//! after a lag, 3 or 4 for a smooth one.
 //!
 //! **Scale.** q_j is the 99 % quantile of `|r_j|`, by stochastic approximation in its logarithm (H.
 //! Robbins and S. Monro, *Annals of Mathematical Statistics* 22 (1951) 400-407):
 //!
 //! `q <- q (1 + g (1 - p))` where `|r| > q`, else `q <- q (1 - g p)`, with p = .01, g = .05.
 //!
-//! The size of an outlier does not enter: one sample moves q by 5 % whatever it is. A quantile in the tail, and not a
-//! median: people's u rests and moves by pulses, and its tails are what the limit must let pass. p_j is the 90 %
-//! quantile, in the same way with g = .02. Samples at which the signal stays constant carry no information about how it
-//! moves: they enter neither.
+//! The size of an outlier does not enter: one sample moves q by 5 % whatever its size. A quantile in the tail is used,
+//! not a median: people's u rests and moves by pulses, and the limit must accept its tails. p_j is the 90 % quantile,
+//! in the same way with g = .02. Samples at which the signal stays constant carry no information about how it moves:
+//! they enter neither.
 //!
 //! **Outliers.** A sample is held back where `|r_j| > max(m_j q_j, floor)` with
 //!
 //! `m_j = mean of (q_j/p_j)^2`, at least 2.5 and at most 12,
 //!
-//! the mean over the last 20 s or so, for the quotient of two quantiles that follow the signal is noisy.
-//! A tail like `P(|r| > x) = exp(-(x/s)^k)` (W. Weibull, *Journal of Applied Mechanics* 18 (1951)
-//! 293-297) has its quantiles beyond P at `s (-log P)^(1/k)`. Those at .1 and .01 are apart by the factor
-//! `2^(1/k)`, those at 1e-2 and 1e-8 by `4^(1/k)`, its square: what one sample of 1e8 goes beyond, for
-//! the steady hand (k = 2: m = 2, and for a Gaussian tail 2.45) as for the one that moves in bursts
-//! (k = 1: m = 4; k = .7: m = 7). With m = 2.5 Gaussian errors are held back from 6.4 standard
-//! deviations on, one of 8e9 samples. The floor is a share of the signal's mean magnitude below which an
-//! outlier is worth nothing.
+//! the mean over about the last 20 s, since the ratio of two tracked quantiles is noisy. A tail like
+//! `P(|r| > x) = exp(-(x/s)^k)` (W. Weibull, *Journal of Applied Mechanics* 18 (1951) 293-297) has its quantiles
+//! beyond P at `s (-log P)^(1/k)`. Those at .1 and .01 differ by the factor `2^(1/k)`, those at 1e-2 and 1e-8 by
+//! `4^(1/k)`, its square: the limit that one of 1e8 samples exceeds, for a steady hand (k = 2: m = 2, and for a
+//! Gaussian tail 2.45) as for one that moves in bursts (k = 1: m = 4; k = .7: m = 7). With m = 2.5 Gaussian errors are
+//! held back from 6.4 standard deviations on, one of 8e9 samples. The floor is a share of the signal's mean magnitude
+//! below which an outlier has no effect.
 //!
-//! **While it is held back** the signal continues along its last slope where that has a meaning (order 2 or more),
-//! damped with a time constant of [`SLOPE_S`], else at its last value. It has come back when it is as near to that as
-//! it may be after h samples: within `max(m q_j, floor) + h q_1` if it has a slope, and `max(m q_1, floor) sqrt(h + 1)`
-//! if it wanders.
+//! **While it is held back** the signal continues with its last slope if the order is 2 or more, damped with a time
+//! constant of [`SLOPE_S`], else with its last value. It has returned if its distance from that value is plausible
+//! after h samples: within `max(m q_j, floor) + h q_1` with a slope, and `max(m q_1, floor) sqrt(h + 1)` without one.
 
 /// Orders of the differences.
 pub const ORDERS: usize = 4;
@@ -45,43 +43,42 @@ const INNER_GAIN: f64 = 0.02;
 /// Least and largest limit in units of the quantile.
 const LIMIT: f64 = 2.5;
 const HEAVIEST: f64 = 12.0;
-/// Largest mean magnitude, in units of the inner quantile, of a signal that moves as by default: Gaussian errors have
+/// Largest mean magnitude, in units of the inner quantile, of a signal with its typical moves: Gaussian errors have
 /// .49 and Laplacian ones .43, and those of a signal five times as large 2.4 and 2.2.
 const TYPICAL: f64 = 1.3;
-/// Blocks over which the tails are averaged.
+/// Number of blocks over which the tails are averaged.
 const AVERAGED: u32 = 20;
-/// Inner quantile over the outer one, of Gaussian errors.
+/// Ratio of the inner quantile to the outer one, for Gaussian errors.
 const GAUSSIAN_INNER: f64 = 1.6449 / 2.5758;
-/// Time constant with which the slope of a signal that is held back is damped, s.
+/// Time constant of the damped slope of a held-back signal, s.
 pub const SLOPE_S: f64 = 0.1;
-/// Quantile over mean magnitude of Gaussian errors: what the first quantiles are made of.
+/// Ratio of quantile to mean magnitude of Gaussian errors, for the first quantiles.
 const QUANTILE_OVER_MEAN: f64 = 3.228;
 
-/// One signal.
+/// The guard of one signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChannelGuard {
-    /// The last sample as handed on, and its differences of order 1 to 3.
+    /// The last accepted sample, and its differences of order 1 to 3.
     last: f64,
     differences: [f64; ORDERS - 1],
-    /// Samples in a row as they came, up to [`ORDERS`].
+    /// Number of consecutive samples as recorded, up to [`ORDERS`].
     known: usize,
-    /// Quantiles; those of nothing are zero.
+    /// Quantiles; zero for unknown ones.
     quantiles: [f64; ORDERS],
-    /// Those further in, from which the tail is predicted.
+    /// The inner quantiles, from which the tail is extrapolated.
     inner: [f64; ORDERS],
-    /// Mean of the squares of the quotients of the two, and what they were averaged over.
+    /// Mean of the squares of the ratios of the two, and the number of averaged blocks.
     heavy: [f64; ORDERS],
     averaged: u32,
-    /// True once outliers are searched for.
+    /// True once outliers are detected.
     watching: bool,
-    /// A first difference within which the signal stays constant.
+    /// First difference up to which the signal counts as constant.
     resting: f64,
-    /// Order less one that is used.
+    /// Order of the prediction, less one.
     order: usize,
     /// Least limit.
     floor: f64,
-    /// Samples that are being held back, the largest error among them, the sample before them, and
-    /// the slope.
+    /// Number of held-back samples, the largest error among them, the sample before them, and the slope.
     held: u32,
     size: f64,
     base: f64,
@@ -94,7 +91,7 @@ crate::state!([] ChannelGuard {
 });
 
 impl ChannelGuard {
-    /// A signal without prior knowledge: everything passes until [`ChannelGuard::set_quantiles`].
+    /// A signal without prior knowledge: all samples pass until [`ChannelGuard::set_quantiles`].
     pub fn new(sample_time: f64) -> Self {
         Self {
             last: 0.0,
@@ -116,8 +113,8 @@ impl ChannelGuard {
         }
     }
 
-    /// Quantiles that are known from the past of the signal, of the differences of order 1 to 4;
-    /// one of zero or less is not known. The tails are Gaussian until something else is learnt.
+    /// Sets quantiles that are known from the past of the signal, of the differences of order 1 to 4; one of zero or
+    /// less is unknown. The tails are Gaussian until they are learnt.
     pub fn set_quantiles(&mut self, quantiles: [f64; ORDERS]) {
         self.set_tails(quantiles, quantiles.map(|q| GAUSSIAN_INNER * q));
     }
@@ -131,8 +128,8 @@ impl ChannelGuard {
         self.watch();
     }
 
-    /// First values of quantiles that are not known, from the mean magnitudes of the differences; they are
-    /// learnt from then on, and nothing is an outlier until [`ChannelGuard::watch`].
+    /// Sets the initial values of unknown quantiles, from the mean magnitudes of the differences; they are then
+    /// learnt, and nothing is an outlier until [`ChannelGuard::watch`].
     pub fn start_learning(&mut self, means: [f64; ORDERS]) {
         for (j, mean) in means.into_iter().enumerate() {
             if self.quantiles[j] <= 0.0 {
@@ -142,19 +139,19 @@ impl ChannelGuard {
         }
     }
 
-    /// Looks for outliers from now on, if the quantiles are known.
+    /// Detects outliers from now on, if the quantiles are known.
     pub fn watch(&mut self) {
         self.watching = self.quantiles[0] > 0.0;
         self.choose();
     }
 
-    /// True once the quantiles are known and outliers are searched for.
+    /// True once the quantiles are known and outliers are detected.
     pub fn is_known(&self) -> bool {
         self.watching
     }
 
-    /// True for samples in a row, the first of them after a jump, that move as the signal does: the mean magnitude of
-    /// their differences of the order in use is below that of a signal about three times as large.
+    /// True for consecutive samples, the first of them after a jump, that move as the signal does: the mean magnitude
+    /// of their differences of the order in use is below that of a signal about three times as large.
     pub fn moves_as_usual(&self, samples: impl Iterator<Item = f64>) -> bool {
         let (mut past, mut count, mut sum) = ([0.0; ORDERS], 0, 0.0);
         for x in samples {
@@ -176,22 +173,22 @@ impl ChannelGuard {
         counted > 0.0 && sum <= TYPICAL * self.inner[self.order] * counted
     }
 
-    /// The first difference from which on a sample is a jump.
+    /// Returns the first difference from which on a sample is a jump.
     pub fn largest_move(&self) -> f64 {
         self.limit(0)
     }
 
-    /// A first difference within which the signal stays constant.
+    /// Sets the first difference up to which the signal counts as constant.
     pub fn set_resting(&mut self, difference: f64) {
         self.resting = difference;
     }
 
-    /// The last sample, or what represents it.
+    /// Returns the last sample, or its replacement.
     pub fn last(&self) -> f64 {
         self.last
     }
 
-    /// The last difference where the signal is predicted by more than its last value, else zero.
+    /// Returns the last difference if the order of the prediction is 2 or more, else zero.
     pub fn slope(&self) -> f64 {
         if self.order_in_use() > 0 {
             self.differences[0]
@@ -200,18 +197,17 @@ impl ChannelGuard {
         }
     }
 
-    /// True if the signal is predicted by more than its last value.
+    /// True if the order of the prediction is 2 or more.
     pub fn has_slope(&self) -> bool {
         self.order > 0
     }
 
-    /// Least limit from now on.
+    /// Sets the least limit.
     pub fn set_floor(&mut self, floor: f64) {
         self.floor = floor;
     }
 
-    /// Backward differences of order 1 to 4 with x as the next sample: the errors of the
-    /// predictions.
+    /// Returns the backward differences of order 1 to 4 with x as the next sample: the errors of the predictions.
     #[inline(always)]
     pub fn errors(&self, x: f64) -> [f64; ORDERS] {
         let first = x - self.last;
@@ -220,7 +216,7 @@ impl ChannelGuard {
         [first, second, third, third - self.differences[2]]
     }
 
-    /// Order less one of the prediction in use: none that rests on samples that were made up.
+    /// Order of the prediction in use, less one: only orders that use no replaced samples.
     #[inline(always)]
     fn order_in_use(&self) -> usize {
         let most = self.known.saturating_sub(1);
@@ -233,8 +229,7 @@ impl ChannelGuard {
         if limit > self.floor { limit } else { self.floor }
     }
 
-    /// True for errors beyond the limit, and for those that are not numbers. Nothing is beyond it
-    /// while the quantiles, or a sample before, are not known.
+    /// True for errors beyond the limit, and for NaN. False while the quantiles or the samples before are unknown.
     #[inline(always)]
     pub fn is_outlier(&self, errors: &[f64; ORDERS]) -> bool {
         let order = self.order_in_use();
@@ -243,7 +238,7 @@ impl ChannelGuard {
         !within && (self.watching && self.known > 0 || !errors[0].is_finite())
     }
 
-    /// Takes a sample into the prediction as it is, and its errors into the quantiles.
+    /// Takes an accepted sample into the prediction, and its errors into the quantiles.
     #[inline(always)]
     pub fn accept(&mut self, x: f64, errors: &[f64; ORDERS]) {
         if errors[0].abs() > self.resting {
@@ -265,7 +260,7 @@ impl ChannelGuard {
         self.follow(x, errors);
     }
 
-    /// Takes a sample into the prediction alone.
+    /// Takes a sample into the prediction only.
     #[inline(always)]
     pub fn follow(&mut self, x: f64, errors: &[f64; ORDERS]) {
         self.last = x;
@@ -278,13 +273,13 @@ impl ChannelGuard {
         let weight = 1.0 / f64::from(self.averaged);
         for ((heavy, q), p) in self.heavy.iter_mut().zip(&self.quantiles).zip(&self.inner) {
             let quotient = q / p;
-            // A tail without prior knowledge (0/0) is a Gaussian one.
+            // A tail without prior knowledge (0/0) is Gaussian.
             let square = (quotient * quotient).clamp(LIMIT, HEAVIEST);
             *heavy += weight * (square - *heavy);
         }
     }
 
-    /// The end of a block: averages the tails and chooses the order of the prediction again.
+    /// Ends a block: averages the tails and chooses the order of the prediction again.
     pub fn end_block(&mut self) {
         self.average_tails();
         self.choose();
@@ -298,17 +293,17 @@ impl ChannelGuard {
         }
     }
 
-    /// Samples that are being held back.
+    /// Returns the number of held-back samples.
     pub fn held(&self) -> u32 {
         self.held
     }
 
-    /// The largest error among them.
+    /// Returns the largest error among them.
     pub fn size(&self) -> f64 {
         self.size
     }
 
-    /// Holds back a sample, or a missing one (NaN); returns what represents it.
+    /// Holds back a sample, or a missing one (NaN); returns its replacement.
     pub fn hold(&mut self, x: f64) -> f64 {
         if self.held == 0 {
             (self.size, self.base) = (0.0, self.last);
@@ -324,7 +319,7 @@ impl ChannelGuard {
         self.last
     }
 
-    /// True if a signal that is held back has come back with this sample.
+    /// True if a held-back signal has returned with this sample.
     pub fn is_back(&self, x: f64) -> bool {
         let expected = self.last + self.damping * self.slope;
         let (limit, held) = (self.limit(self.order_in_use()), f64::from(self.held));
@@ -336,7 +331,7 @@ impl ChannelGuard {
         (x - expected).abs() <= room
     }
 
-    /// Continues from a sample that has come back, with the mean slope since the last good one.
+    /// Continues from a sample with which the signal has returned, with the mean slope since the last good one.
     pub fn resume(&mut self, x: f64) {
         let slope = (x - self.base) / (f64::from(self.held) + 1.0);
         self.last = x;
@@ -345,7 +340,7 @@ impl ChannelGuard {
         (self.held, self.size) = (0, 0.0);
     }
 
-    /// Continues from the last samples of the signal as they came, the newest last.
+    /// Continues from the last samples of the signal as recorded, the newest last.
     pub fn restart(&mut self, samples: impl Iterator<Item = f64>) {
         (self.known, self.held, self.size, self.slope) = (0, 0, 0.0, 0.0);
         let mut first = true;
@@ -368,7 +363,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// Twin: a polynomial of degree j-1 through the last j samples, by Lagrange's formula.
+    /// Comparison: a polynomial of degree j-1 through the last j samples, by Lagrange's formula.
     #[test]
     fn errors_are_those_of_the_extrapolated_polynomials() {
         let signal = |t: f64| libm::sin(0.31 * t) + 0.2 * libm::cos(1.7 * t);
@@ -454,8 +449,8 @@ mod tests {
         }
     }
 
-    /// Weibull's law has m = 4^(1/k): twice the quantile of k = 2, seven times that of k = .7; the largest of
-    /// 1e5 samples is within, one as large as never is not. Rests change nothing.
+    /// Weibull's law has m = 4^(1/k): twice the quantile for k = 2, seven times for k = .7; the largest of 1e5 samples
+    /// is within the limit, a spike is not. Rests change nothing.
     #[test]
     fn who_moves_in_bursts_has_a_higher_limit_and_a_spike_is_still_one() {
         for (shape, least, most) in [(2.0, 2.4, 2.6), (1.0, 3.0, 5.5), (0.7, 5.0, 10.5)] {
@@ -535,7 +530,7 @@ mod tests {
         assert!(!channel.is_outlier(&channel.errors(1e9)));
         assert!(channel.is_outlier(&channel.errors(f64::NAN)));
         assert!(channel.hold(f64::NAN).is_finite() && channel.held() == 1);
-        // A signal that never moves has no scale, and no outliers but by its floor.
+        // A signal that never moves has no scale, and outliers only by its floor.
         channel.restart([3.0; 9].into_iter());
         channel.set_quantiles([1e-300; ORDERS]);
         channel.set_floor(0.1);

@@ -1,10 +1,9 @@
-//! Both signals over a second, against what they were before.
+//! Signals of a second compared with those before.
 //!
 //! For each block of a second the mean magnitudes of e and u about their long-run means are kept, `m_c`, of their
-//! backward differences of order 1 to 4, `a_cj`, and of the innovations of the recursion, `a_eps`. Their long-run means
-//! M_c and A_cj follow with a time constant of 60 blocks; a block enters with no less than half and no more than twice
-//! the long-run value, so that no block moves them by more than 1/60. Blocks that are not as they should be do not
-//! enter.
+//! backward differences of order 1 to 4, `a_cj`, and of the innovations of the recursion, `a_eps`. Their long-run
+//! means M_c and A_cj follow with a time constant of 60 blocks; a block enters with no less than half and no more than
+//! twice the long-run value, so that no block moves them by more than 1/60. Blocks with a trouble do not enter.
 //!
 //! | what | rule | why |
 //! |---|---|---|
@@ -16,20 +15,20 @@
 //! | swapped | the sum over blocks of `d(own) - d(other) - 1`, at most 4 a block and never below 0, reaches 6 | e is as u was and u as e was; d is the sum over both channels of `\|log a_1/A_1\| + \|log a_3/A_3\|` |
 //! | misfit | `R = a_eps/min_j a_uj` is above 4 times its long-run value, and above 1.5, and a_eps above twice its own, in two blocks in a row | what u has been for the last samples predicts it better than the model does, which knows e too, and did not before |
 //!
-//! The sum for swapped channels is a one-sided CUSUM (E. S. Page, *Biometrika* 41 (1954) 100-115) of
-//! a difference that is negative for channels as they were and at most the distance of the two
-//! profiles for swapped ones: channels that are alike are never called swapped.
+//! The sum for swapped channels is a one-sided CUSUM (E. S. Page, *Biometrika* 41 (1954) 100-115) of a difference that
+//! is negative for channels that are not swapped and at most the distance of the two profiles for swapped ones:
+//! channels that are alike are never reported as swapped.
 
 use super::channel::ORDERS;
 use crate::bounds::within;
 
 /// e and u.
 pub const CHANNELS: usize = 2;
-/// Blocks after which the long-run values are known.
+/// Number of blocks after which the long-run values are known.
 const LEARNT: u32 = 10;
-/// Weight of a block thereafter.
+/// Weight of a block after that.
 const WEIGHT: f64 = 1.0 / 60.0;
-/// Limits of the rules. Share of the typical mean difference up to which a signal stays constant.
+/// Limits of the rules. Share of the typical mean difference up to which a signal counts as constant.
 pub const STILL: f64 = 1e-3;
 const FROZEN_U_BLOCKS: u32 = 3;
 const IDLE: f64 = 0.05;
@@ -41,22 +40,22 @@ const OTHER: f64 = 2.0;
 const LARGER_BLOCKS: u32 = 2;
 const SWAPPED_DRIFT: f64 = 1.0;
 const SWAPPED: f64 = 6.0;
-/// Largest evidence of one block.
+/// Largest contribution of one block to the sum.
 const MOST_EVIDENCE: f64 = 4.0;
 const MISFIT: f64 = 4.0;
-/// Ratio R below which a model predicts well enough.
+/// Ratio R up to which a model predicts well enough.
 const LEAST_RATIO: f64 = 1.5;
-/// Growth of the innovations without which it is not a misfit.
+/// Growth of the innovations below which there is no misfit.
 const LEAST_GROWTH: f64 = 2.0;
 const MISFIT_BLOCKS: u32 = 2;
-/// Distance of a block that is as by default: four logarithms of four.
+/// Distance of a typical block: four logarithms of four.
 const ALIKE: f64 = 4.0 * 1.386;
-/// And of one that is not.
+/// Distance of an unusual one.
 const UNLIKE: f64 = 4.0;
-/// Logarithms of features stay within this of each other.
+/// Limit of the logarithms of features.
 const LARGEST_LOG: f64 = 10.0;
 
-/// Sums over a block, and means of one.
+/// Sums over a block, or its means.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Block {
     /// Magnitudes of the backward differences of order 1 to 4.
@@ -69,9 +68,9 @@ pub struct Block {
     pub mean: [f64; CHANNELS],
     /// Magnitudes of innovations.
     pub innovation: f64,
-    /// Samples, and innovations.
+    /// Number of samples.
     pub samples: u32,
-    /// Innovations among them.
+    /// Number of innovations among them.
     pub innovations: u32,
 }
 
@@ -117,7 +116,7 @@ impl Block {
         self.innovations += 1;
     }
 
-    /// The means.
+    /// Returns the means.
     #[must_use]
     pub fn means(&self) -> Self {
         let over = |sum: f64, count: u32| if count > 0 { sum / f64::from(count) } else { 0.0 };
@@ -131,13 +130,13 @@ impl Block {
         }
     }
 
-    /// R: the mean innovation over what the past of u leaves open; none without either.
+    /// R: the mean innovation over the least mean difference of u; none if either is missing.
     fn ratio(&self) -> Option<f64> {
         let least = self.least_of_u();
         (self.innovations > 0 && least > 0.0).then(|| self.innovation / least)
     }
 
-    /// The least mean of the differences of u: what its own past leaves open.
+    /// The least mean of the differences of u: the error of predicting u from its own past.
     fn least_of_u(&self) -> f64 {
         self.differences[1]
             .iter()
@@ -145,7 +144,7 @@ impl Block {
     }
 }
 
-/// Problems with a block.
+/// Kind of trouble of a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trouble {
     /// e stays constant.
@@ -154,25 +153,25 @@ pub enum Trouble {
     FrozenOutput,
     /// e and u are nearly silent.
     Idle,
-    /// Both are scaled by a factor.
+    /// Both are larger by a factor.
     Larger,
     /// e is scaled by a factor.
     RescaledInput,
     /// u is scaled by a factor.
     RescaledOutput,
-    /// e is as u was, and u as e was.
+    /// e is as u was before, and u as e was.
     Swapped,
     /// The model predicts u worse than the past of u does.
     Misfit,
 }
 
 impl Trouble {
-    /// True for what may have become typical; no one tracks in silence.
+    /// True for troubles that may become the typical state; silence may not.
     pub fn may_be_the_new_level(self) -> bool {
         !matches!(self, Self::FrozenInput | Self::FrozenOutput | Self::Idle)
     }
 
-    /// Blocks that it has lasted for at least when it is first reported.
+    /// Least duration in blocks at the first report.
     pub fn blocks(self) -> u32 {
         match self {
             Self::FrozenInput => 1,
@@ -185,11 +184,11 @@ impl Trouble {
     }
 }
 
-/// The long-run values, and how long something has been wrong.
+/// The long-run values, and the duration of troubles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Profile {
     typical: Block,
-    /// Blocks that it was learnt from.
+    /// Number of blocks from which they were learnt.
     blocks: u32,
     frozen_u: u32,
     idle: u32,
@@ -197,7 +196,7 @@ pub struct Profile {
     rescaled: [u32; CHANNELS],
     swapped: f64,
     misfits: u32,
-    /// Long-run value of R, and the blocks that it was learnt from.
+    /// Long-run value of R, and number of blocks from which it was learnt.
     ratio: f64,
     ratios: u32,
     /// Long-run value of a_eps.
@@ -213,7 +212,7 @@ impl Default for Profile {
 }
 
 impl Profile {
-    /// Nothing is known.
+    /// An empty profile.
     pub fn new() -> Self {
         Self {
             typical: Block::default(),
@@ -230,7 +229,7 @@ impl Profile {
         }
     }
 
-    /// With long-run values that are known.
+    /// A profile with known long-run values.
     pub fn of(typical: &Block) -> Self {
         Self {
             typical: *typical,
@@ -239,7 +238,7 @@ impl Profile {
         }
     }
 
-    /// True if the last blocks gave no reason to suspect anything.
+    /// True if the last blocks gave no reason for suspicion.
     pub fn is_calm(&self) -> bool {
         self.is_known()
             && self.frozen_u == 0
@@ -250,28 +249,28 @@ impl Profile {
             && self.misfits == 0
     }
 
-    /// True for the means of a block unlike those that are typical: by a factor of e in the mean of the logarithms.
+    /// True for the means of an unusual block: different by a factor of e in the mean of the logarithms.
     pub fn is_unusual(&self, block: &Block) -> bool {
         self.is_known() && self.distance(block, [0, 1]) > UNLIKE
     }
 
-    /// True for the means of a block like those that are typical: within a factor of four in the
-    /// mean of the logarithms.
+    /// True for the means of a block that is like the typical ones: within a factor of four in the mean of the
+    /// logarithms.
     pub fn resembles(&self, block: &Block) -> bool {
         self.is_known() && self.distance(block, [0, 1]) < ALIKE
     }
 
-    /// True once there are long-run values.
+    /// True once long-run values are known.
     pub fn is_known(&self) -> bool {
         self.blocks >= LEARNT
     }
 
-    /// The long-run values.
+    /// Returns the long-run values.
     pub fn typical(&self) -> &Block {
         &self.typical
     }
 
-    /// Lets the means of a sound block enter the long-run values.
+    /// Takes the means of a sound block into the long-run values.
     pub fn update(&mut self, block: &Block) {
         let known = self.is_known();
         self.blocks = self.blocks.saturating_add(1);
@@ -317,7 +316,7 @@ impl Profile {
         }
     }
 
-    /// Blocks that a trouble which was just reported has lasted for at least.
+    /// Returns the least duration in blocks of a trouble that was just reported.
     pub fn lasting(&self, trouble: Trouble) -> u32 {
         match trouble {
             Trouble::FrozenOutput => self.frozen_u.max(trouble.blocks()),
@@ -325,8 +324,8 @@ impl Profile {
         }
     }
 
-    /// Problems with the means of a block, in the light of those before it; `rests` where u stays constant at its end
-    /// as the person rests.
+    /// Returns the trouble of a block, given those before it; `rests` if u is constant at its end because the person
+    /// rests.
     pub fn judge(&mut self, block: &Block, rests: bool) -> Option<Trouble> {
         if !self.is_known() {
             return None;
@@ -355,7 +354,7 @@ impl Profile {
         self.swapped = (self.swapped + evidence).clamp(0.0, 2.0 * SWAPPED);
         let limit = (MISFIT * self.ratio).max(LEAST_RATIO);
         let misfit = self.ratios >= LEARNT && block.ratio().is_some_and(|ratio| ratio > limit);
-        // For a person who rests the past predicts all, and the model need not be wrong.
+        // During a rest the past predicts u exactly, and the model need not be wrong.
         let as_foretold = self.ratios < LEARNT || block.innovation <= LEAST_GROWTH * self.innovation;
         let misfit = misfit && !as_foretold;
         self.misfits = count(self.misfits, misfit);
@@ -380,7 +379,7 @@ impl Profile {
         }
     }
 
-    /// The least and the largest ratio of the differences of a channel to the default.
+    /// The least and the largest ratio of the differences of a channel to the typical ones.
     fn ratios_of(&self, block: &Block, c: usize) -> [f64; 2] {
         let mut ends = [f64::INFINITY, 0.0];
         for (found, typical) in block.differences[c].iter().zip(&self.typical.differences[c]) {
@@ -396,7 +395,7 @@ impl Profile {
         for (c, typical) in of.into_iter().enumerate() {
             for j in [0, 2] {
                 let (found, typical) = (block.differences[c][j], self.typical.differences[typical][j]);
-                // Zero against zero is not a difference.
+                // Zero compared with zero is not a difference.
                 let log = if found == typical {
                     0.0
                 } else {
@@ -481,8 +480,8 @@ mod tests {
         }
     }
 
-    /// The stick is where it rests and e continues; not so where the person does an unpredicted sample, or e is
-    /// stationary too.
+    /// A trouble only if e is constant too, or the control during the rest is not predicted: u is constant at its rest
+    /// position and e continues.
     #[test]
     fn a_rest_is_not_frozen_but_a_rest_that_does_not_fit_is() {
         let still = block([0.02, 0.0], [0.1, 1.1]);
@@ -499,7 +498,7 @@ mod tests {
         assert_eq!(after(true, &quiet(0.19, 0.02)), None);
         assert_eq!(after(true, &quiet(0.21, 0.02)), Some((3, Trouble::FrozenOutput)));
         assert_eq!(after(true, &quiet(0.0, 0.0)), Some((1, Trouble::FrozenInput)));
-        // One that was trusted for long has lasted for as long.
+        // A channel that was trusted for long has had the trouble for as long.
         let mut profile = known();
         (0..9).for_each(|_| assert_eq!(profile.judge(&quiet(0.0, 0.02), true), None));
         let told = profile.judge(&quiet(0.0, 0.02), false);

@@ -1,4 +1,4 @@
-//! A model that stays: how well does what a recursion started with predict u today?
+//! A fixed model: how well the start of a recursion predicts the current u.
 //!
 //! The general model `A u = (B/F) q^-nk e + (C/D) eps` with the coefficients of the start gives the innovations eps_0
 //! next to those of the recursion, eps. Over a block of n samples the estimate is the worse of the two by
@@ -6,21 +6,21 @@
 //! `s = n log(mean |eps| / mean |eps_0|)`
 //!
 //! units of log likelihood: the ratio of the mean magnitudes is that of the standard deviations for every shape of the
-//! distribution, and a few outliers weigh little. The innovations of a sound recursion are larger than those of a fixed
-//! model by half of its effective number of parameters over its memory: .2 % for memories of 2 to 5 s and white
-//! innovations, several per cent for seconds where its noise model is too small for the remnant, and more for a person
-//! who is not steady. What a block shows beyond [`DRIFT`] counts. The one-sided cumulative sum (E. S. Page,
-//! *Biometrika* 41 (1954) 100-115) reports an estimate that has gone diverged when it reaches [`ASTRAY`].
+//! distribution, and a few outliers have little weight. The innovations of a sound recursion are larger than those of
+//! a fixed model by half of its effective number of parameters over its memory: .2 % for memories of 2 to 5 s and
+//! white innovations, several per cent for seconds if the order of its noise model is too low for the remnant, and
+//! more for an unsteady person. The part beyond [`DRIFT`] counts. The one-sided cumulative sum (E. S. Page,
+//! *Biometrika* 41 (1954) 100-115) reports a diverged estimate when it reaches [`ASTRAY`].
 //!
-//! A person who has changed is predicted better by an estimate that followed than by the start: the sum stays at zero.
+//! A changed person is predicted better by an estimate that has followed than by the start: the sum stays at zero.
 
 /// Largest order of a polynomial.
 pub const ROOM: usize = 16;
-/// Share by which the innovations must be larger to count.
+/// Relative increase of the innovations that does not count.
 pub const DRIFT: f64 = 0.2;
-/// Sum at which the estimate is diverged.
+/// Sum at which the estimate has diverged.
 pub const ASTRAY: f64 = 40.0;
-/// Largest evidence of one block.
+/// Largest contribution of one block to the sum.
 const MOST: f64 = 15.0;
 
 /// Orders of the model: na, nb, nc, nd, nf.
@@ -41,8 +41,8 @@ pub struct ReferenceModel {
 crate::state!([] ReferenceModel { coefficients, past, sum, samples, score });
 
 impl ReferenceModel {
-    /// The model of `theta = [a.., b.., c.., d.., f..]`. `None` where an order is above [`ROOM`] or
-    /// theta has another length.
+    /// Builds the model of `theta = [a.., b.., c.., d.., f..]`. `None` if an order is above [`ROOM`] or theta has
+    /// another length.
     pub fn new(orders: Orders, theta: &[f64]) -> Option<Self> {
         if orders.iter().any(|n| *n > ROOM) || orders.iter().sum::<usize>() != theta.len() {
             return None;
@@ -62,7 +62,7 @@ impl ReferenceModel {
         })
     }
 
-    /// At rest, with nothing reported.
+    /// Resets the filters and the sum.
     pub fn reset(&mut self) {
         (self.past, self.sum, self.samples, self.score) = ([[0.0; ROOM]; 5], 0.0, 0, 0.0);
     }
@@ -95,13 +95,13 @@ impl ReferenceModel {
         eps
     }
 
-    /// Forgets the errors of the block so far.
+    /// Drops the errors of the block so far.
     pub fn skip_block(&mut self) {
         (self.sum, self.samples) = (0.0, 0);
     }
 
-    /// The end of a block in which the mean magnitude of the recursion's innovations was so large:
-    /// true when its estimate is diverged.
+    /// Ends a block in which the innovations of the recursion have this mean magnitude: true if its estimate has
+    /// diverged.
     pub fn end_block(&mut self, innovation: f64) -> bool {
         let own = self.sum / f64::from(self.samples.max(1));
         let said = f64::from(self.samples) * (libm::log(innovation / own) - DRIFT);
@@ -122,7 +122,7 @@ mod tests {
         shape::AnyShape,
     };
 
-    /// Twin: the predictor of the recursions.
+    /// Comparison with the predictor of the recursions.
     #[test]
     fn innovations_are_those_of_the_predictor() {
         let orders = [1, 2, 1, 2, 2];

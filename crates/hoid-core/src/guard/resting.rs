@@ -1,29 +1,30 @@
-//! A stick that rests, and a channel that is frozen: both stay constant, and only one of them is a fault.
+//! A resting stick and a frozen channel: both stay constant, and only one of them is a fault.
 //!
 //! A stick with a dead zone rests at its centre, and one that is pushed to its end rests there. Such values are atoms
-//! of the distribution of u: u comes back to them often, and stays. The last [`ATOMS`] values at which u represented
-//! `LEAST_S` or more are kept, each with the number of its rests n, their sum s and the longest of them, l. A stand of
-//! length T is a **rest**, and no fault, where
+//! of the distribution of u: u returns to them often, and stays. The last [`ATOMS`] values at which u stayed for
+//! `LEAST_S` or more are kept, each with the number of its rests n, their sum s and the longest of them, l. A constant
+//! span of length T is a **rest**, and no fault, if
 //!
 //! `n >= 3`, `s >= .05 t`, `T < max(8 s, 2 l)`
 //!
-//! after t seconds. A frozen channel is at whatever the value was, to which u never came back before or hardly ever,
-//! for a distribution without an atom there gives it probability zero; and one that froze within a rest is stationary
-//! longer than the person ever rested. For a longest of n equally distributed rests the next one is larger with
+//! after t seconds. A frozen channel has an arbitrary value, at which u was never or hardly ever before, since a
+//! distribution without an atom there gives it probability zero; and a channel that freezes within a rest is constant
+//! for longer than the person ever rested. After a longest of n equally distributed rests the next one is larger with
 //! probability 1/(n+1), whatever their distribution (order statistics; H. A. David and H. N. Nagaraja, *Order
-//! Statistics*, 2003, §2.1); twice as long it is, with exponential rests, with a probability of about `2/((n+1)(n+2))`.
-//! The least of 8 s is for the time in which only a few rests have been seen.
+//! Statistics*, 2003, §2.1); it is twice as long, for exponential rests, with a probability of about `2/((n+1)(n+2))`.
+//! The minimum of 8 s is for the time in which only a few rests have been observed.
 //!
-//! A rest is judged by who calls: e has to move on meanwhile, and the innovations must be no larger than typical.
+//! The caller checks the other conditions of a rest: e has to move meanwhile, and the innovations must be no larger
+//! than typical.
 
-/// Values that are kept.
+/// Number of values that are kept.
 pub const ATOMS: usize = 4;
 /// Least length of a rest, s.
 const LEAST_S: f64 = 0.1;
-/// Rests at a value, and their share of the time, that make it an atom.
+/// Number of rests at a value, and their share of the time, that make it an atom.
 const RESTS: u32 = 3;
 const SHARE: f64 = 0.05;
-/// Longest rest that is always believed at an atom, s, and in units of the longest so far.
+/// Longest rest at an atom that is always accepted, s, and the same in units of the longest so far.
 const BELIEVED_S: f64 = 8.0;
 const LONGER: f64 = 2.0;
 
@@ -32,7 +33,7 @@ const LONGER: f64 = 2.0;
 struct Atom {
     value: f64,
     rests: u32,
-    /// Samples of its rests, and of the longest.
+    /// Number of samples of its rests, and of the longest.
     samples: u64,
     longest: u64,
 }
@@ -43,21 +44,21 @@ crate::state!([] Atom { value, rests, samples, longest });
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Resting {
     sample_time: f64,
-    /// Distance within which two values are one.
+    /// Distance up to which two values are equal.
     tolerance: f64,
     atoms: [Atom; ATOMS],
     samples: u64,
-    /// The value at which u is stationary, and for how long.
+    /// The current value of u, and how long it has been constant.
     value: f64,
     stands: u64,
-    /// True if the stand is not to be learnt.
+    /// True if the constant span is not to be learnt.
     doubted: bool,
 }
 
 crate::state!([] Resting { tolerance, atoms, samples, value, stands, doubted });
 
 impl Resting {
-    /// Nothing is known.
+    /// An empty list of rests.
     pub fn new(sample_time: f64) -> Self {
         Self {
             sample_time,
@@ -70,12 +71,12 @@ impl Resting {
         }
     }
 
-    /// Values that are so near to each other are one.
+    /// Sets the distance up to which two values are equal.
     pub fn set_tolerance(&mut self, tolerance: f64) {
         self.tolerance = tolerance;
     }
 
-    /// Takes a sample of u; one that is not a number ends a stand.
+    /// Takes a sample of u; NaN ends a constant span.
     #[inline]
     pub fn take(&mut self, u: f64) {
         self.samples += 1;
@@ -90,12 +91,12 @@ impl Resting {
         }
     }
 
-    /// The current stand is not a rest: it is not learnt.
+    /// Marks the current constant span as no rest: it is not learnt.
     pub fn doubt(&mut self) {
         self.doubted = true;
     }
 
-    /// The stand that is over enters the values; where there is no room, in place of the one with the least time.
+    /// Learns the constant span that has ended; if the list is full, it replaces the value with the least time.
     fn learn(&mut self) {
         let place = self.place().unwrap_or_else(|| {
             let least = (0..ATOMS).min_by_key(|i| self.atoms[*i].samples).unwrap_or(0);
@@ -111,13 +112,13 @@ impl Resting {
         atom.longest = atom.longest.max(stands);
     }
 
-    /// Where the current value is kept.
+    /// Index of the current value.
     fn place(&self) -> Option<usize> {
         let known = |atom: &Atom| atom.rests > 0 && (atom.value - self.value).abs() <= self.tolerance;
         self.atoms.iter().position(known)
     }
 
-    /// True while u is stationary as the person rests.
+    /// True while u is constant because the person rests.
     pub fn is_rest(&self) -> bool {
         let Some(place) = self.place() else {
             return false;
@@ -130,7 +131,7 @@ impl Resting {
         } = self.atoms[place];
         let stands = self.stands as f64 * self.sample_time;
         let believed = (LONGER * longest as f64 * self.sample_time).max(BELIEVED_S);
-        // The time before this stand.
+        // The time before this constant span.
         let time = self.samples.saturating_sub(self.stands) as f64;
         self.stands > 0 && rests >= RESTS && samples as f64 >= SHARE * time && stands < believed && !self.doubted
     }
@@ -151,7 +152,7 @@ mod tests {
         resting
     }
 
-    /// The time after which a are at a value is not a rest, s.
+    /// The time after which a constant span at a value is no longer a rest, s.
     fn told_after(mut resting: Resting, value: f64) -> f64 {
         let last = (1..10_000).take_while(|_| {
             resting.take(value);
@@ -165,12 +166,12 @@ mod tests {
         let resting = person(&[60, 150, 80, 120]);
         assert!((told_after(resting, 0.0) - 8.0).abs() < 0.02);
         assert!((told_after(person(&[60, 600, 80, 120]), 0.0) - 12.0).abs() < 0.02);
-        // Never there, and there once.
+        // A new value, and one with a single rest.
         assert!(told_after(resting, 0.37) == 0.0);
         assert!(told_after(person(&[150]), 0.0) == 0.0);
     }
 
-    /// A signal that was seen to be at many values for a moment, as one of a coarse converter does.
+    /// A signal with many values for a moment each, as from a coarse converter.
     #[test]
     fn values_of_a_coarse_signal_are_no_atoms() {
         let mut resting = Resting::new(0.01);

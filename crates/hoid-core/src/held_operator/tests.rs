@@ -1,5 +1,4 @@
-//! The hold of the operator against 60 digits, against itself where its cases meet, and on
-//! degenerate input.
+//! The hold of the operator compared with 60 digits, with itself at the borders of its cases, and on degenerate input.
 
 use super::*;
 use std::vec::Vec;
@@ -14,7 +13,7 @@ struct Case {
     ts: f64,
     coefficients: [f64; 5],
     sum: f64,
-    /// By omega and by zeta.
+    /// With respect to omega and to zeta.
     sum_slopes: [f64; 2],
     jacobian: [[f64; 5]; 5],
 }
@@ -47,7 +46,7 @@ fn column(jacobian: &[[f64; 5]; 5], j: usize) -> [f64; 5] {
     core::array::from_fn(|i| jacobian[i][j])
 }
 
-/// For a numerator and of a denominator with its leading one.
+/// Scales of a numerator, and of a denominator with its leading one.
 fn scales(coefficients: &[f64; 5]) -> [f64; 5] {
     let (b, f) = (largest(&coefficients[..3]), largest(&coefficients[3..]).max(1.0));
     [b, b, b, f, f]

@@ -39,8 +39,7 @@ pub fn box_jenkins(samples: usize, seed: u64, level: f64) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// P by rows, updated as the text prints it, made symmetric at each sample: the oracle of the
-/// factors.
+/// P by rows, updated as printed in the thesis, made symmetric at each sample: the reference for the factored form.
 pub struct Plain<const N: usize> {
     pub p: [[f64; N]; N],
     pub power: f64,

@@ -1,13 +1,13 @@
-//! The gain of each part of the remnant that has its share of the variance of u.
+//! The gain of each part of the remnant that gives it its share of the variance of u.
 //!
-//! Part i of gain 1 makes `V_i = sum over k of h_i(k)^2` of the variance of u, h_i the response of u,
-//! through the closed loop, to one unit of w at sample 0. The sinusoids of target and disturbance
-//! make `V_0 = sum of A^2/2 |u/f|^2` at their frequencies, responses being those of the samples. All
-//! parts are independent, so that with shares p_i
+//! Part i with gain 1 contributes `V_i = sum over k of h_i(k)^2` to the variance of u, with h_i the response of u,
+//! through the closed loop, to one unit of w at sample 0. The sinusoids of target and disturbance contribute
+//! `V_0 = sum of A^2/2 |u/f|^2` at their frequencies, with the responses of the sampled loop. All parts are
+//! independent, so that with shares p_i
 //!
 //! `var u = (V_0 + sum of K_j^2 V_j of given gains) / (1 - sum of p_i)`, `K_i^2 = p_i var u / V_i`.
 //!
-//! The response also shows whether the loop is stable: it then dies away.
+//! The response also shows whether the loop is stable: it then decays to zero.
 
 use hoid_model::Complex64;
 use hoid_model::{
@@ -22,16 +22,16 @@ use super::{
 
 /// The first horizon, in samples.
 const FIRST: usize = 512;
-/// A response that has not died away by then is one of a loop that is not stable.
+/// Horizon in samples by which the response of a stable loop has decayed.
 const LONGEST: usize = 1 << 20;
-/// Part of the energy in the second half of the horizon at which a response has died away: what
-/// comes behind is its square.
+/// Share of the energy in the second half of the horizon at which a response has decayed: the share after the horizon
+/// is its square.
 const LEFT: f64 = 1e-7;
 
 /// Mean squares of u, of its steps and of e.
 type MeanSquares = [f64; 3];
 
-/// Strength of the remnant in one state.
+/// Strength of the remnant for one state.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Calibration {
     /// K of each part.
@@ -47,7 +47,7 @@ impl Calibration {
         shapings: &[Shaping],
         is_last: bool,
     ) -> Result<Self, ModelError> {
-        // Stable or not, with and without a remnant.
+        // Stability is checked with and without a remnant.
         energy(held, &Shaping::White)?;
         let mut sum = line_power(held, scenario)?;
         let mut energies = Vec::with_capacity(shapings.len());
@@ -139,7 +139,7 @@ fn energy(held: &HeldLoop, shaping: &Shaping) -> Result<MeanSquares, ModelError>
     }
 }
 
-/// Mean squares that target and disturbance make.
+/// Mean squares due to target and disturbance.
 fn line_power(held: &HeldLoop, scenario: &FamilyScenario) -> Result<MeanSquares, ModelError> {
     let mut sum = [0.0; 3];
     for (excitation, is_target) in [(&scenario.target, true), (&scenario.disturbance, false)] {

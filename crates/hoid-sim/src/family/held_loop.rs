@@ -1,16 +1,15 @@
 //! One sample of the loop.
 //!
-//! At sample k, with the parameters in force at its time,
+//! At sample k, with the parameters at that time,
 //!
 //! `u = r(k - l) + n`, `y = C x_p + D (u + d)`, `e = f - y`,
 //!
-//! r the response of the operator after the part of a sample of their delay `tau = l Ts + delta`,
-//! x_p the state of the controlled element. Operator and element are then taken over one sample
-//! exactly, for inputs that are held ([`hoid_model::held_system`]). An operator without
-//! neuromuscular part may pass e on at once: of the held error that would be one sample or the next,
-//! and it is taken from the error interpolated around `t - delta - Ts/2`, as
-//! [`FamilyOperator::zoh`](hoid_model::FamilyOperator::hold) has it. Where that part and D meet
-//! within a sample, both equations are solved together.
+//! r is the response of the operator after the fractional part of the delay `tau = l Ts + delta`, x_p the state of the
+//! controlled element. Operator and element are then advanced by one sample exactly, for held inputs
+//! ([`hoid_model::held_system`]). An operator without a neuromuscular part may pass e on without lag: of the held
+//! error that would be one sample or the next, so it is taken from the error interpolated about `t - delta - Ts/2`, as
+//! in [`FamilyOperator::zoh`](hoid_model::FamilyOperator::zoh). If that part and D form a loop within a sample, both
+//! equations are solved together.
 
 use hoid_model::{
     ModelError, SampleTime, family_scenario::FamilyState, held_system::HeldSystem, scenario::Realisation,
@@ -50,38 +49,38 @@ pub(super) struct Outputs {
     pub y: f64,
 }
 
-/// Where the loop is between two samples.
+/// State of the loop between two samples.
 pub(super) struct LoopState {
     operator: OperatorState,
     element: Vec<f64>,
     next: Vec<f64>,
 }
 
-/// Where the operator is between two samples.
+/// State of the operator between two samples.
 #[derive(Debug, Clone)]
 pub(super) struct OperatorState {
     state: Vec<f64>,
     next: Vec<f64>,
     /// e(k-1), e(k-2).
     errors: [f64; 2],
-    /// Responses, that of sample k in place k of a ring.
+    /// Responses, that of sample k at index k of a ring.
     ring: Vec<f64>,
     k: usize,
 }
 
-/// Information of the operator about a sample before its error is known.
+/// Output of the operator at a sample before its error is known.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct OperatorOutput {
     /// The response without the error of the sample, before the delay of whole samples.
     past: f64,
-    /// The same after the delay: what u has of it.
+    /// The same after the delay: its contribution to u.
     pub known: f64,
     /// Direct response of u to the error of the sample.
     tap: f64,
 }
 
 impl HeldLoop {
-    /// With a delay of whole samples and a part of one.
+    /// Builds the loop with a delay of whole samples and a fraction of one.
     pub fn new(
         state: &FamilyState,
         (delay, late): (usize, f64),
@@ -96,7 +95,7 @@ impl HeldLoop {
         taps[whole as usize] = operator.direct() * (1.0 - part);
         taps[whole as usize + 1] = operator.direct() * part;
         let p = &state.controlled_element;
-        // The leading gain apart: a step of it does or does not make y jump.
+        // The leading gain is separate: a step of it may or may not make y jump.
         let gain = p.num()[0];
         let num: Vec<f64> = p
             .num()
@@ -124,7 +123,7 @@ impl HeldLoop {
         Ok(held)
     }
 
-    /// Delay in whole samples.
+    /// Returns the delay in whole samples.
     pub fn delay(&self) -> usize {
         self.delay
     }
@@ -133,17 +132,17 @@ impl HeldLoop {
         self.element_input * self.element_output * self.element.direct()
     }
 
-    /// `1 + D Y` of what passes within a sample.
+    /// Returns `1 + D Y` of the direct paths within a sample.
     fn at_once(&self) -> f64 {
         1.0 + self.element_direct() * if self.delay == 0 { self.taps[0] } else { 0.0 }
     }
 
-    /// True if u has something of the error of the same sample.
+    /// True if u depends on the error of the same sample.
     pub fn answers_at_once(&self) -> bool {
         self.delay == 0 && self.taps[0] != 0.0
     }
 
-    /// Information of the operator about the sample that is next.
+    /// Returns the output of the operator at the next sample.
     #[inline]
     pub fn answer(&self, state: &OperatorState) -> OperatorOutput {
         let [e1, e2] = state.errors;
@@ -157,7 +156,7 @@ impl HeldLoop {
         OperatorOutput { past, known, tap }
     }
 
-    /// Takes the error of the sample that was answered: the operator is one sample on.
+    /// Takes the error of that sample and advances the operator by one sample.
     #[inline]
     pub fn respond(&self, state: &mut OperatorState, answer: OperatorOutput, e: f64) {
         let mask = state.ring.len() - 1;
@@ -169,7 +168,7 @@ impl HeldLoop {
         state.errors = [e, e1];
     }
 
-    /// One sample on.
+    /// Advances the loop by one sample.
     #[inline]
     pub fn step(&self, state: &mut LoopState, inputs: Inputs) -> Outputs {
         let answer = self.answer(&state.operator);
@@ -190,7 +189,7 @@ impl HeldLoop {
         }
     }
 
-    /// Response of the operator and of the element at a frequency, as the samples have them.
+    /// Returns the responses of the operator and of the element at a frequency, for the sampled loop.
     pub fn responses(&self, omega_rad_s: f64) -> Option<[Complex64; 2]> {
         let backward = Complex64::from_polar(1.0, -omega_rad_s * self.sample_time.s());
         let [a, b, c] = self.taps;
@@ -226,7 +225,7 @@ impl OperatorState {
         }
     }
 
-    /// What it is at, as numbers; the ring from the sample that is next.
+    /// Returns its state as numbers; the ring starts at the next sample.
     pub fn numbers(&mut self) -> impl Iterator<Item = &mut f64> {
         let oldest = self.k & (self.ring.len() - 1);
         self.ring.rotate_left(oldest);

@@ -1,7 +1,7 @@
 //! The closed loop of any operator of the family, sample by sample.
 //!
-//! The lean path of the thesis's operator stays [`Simulator`](crate::Simulator); here all orders
-//! are found at run time.
+//! The fast path for the thesis's operator is [`Simulator`](crate::Simulator); here all orders are known only at run
+//! time.
 //!
 //! | file | contents |
 //! |---|---|

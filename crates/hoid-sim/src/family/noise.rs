@@ -1,7 +1,7 @@
 //! The parts of the remnant, sample by sample.
 //!
-//! `n = K G w` with the white sequence w of [`hoid_model::family_scenario`]'s remnant. Each part has
-//! random streams of its own.
+//! `n = K G w` with the white sequence w of [`hoid_model::family_scenario`]'s remnant. Each part has its own random
+//! streams.
 
 use hoid_model::{
     ModelError, SampleTime,
@@ -38,7 +38,7 @@ impl Shaping {
     }
 }
 
-/// Position of a filter.
+/// State of a filter.
 #[derive(Debug, Clone)]
 pub(super) struct Shaped {
     state: Vec<f64>,
@@ -58,7 +58,8 @@ impl Shaped {
         }
     }
 
-    /// The output of its filter in this sample; `w` is the input, which a held filter feels from the next on.
+    /// Returns the output of the filter in this sample; `w` is the input, which affects a held filter from the next
+    /// sample on.
     #[inline]
     pub fn step(&mut self, shaping: &Shaping, w: f64) -> f64 {
         match shaping {
@@ -81,22 +82,22 @@ impl Shaped {
         }
     }
 
-    /// What it is at, as numbers.
+    /// Returns its state as numbers.
     pub fn numbers(&mut self) -> impl Iterator<Item = &mut f64> {
         self.state.iter_mut()
     }
 }
 
-/// The factors of w that do not hang on u: normal deviates, pulses, on and off.
+/// Factors of w that do not depend on u: normal deviates, pulses, on and off.
 pub(super) fn driving(part: &RemnantPart, run: RunSeed, index: u64, ts_s: f64, samples: usize) -> Vec<f64> {
     let mut w = if index == 0 {
-        // The deviates of a single remnant are those of `Simulator` too.
+        // The deviates of a single remnant equal those of `Simulator`.
         run.white_noise(samples)
     } else {
         run.white_noise_of(STREAMS + 4 * index, samples)
     };
     if let Some(pulses) = part.pulses {
-        // More pulses than samples are one in each.
+        // More pulses than samples count as one per sample.
         let chance = (pulses.rate_per_s * ts_s).min(1.0);
         let heights = run.white_noise_of(STREAMS + 4 * index + 1, samples);
         let places = run.uniform_of(STREAMS + 4 * index + 2, samples);
@@ -108,7 +109,7 @@ pub(super) fn driving(part: &RemnantPart, run: RunSeed, index: u64, ts_s: f64, s
     if let Some(times) = part.intermittence.filter(|times| times.off_s > 0.0) {
         let draws = run.uniform_of(STREAMS + 4 * index + 3, samples);
         let duty = times.on_s / (times.on_s + times.off_s);
-        // The chain of two states with these mean times, seen at the samples.
+        // The two-state Markov chain with these mean times, observed at the samples.
         let settled = 1.0 - (-ts_s * (1.0 / times.on_s + 1.0 / times.off_s)).exp();
         let mut on = draws.first().is_some_and(|draw| *draw < duty);
         for (w, draw) in w.iter_mut().zip(draws) {

@@ -1,9 +1,9 @@
-//! The operator of a scenario of the family alone, a sample at a time: for a loop that is closed elsewhere.
+//! The operator of a scenario of the family alone, sample by sample: for a loop that is closed elsewhere.
 //!
-//! Simulates, as [`FamilySimulator`] does in a loop, `u = r(k - l) + n`, with the same random numbers and the strength
-//! of remnant that the loop of the scenario gives: a loop that answers u as its controlled element does gives the same
-//! run to the last bit. Contribution of the recorder to e and u (`offset_e`, `offset_u`) is not the operator's. The
-//! control of a sample must not hang on the error of the same sample.
+//! Simulates, as [`FamilySimulator`] does in a loop, `u = r(k - l) + n`, with the same random numbers and with the
+//! strength of the remnant in the loop of the scenario: a loop that responds to u like its controlled element gives
+//! the same run to the last bit. The offsets of the recorder in e and u (`offset_e`, `offset_u`) are not part of the
+//! operator. The control of a sample must not depend on the error of the same sample.
 
 use super::{
     FamilySimulator,
@@ -12,20 +12,20 @@ use super::{
 };
 use crate::{RunSeed, SimError, operator_run::saved_sample};
 
-/// An operator of the family that is at work.
+/// A running operator of the family.
 #[derive(Debug, Clone)]
 pub struct FamilyOperatorRun {
     simulator: FamilySimulator,
     operator: OperatorState,
     remnant: RemnantRun,
-    /// The sample that is next, and its remnant.
+    /// The next sample, and its remnant.
     k: usize,
     n: f64,
 }
 
 impl FamilyOperatorRun {
-    /// An operator at rest before the sample at `start_s`, in s from the start of the measurement.
-    /// What the run-in would have been before it is left out; its random numbers are passed over.
+    /// Starts an operator at rest before the sample at `start_s`, in s from the start of the measurement. The part of
+    /// the run-in before it is left out; its random numbers are skipped.
     ///
     /// # Errors
     /// [`SimError::AnswersAtOnce`].
@@ -59,17 +59,17 @@ impl FamilyOperatorRun {
         self.simulator.held(self.k)
     }
 
-    /// The control u of the sample that is next, deg.
+    /// Returns the control u of the next sample, deg.
     pub fn control(&self) -> f64 {
         self.held().answer(&self.operator).known + self.n
     }
 
-    /// The remnant n of the sample that is next, deg, with bias and walk of the stick.
+    /// Returns the remnant n of the next sample, deg, with bias and walk of the stick.
     pub fn remnant(&self) -> f64 {
         self.n
     }
 
-    /// Takes the error e of the sample, deg: the next one is one sample later.
+    /// Takes the error e of the sample, deg, and advances by one sample.
     pub fn take(&mut self, e: f64) {
         let held = self.simulator.held(self.k);
         let answer = held.answer(&self.operator);
@@ -80,14 +80,14 @@ impl FamilyOperatorRun {
         self.n = self.remnant.next(scenario, remnants, self.k);
     }
 
-    /// Its position, as numbers.
+    /// Returns its state as numbers.
     pub fn saved(&mut self) -> Vec<f64> {
         let beside = [self.k as f64, self.n];
         beside.into_iter().chain(self.numbers().map(|number| *number)).collect()
     }
 
-    /// Continues from where an operator of the same scenario and run was ([`FamilyOperatorRun::saved`]), with the same
-    /// digits. False if the numbers are of another; then nothing has changed.
+    /// Continues from a saved state of an operator of the same scenario and run ([`FamilyOperatorRun::saved`]), with
+    /// the same digits. False, without any change, if the numbers belong to another one.
     pub fn restore(&mut self, saved: &[f64]) -> bool {
         let Some((&[k, n], rest)) = saved.split_first_chunk::<2>() else {
             return false;
@@ -199,14 +199,14 @@ mod tests {
         scenario
     }
 
-    /// A gain whose delay has this part of a sample and no whole one.
+    /// A gain with a delay of a fraction of a sample only.
     fn quick(samples: f64) -> FamilyScenario {
         let mut scenario = task(state(Form::Gain, false, &[1.5, 0.01 * samples], [&[1.0], &[1.0, 0.0]]));
         scenario.remnant = vec![RemnantPart::new(RemnantShape::White, 0.1)];
         scenario
     }
 
-    /// Given the error of a run from its run-in on, the operator gives its control to the last bit.
+    /// For the error of a run from its run-in on, the operator gives the control of the run to the last bit.
     #[test]
     fn the_operator_of_a_run_gives_its_control() {
         let integrating = state(Form::Lag, false, &[1.5, 0.0, 0.1437], [&[1.0], &[1.0]]);
@@ -223,7 +223,7 @@ mod tests {
         }
     }
 
-    /// An operator continues in another, after the end of its scenario too.
+    /// An operator continues in another one, also after the end of its scenario.
     #[test]
     fn a_saved_operator_goes_on_with_the_same_digits() {
         let new = || FamilyOperatorRun::new(FamilySimulator::new(&busy()).unwrap(), SEED, 0.0).unwrap();

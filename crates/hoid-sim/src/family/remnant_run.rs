@@ -1,8 +1,8 @@
 //! Components of u other than the response, sample by sample: the parts of the remnant, and the walk of the stick.
 //!
 //! `n(k) = walk(k) + sum of K_i(k) G_i(q) w_i(k)`, with K_i of [`calibration`](super::calibration) and w_i of
-//! [`noise`](super::noise), scaled by what it follows where it depends on the signal. All of it is known before the
-//! control of the sample is.
+//! [`noise`](super::noise), scaled by the signal that it depends on for a signal-dependent part. All of it is known
+//! before the control of the sample.
 
 use hoid_model::family_scenario::{Followed, ResolvedFamilyScenario};
 
@@ -14,17 +14,17 @@ use crate::RunSeed;
 
 const WALK: u64 = u64::from_le_bytes(*b"stick\0\0\0");
 
-/// The remnant of a scenario made ready: the filter of each part, and its strength before and after the change.
+/// The prepared remnant of a scenario: the filter of each part, and its strength before and after the change.
 #[derive(Debug, Clone)]
 pub(super) struct Remnants {
     pub shapings: Vec<Shaping>,
     pub calibrations: [Calibration; 2],
-    /// Whether anything changes in the scenario.
+    /// True if anything changes in the scenario.
     pub changes: bool,
 }
 
 impl Remnants {
-    /// A number of the calibration at sample `k`, on its way from the initial to the last one; after the end of the
+    /// Returns a number of the calibration at sample `k`, between its initial and final value; after the end of the
     /// scenario it is that of the last sample.
     #[inline]
     fn calibrated(&self, scenario: &ResolvedFamilyScenario, k: usize, of: impl Fn(&Calibration) -> f64) -> f64 {
@@ -41,11 +41,11 @@ fn samples_of(scenario: &ResolvedFamilyScenario) -> usize {
     scenario.run_in_samples() + scenario.measurement_samples()
 }
 
-/// The remnant of a run, and its position.
+/// The remnant of a run, and its state.
 #[derive(Debug, Clone)]
 pub(super) struct RemnantRun {
     run: RunSeed,
-    /// The input of each part, from the first sample of the run-in on, as far as it has been drawn.
+    /// The input of each part, from the first sample of the run-in to the last drawn sample.
     driven: Vec<Vec<f64>>,
     /// Steps of the stick, likewise.
     steps: Vec<f64>,
@@ -80,8 +80,8 @@ impl RemnantRun {
         new
     }
 
-    /// Draws the random numbers of a given number of samples where there are fewer; the first ones are the same for any
-    /// number.
+    /// Draws the random numbers up to a given number of samples if there are fewer; the first ones do not depend on
+    /// the number.
     fn draw(&mut self, scenario: &ResolvedFamilyScenario, samples: usize) {
         if samples <= self.steps.len() {
             return;
@@ -99,10 +99,10 @@ impl RemnantRun {
         };
     }
 
-    /// The remnant of sample `k`, which comes after that of `k - 1`.
+    /// Returns the remnant of sample `k`, to be called after that of `k - 1`.
     #[inline]
     pub fn next(&mut self, scenario: &ResolvedFamilyScenario, of: &Remnants, k: usize) -> f64 {
-        // After the end of the scenario it continues.
+        // It continues after the end of the scenario.
         if k >= self.steps.len() {
             self.draw(scenario, 2 * k + 1);
         }
@@ -120,7 +120,7 @@ impl RemnantRun {
     /// Takes the control of sample `k`, after its remnant.
     #[inline]
     pub fn follow(&mut self, scenario: &ResolvedFamilyScenario, of: &Remnants, k: usize, u: f64) {
-        // For a run that was restored here nothing has been drawn yet.
+        // In a restored run nothing has been drawn yet.
         self.draw(scenario, k + 1);
         for (i, part) in scenario.scenario().remnant.iter().enumerate() {
             if let Some(own) = part.signal_dependence {
@@ -139,7 +139,7 @@ impl RemnantRun {
         self.walk += scenario.stick.walk_per_root_s * scenario.sample_time.s().sqrt() * self.steps[k];
     }
 
-    /// What it is at, as numbers.
+    /// Returns its state as numbers.
     pub fn numbers(&mut self) -> impl Iterator<Item = &mut f64> {
         let shaped = self.shaped.iter_mut().flat_map(Shaped::numbers);
         [&mut self.walk, &mut self.before]

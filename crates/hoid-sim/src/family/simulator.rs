@@ -1,10 +1,9 @@
-//! A scenario of the family made ready, and its runs.
+//! A prepared scenario of the family, and its runs.
 //!
-//! Parameters that change are those of the sigmoid at each sample, with the exact hold of these
-//! values ([`held_loop`](super::held_loop)); gains of the remnant are found in both states and go
-//! along the same sigmoid. The random numbers of a run are named by its [`RunSeed`]: those of each
-//! part of the remnant, of the stick, and of the phases of target and disturbance have streams of
-//! their own.
+//! Parameters that change follow the sigmoid at each sample, with the exact hold of these values
+//! ([`held_loop`](super::held_loop)); gains of the remnant are computed for both states and follow the same sigmoid.
+//! The random numbers of a run are identified by its [`RunSeed`]: those of each part of the remnant, of the stick, and
+//! of the phases of target and disturbance have their own streams.
 
 use std::f64::consts::TAU;
 
@@ -23,13 +22,13 @@ use super::{
 };
 use crate::{RunSeed, SimError};
 
-/// A scenario made ready: held models of all samples, gains of the remnant.
+/// A prepared scenario: held models of all samples, gains of the remnant.
 #[derive(Debug, Clone)]
 pub struct FamilySimulator {
     pub(super) scenario: ResolvedFamilyScenario,
-    /// Each with the state that it is of.
+    /// Each loop with its state.
     loops: Vec<(FamilyState, HeldLoop)>,
-    /// Place in `loops` of each sample; empty if there is one for all.
+    /// Index in `loops` of each sample; empty if there is one for all.
     places: Vec<usize>,
     pub(super) remnants: Remnants,
 }
@@ -55,11 +54,10 @@ const TARGET_PHASES: u64 = u64::from_le_bytes(*b"target\0\0");
 const DISTURBANCE_PHASES: u64 = u64::from_le_bytes(*b"disturb\0");
 
 impl FamilySimulator {
-    /// Prepares a scenario. Runs share what is computed here.
+    /// Prepares a scenario. Its runs share the results.
     ///
     /// # Errors
-    /// [`SimError::Model`] when the scenario has no meaning or the loop of one of its states is not
-    /// stable.
+    /// [`SimError::Model`] if the scenario is invalid or the loop of one of its states is not stable.
     pub fn new(scenario: &FamilyScenario) -> Result<Self, SimError> {
         let resolved = scenario.resolve()?;
         let ts = scenario.sample_time;
@@ -103,10 +101,10 @@ impl FamilySimulator {
         })
     }
 
-    /// The same with another stick, which changes nothing else.
+    /// Returns the same scenario with another stick, which changes nothing else.
     ///
     /// # Errors
-    /// [`SimError::Model`] when a number of it has no meaning.
+    /// [`SimError::Model`] if one of its numbers is invalid.
     pub fn with_stick(mut self, stick: Stick) -> Result<Self, SimError> {
         let scenario = FamilyScenario {
             stick,
@@ -116,45 +114,45 @@ impl FamilySimulator {
         Ok(self)
     }
 
-    /// The scenario.
+    /// Returns the scenario.
     pub fn scenario(&self) -> &ResolvedFamilyScenario {
         &self.scenario
     }
 
-    /// Samples of a run: run-in and measurement.
+    /// Returns the number of samples of a run: run-in and measurement.
     pub fn samples(&self) -> usize {
         self.scenario.run_in_samples() + self.scenario.measurement_samples()
     }
 
-    /// The loop at sample `k`; after the end of the scenario it is that of the last one.
+    /// Returns the loop at sample `k`; after the end of the scenario it is that of the last one.
     #[inline]
     pub(super) fn held(&self, k: usize) -> &HeldLoop {
         let place = self.places.get(k).or(self.places.last()).copied().unwrap_or(0);
         &self.loops[place].1
     }
 
-    /// The longest delay in whole samples.
+    /// Returns the longest delay in whole samples.
     pub(super) fn longest_delay(&self) -> usize {
         self.loops.iter().map(|(_, held)| held.delay()).max().unwrap_or(0)
     }
 
-    /// Gains K of the parts of the remnant, before and after the change.
+    /// Returns the gains K of the parts of the remnant, before and after the change.
     pub fn remnant_gains(&self) -> [&[f64]; 2] {
         let [initial, last] = &self.remnants.calibrations;
         [&initial.gains, &last.gains]
     }
 
-    /// Variance of u in a long run, without bias and walk of the stick, before and after the change.
+    /// Returns the variance of u in a long run, without bias and walk of the stick, before and after the change.
     pub fn control_variance(&self) -> [f64; 2] {
         [0, 1].map(|i| self.remnants.calibrations[i].mean_squares[0])
     }
 
-    /// Variance of e, likewise.
+    /// Returns the variance of e, likewise.
     pub fn error_variance(&self) -> [f64; 2] {
         [0, 1].map(|i| self.remnants.calibrations[i].mean_squares[2])
     }
 
-    /// The signals of a run.
+    /// Returns the signals of a run.
     ///
     /// # Errors
     /// [`SimError::Diverged`].
@@ -175,7 +173,7 @@ impl FamilySimulator {
             let inputs = Inputs {
                 target: signals.f[k],
                 disturbance: signals.d[k],
-                // What the person does about the target depends on nothing in the loop.
+                // The response of the person to the target is independent of the loop.
                 remnant: n + seen.get(k).copied().unwrap_or(0.0),
             };
             let now = self.held(k).step(&mut state, inputs);
@@ -197,7 +195,7 @@ impl FamilySimulator {
         Ok(signals)
     }
 
-    /// The response to a target that is seen, from rest; empty where it is not.
+    /// Returns the response to a visible target, from rest; empty for a target that is not visible.
     fn response_to_target(&self, run: RunSeed) -> Result<Vec<f64>, SimError> {
         let scenario = self.scenario.scenario();
         let Some(seen) = &scenario.feedforward else {
@@ -213,8 +211,8 @@ impl FamilySimulator {
         Ok(response)
     }
 
-    /// One run as a record of the measurement (or from the start of the run-in): e, u, d, y, n, and
-    /// f_t where there is a target.
+    /// Returns one run as a record of the measurement (or from the start of the run-in): e, u, d, y, n, and f_t if
+    /// there is a target.
     ///
     /// # Errors
     /// [`SimError::Diverged`].
@@ -239,8 +237,8 @@ impl FamilySimulator {
         Ok(record)
     }
 
-    /// The same record with the true parameters of the operator at each sample under their names,
-    /// those that are finite throughout.
+    /// Returns the same record with the true parameters of the operator at each sample under their names, those that
+    /// are finite throughout.
     ///
     /// # Errors
     /// As [`FamilySimulator::run`].
@@ -259,7 +257,7 @@ impl FamilySimulator {
     }
 }
 
-/// The function with the phases of a run.
+/// Returns the function with the phases of a run.
 fn phased(excitation: &Excitation, run: RunSeed, tag: u64) -> Result<ForcingFunction, SimError> {
     if !excitation.random_phases {
         return Ok(excitation.function.clone());

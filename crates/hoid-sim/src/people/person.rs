@@ -1,9 +1,9 @@
 //! One virtual person, and their runs.
 //!
-//! Numbers from `[0, 1)` of the stream (seed, person) give the parameters, in an order that never
-//! changes; a draw that [`Population`] does not take is followed by the next. In each run gain, lead,
-//! `1/T_I`, omega_nm, zeta_nm and delay are multiplied by `exp(b z)`, z normal deviates of the run, b
-//! the spread between runs; a run whose loop is not stable is drawn again.
+//! Numbers from `[0, 1)` of the stream (seed, person) give the parameters, in a fixed order; a draw that
+//! [`Population`] rejects is followed by the next. In each run gain, lead,
+//! `1/T_I`, omega_nm, zeta_nm and delay are multiplied by `exp(b z)`, with z normal deviates of the run and b the
+//! spread between runs; a run whose loop is not stable is drawn again.
 
 use hoid_model::{
     Complex64, FamilyOperator, FamilyScenario, FamilyState, Form, ModelError, Record, SampleTime,
@@ -42,12 +42,12 @@ impl Default for Task {
     }
 }
 
-/// A person with everything true of them.
+/// A person with all true values.
 #[derive(Debug, Clone)]
 pub struct Person {
     /// The controlled element.
     pub plant: Plant,
-    /// Their operator, and the controlled element.
+    /// The operator and the controlled element.
     pub state: FamilyState,
     /// Kind of remnant.
     pub kind: RemnantKind,
@@ -69,27 +69,27 @@ pub struct Person {
 /// A run of a person.
 #[derive(Debug, Clone)]
 pub struct PersonRun {
-    /// The operator of this run; that of the person where runs have no spread.
+    /// The operator of this run; that of the person if runs have no spread.
     pub state: FamilyState,
     /// e, u, d, y, n from the start of the measurement.
     pub record: Record,
 }
 
-/// Draws of a person before the ranges count as empty.
+/// Number of draws of a person after which the ranges count as empty.
 const MOST_DRAWS: usize = 2000;
-/// Draws of a run.
+/// Largest number of draws of a run.
 const MOST_RUN_DRAWS: usize = 50;
-/// Numbers of one draw.
+/// Number of random values per draw.
 const NUMBERS: usize = 16;
 const PERSON: u64 = u64::from_le_bytes(*b"person\0\0");
 const SPREAD: u64 = u64::from_le_bytes(*b"spread\0\0");
 
 impl Person {
-    /// The person of a seed and a number. Without a form, one that people have on this element.
+    /// Draws the person of a seed and a number. Without a given form, one that people use with this element.
     ///
     /// # Errors
-    /// [`SimError::Model`] for ranges or a task without meaning, and [`SimError::NobodyFound`]
-    /// where the ranges hold no loop that is taken.
+    /// [`SimError::Model`] for invalid ranges or an invalid task, and [`SimError::NobodyFound`] if the ranges contain
+    /// no acceptable loop.
     pub fn draw(
         population: &Population,
         task: &Task,
@@ -135,7 +135,7 @@ impl Person {
             scenario.remnant.clone_from(&remnant);
             scenario.measurement_s = task.measurement_s;
             scenario.run_in_s = task.run_in_s;
-            // What is stable in continuous time need not be so after the holds.
+            // A loop that is stable in continuous time need not be so after the holds.
             let simulator = match FamilySimulator::new(&scenario) {
                 Err(SimError::Model(ModelError::UnstableLoop { .. })) => continue,
                 other => other?,
@@ -169,12 +169,12 @@ impl Person {
         })
     }
 
-    /// The scenario of a run without spread.
+    /// Returns the scenario of a run without spread.
     pub fn scenario(&self) -> &FamilyScenario {
         self.simulator.scenario().scenario()
     }
 
-    /// Random streams of a run.
+    /// Returns the seed of the random streams of a run.
     pub fn run_seed(&self, run: u64) -> RunSeed {
         RunSeed {
             replication: run,
@@ -182,10 +182,10 @@ impl Person {
         }
     }
 
-    /// A run by its number.
+    /// Returns a run by its number.
     ///
     /// # Errors
-    /// [`SimError::NobodyFound`] where the spread between runs leaves no stable loop.
+    /// [`SimError::NobodyFound`] if the spread between runs leaves no stable loop.
     pub fn run(&self, run: u64) -> Result<PersonRun, SimError> {
         let seed = self.run_seed(run);
         if self.task.between_runs == 0.0 {
@@ -232,14 +232,14 @@ impl Person {
     }
 }
 
-/// A loop that a population takes.
+/// A loop that a population accepts.
 struct AcceptedLoop {
     state: FamilyState,
     crossover_rad_s: f64,
     phase_margin_deg: f64,
 }
 
-/// The loop of one draw with its crossover and margin, where the population takes it.
+/// Returns the loop of one draw with its crossover and margin, if the population accepts it.
 fn loop_of(population: &Population, plant: Plant, form: Form, draw: &[f64]) -> Result<Option<AcceptedLoop>, SimError> {
     let kinds = form.coordinates(true);
     let value = |kind: &Coordinate| match kind {
@@ -247,7 +247,7 @@ fn loop_of(population: &Population, plant: Plant, form: Form, draw: &[f64]) -> R
         Coordinate::Lead | Coordinate::Linear => population.lead_s.at_log(draw[0]),
         Coordinate::LagRate if draw[1] < population.integrates => 0.0,
         Coordinate::LagRate => 1.0 / population.lag_s.at_log(draw[2]),
-        // A lead twice where the roots of the numerator are real: c_2 up to (c_1/2)^2.
+        // A double lead with real roots of the numerator: c_2 up to (c_1/2)^2.
         Coordinate::Quadratic => (population.lead_s.at_log(draw[0]) / 2.0).powi(2) * draw[3],
         // The droop of a lag: alpha of the order of 1/T_I.
         Coordinate::Droop => 1.0 / population.lag_s.at_log(draw[2]),
@@ -278,7 +278,7 @@ fn loop_of(population: &Population, plant: Plant, form: Form, draw: &[f64]) -> R
     if rings || !closed_loop_is_stable(&open_loop) {
         return Ok(None);
     }
-    // The gain may cross one elsewhere too: what counts is what the definition finds.
+    // The gain may cross one elsewhere too: the crossover by definition is used.
     let found = margins(|omega| open_loop.response(omega), MANUAL_CONTROL_RANGE_RAD_S);
     let (Some(crossover_rad_s), Some(phase_margin_deg)) = (found.crossover_rad_s, found.phase_margin_deg) else {
         return Ok(None);

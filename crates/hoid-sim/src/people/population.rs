@@ -1,9 +1,8 @@
-//! The person drawn, and the controlled element.
+//! Distribution of the drawn people, and the controlled element.
 //!
-//! Each parameter is drawn uniformly over a range, the time constants and the damping over its
-//! logarithm. The gain follows from a crossover frequency that is drawn likewise. A loop whose phase
-//! margin lies outside its range, that rings or is not stable is drawn again with all its
-//! parameters.
+//! Each parameter is drawn uniformly over a range; time constants and damping uniformly in the logarithm. The gain
+//! follows from a crossover frequency that is drawn likewise. A loop whose phase margin lies outside its range, that
+//! has a resonance or is not stable, is drawn again with all its parameters.
 //!
 //! | parameter | range | source |
 //! |---|---|---|
@@ -19,29 +18,29 @@ use hoid_model::{ContinuousTransferFunction, Form, ModelError, family_scenario::
 /// A range of values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {
-    /// Least.
+    /// Lower limit.
     pub low: f64,
-    /// Greatest.
+    /// Upper limit.
     pub high: f64,
 }
 
 impl Range {
-    /// From least to greatest.
+    /// Builds the range from its limits.
     pub const fn new(low: f64, high: f64) -> Self {
         Self { low, high }
     }
 
-    /// The value at a part of the way, 0 to 1.
+    /// Returns the value at a share of the range, 0 to 1.
     pub(super) fn at(&self, part: f64) -> f64 {
         self.low + (self.high - self.low) * part
     }
 
-    /// The same on a logarithmic scale.
+    /// Returns the value at a share of the range on a logarithmic scale.
     pub(super) fn at_log(&self, part: f64) -> f64 {
         self.low * (self.high / self.low).powf(part)
     }
 
-    /// True if it holds the value.
+    /// True if the range contains the value.
     pub fn contains(&self, value: f64) -> bool {
         (self.low..=self.high).contains(&value)
     }
@@ -64,9 +63,9 @@ impl Range {
 pub struct Population {
     /// T_L, s.
     pub lead_s: Range,
-    /// T_I, s, where it is finite.
+    /// T_I, s, if it is finite.
     pub lag_s: Range,
-    /// Chance that a person with a lag integrates without end: T_I is infinite. Default 0.25.
+    /// Probability that the lag of a person is an integration: T_I is infinite. Default 0.25.
     pub integrates: f64,
     /// omega_nm, rad/s.
     pub omega_nm_rad_s: Range,
@@ -78,11 +77,11 @@ pub struct Population {
     pub crossover_rad_s: Range,
     /// Phase margin, deg.
     pub phase_margin_deg: Range,
-    /// Largest `|1/(1 + Y P)|`: beyond it a loop rings. Default 4, that of a phase margin of 14 deg.
+    /// Largest `|1/(1 + Y P)|`: beyond it a loop is too resonant. Default 4, that of a phase margin of 14 deg.
     pub largest_sensitivity: f64,
     /// Share of the remnant in the variance of u. Default 0.05 to 0.5.
     pub remnant_share: Range,
-    /// Greatest offset of recorded e and u, either way, in their own rms. Default 0.3.
+    /// Largest offset of recorded e and u, in either direction, in their own rms. Default 0.3.
     pub offset: f64,
     /// Random walk of the stick, in rms of u per root second. Default 0.03.
     pub walk_per_root_s: f64,
@@ -163,7 +162,7 @@ hoid_model::named_choice!(Plant, "controlled element", 3, {
 });
 
 impl Plant {
-    /// Its denominator by descending powers of s; the numerator is one.
+    /// Returns its denominator by descending powers of s; the numerator is one.
     pub fn denominator(self) -> &'static [f64] {
         match self {
             Self::Integrator => &[1.0, 0.0],
@@ -172,7 +171,7 @@ impl Plant {
         }
     }
 
-    /// As a manifest writes it, `NUM/DEN`.
+    /// Returns it in the notation of a manifest, `NUM/DEN`.
     pub fn text(self) -> &'static str {
         match self {
             Self::Integrator => "1/1,0",
@@ -181,15 +180,15 @@ impl Plant {
         }
     }
 
-    /// Its transfer function.
+    /// Returns its transfer function.
     ///
     /// # Errors
-    /// None in truth: as [`ContinuousTransferFunction::new`].
+    /// None in practice: as [`ContinuousTransferFunction::new`].
     pub fn transfer_function(self) -> Result<ContinuousTransferFunction, ModelError> {
         ContinuousTransferFunction::new(&[1.0], self.denominator())
     }
 
-    /// The forms that people have on it, each as likely: gain, lead and lag on `1/s`; a lead, or
+    /// Returns the forms that people use with it, with equal probabilities: gain, lead and lag on `1/s`; a lead, or
     /// two with a lag, on elements of second order.
     pub fn forms(self) -> &'static [Form] {
         match self {
@@ -198,8 +197,8 @@ impl Plant {
         }
     }
 
-    /// The disturbance: primes up to 31 times 0.05 Hz on `1/s`, up to 17 on elements of second
-    /// order, whose loops are slower.
+    /// Returns the disturbance: primes up to 31 times 0.05 Hz on `1/s`, up to 17 on elements of second order, whose
+    /// loops are slower.
     pub fn disturbance(self) -> MultiSine {
         MultiSine {
             largest: if self == Self::Integrator { 31 } else { 17 },

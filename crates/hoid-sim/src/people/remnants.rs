@@ -1,9 +1,8 @@
-//! Remnants like people's.
+//! Realistic remnants.
 //!
-//! All but the first have three parts: a broad band `1/(T_n s + 1)` with T_n = 0.05 to 0.3 s, 70 %
-//! of the remnant; a peak at the person's own omega_nm with a damping of 0.15 to 0.4, 20 %; a drift
-//! `1/(T_n s + 1)` with T_n = 3 to 10 s, 10 %. What makes each kind is reported with its source in
-//! [`hoid_model::family_scenario`].
+//! All but the first have three parts: a broad band `1/(T_n s + 1)` with T_n = 0.05 to 0.3 s, 70 % of the remnant; a
+//! peak at the person's omega_nm with a damping of 0.15 to 0.4, 20 %; a drift `1/(T_n s + 1)` with T_n = 3 to 10 s, 10
+//! %. The kinds are described with their sources in [`hoid_model::family_scenario`].
 
 use hoid_model::family_scenario::{Followed, Intermittence, Pulses, RemnantPart, RemnantShape, SignalDependence};
 
@@ -16,11 +15,11 @@ pub enum RemnantKind {
     Lag,
     /// Broad band, peak and drift, Gaussian.
     BroadBand,
-    /// The same, 80 % of the variance of the broad band following the running rms of u (1 s).
+    /// The same, with 80 % of the variance of the broad band proportional to the running rms of u (1 s).
     SignalDependent,
-    /// The same, 80 % of the variance of the broad band in two pulses a second.
+    /// The same, with 80 % of the variance of the broad band in two pulses per second.
     Pulsed,
-    /// The same, the broad band there for 2 s and away for 2 s in the mean.
+    /// The same, with the broad band on for 2 s and off for 2 s on average.
     Intermittent,
 }
 
@@ -37,7 +36,7 @@ const DRIFT_S: Range = Range::new(3.0, 10.0);
 const DAMPING: Range = Range::new(0.15, 0.4);
 
 impl RemnantKind {
-    /// The parts of a person, by three numbers from `[0, 1)`.
+    /// Returns the parts of a person, from three numbers from `[0, 1)`.
     pub(super) fn parts(self, share: f64, omega_nm_rad_s: f64, numbers: [f64; 3]) -> Vec<RemnantPart> {
         let lag = |time_constant_s| RemnantShape::Lag {
             time_constant_s,

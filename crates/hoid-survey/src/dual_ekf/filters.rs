@@ -9,12 +9,12 @@ use nalgebra::{DMatrix, DVector, RowDVector};
 
 use super::pade;
 
-/// Most parameters: those of the operator, and the delay.
+/// Largest number of parameters: those of the operator, and the delay.
 pub(super) const LARGEST: usize = OPERATOR + 1;
 
 /// Relative step of the central differences of the held matrices.
 const STEP: f64 = 1e-5;
-/// Most halvings of a step of the parameters.
+/// Largest number of halvings of a step of the parameters.
 const MOST_HALVINGS: usize = 30;
 
 /// Both filters.
@@ -24,22 +24,22 @@ pub(super) struct Filters {
     pub d1: f64,
     /// Order of the Padé approximation, 0 for none.
     pub pade: usize,
-    /// Variances of the innovation of the remnant, and of what enters next to e.
+    /// Variances of the innovation of the remnant, and of the noise added to e.
     pub innovation_variance: f64,
     pub beside_e: f64,
     pub x: DVector<f64>,
     pub p: DMatrix<f64>,
-    /// K_e, K_e_dot, omega_nm, zeta_nm, and tau_e behind a Padé approximation.
+    /// K_e, K_e_dot, omega_nm, zeta_nm, and tau_e with a Padé approximation.
     pub w: DVector<f64>,
     pub p_w: DMatrix<f64>,
-    /// Growth of P_w at a sample.
+    /// Growth of P_w per sample.
     pub walk: DVector<f64>,
     /// dx/dw after the correction.
     pub slope: DMatrix<f64>,
 }
 
 impl Filters {
-    /// A and B of the state for some parameters.
+    /// A and B of the state for given parameters.
     fn held(&self, w: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
         let n = self.x.len();
         let (mut a, mut b) = (DMatrix::zeros(n, n), DVector::zeros(n));
@@ -95,11 +95,11 @@ impl Filters {
         self.p[(n - 1, n - 1)] += self.innovation_variance;
     }
 
-    /// Corrects the state, and the parameters where they move; the innovation and its variance.
+    /// Corrects the state, and the parameters if they move; returns the innovation and its variance.
     pub fn correct(&mut self, u: f64, moves: bool) -> [f64; 2] {
         let c = self.output();
         let innovation = u - (&c * &self.x)[0];
-        // A little more than nothing: u has no noise of its own.
+        // Slightly above zero: u has no measurement noise.
         let variance = (&c * &self.p * c.transpose())[0] + 1e-9 * self.innovation_variance;
         let gain = &self.p * c.transpose() / variance;
         let h = self.along();
@@ -113,7 +113,7 @@ impl Filters {
         [innovation, variance]
     }
 
-    /// h, the whole derivative of the prediction.
+    /// h, the total derivative of the prediction.
     pub fn along(&self) -> RowDVector<f64> {
         let mut h = self.output() * &self.slope;
         h[0] += self.x[0];
@@ -126,7 +126,7 @@ impl Filters {
         let s = (h * &self.p_w * h.transpose())[0] + variance;
         let gain = &self.p_w * h.transpose() / s;
         let mut step = &gain * innovation;
-        // Poles and delay stay positive: a linear step may go too far.
+        // Poles and delay must stay positive: a linear step may be too large.
         for _ in 0..MOST_HALVINGS {
             let moved = &self.w + &step;
             if moved.rows(2, moved.len() - 2).iter().all(|x| *x > 0.0) {
@@ -150,7 +150,7 @@ impl Filters {
         all.all(|x| x.is_finite())
     }
 
-    /// Keeps the parameters within their bounds; true if that changed one.
+    /// Keeps the parameters within their bounds; true if one of them was changed.
     pub fn bound(&mut self, bounds: &[[f64; 2]; LARGEST]) -> bool {
         let before = self.w.clone();
         for (w, bounds) in self.w.iter_mut().zip(bounds) {
@@ -174,8 +174,8 @@ mod tests {
             innovation_variance: 1e-4,
             beside_e: 0.0,
             x: DVector::zeros(n),
-            // Nothing of the state is unsure and nothing enters: the gain of y_0 and y_1 is zero,
-            // that of n does not depend on w.
+            // The state is exactly known and has no noise: the gain of y_0 and y_1 is zero, that of n does not depend
+            // on w.
             p: DMatrix::zeros(n, n),
             w: DVector::from_row_slice(w),
             p_w: DMatrix::identity(p, p),
@@ -184,8 +184,8 @@ mod tests {
         }
     }
 
-    /// h is the derivative of the prediction while the parameters stay constant, with and without
-    /// Padé's delay.
+    /// h is the derivative of the prediction for constant parameters, with and without a Padé approximation of the
+    /// delay.
     #[test]
     fn the_whole_derivative_is_that_of_finite_differences() {
         let e = |k: usize| (0.07 * k as f64).sin() + 0.3 * (0.31 * k as f64).cos();

@@ -2,8 +2,8 @@
 //!
 //! `e^(-tau s) = Q(-tau s)/Q(tau s)`, `Q(x) = sum_k c_k x^k`,
 //! `c_k = (2n - k)! n!/((2n)! k! (n - k)!)`, of order n: all-pass, with the phase of the delay up to
-//! about `omega tau = 2 n`. Each order is a state and a pole more, and tau appears in the
-//! coefficients, where a parameter belongs that is to be estimated or changes.
+//! `omega tau = 2 n`. Each order adds a state and a pole, and tau appears in the coefficients, as needed for a
+//! parameter that is estimated or changes.
 
 use hoid_model::SampleTime;
 use nalgebra::{DMatrix, DVector};
@@ -22,12 +22,11 @@ fn coefficients(order: usize) -> Vec<f64> {
     c
 }
 
-/// The neuromuscular part after a delay, over one sample of held input: states y_0, y_1 and those
-/// of the delay.
+/// The neuromuscular part with a delay, over one sample of held input: states y_0, y_1 and those of the delay.
 ///
 /// The delay is in controllable canonical form, `p^(n) + sum a_k p^(k) = e`, its output
-/// `d e + sum b_k p^(k)` with the direct part `d = (-1)^n`; y_0 is driven by it. Both together are
-/// held exactly, by the exponential of the matrix of states and input.
+/// `d e + sum b_k p^(k)` with the direct part `d = (-1)^n`; y_0 is driven by it. Both together are held exactly, by
+/// the exponential of the matrix of states and input.
 pub(super) fn delayed_second_order(
     omega: f64,
     zeta: f64,
@@ -37,7 +36,7 @@ pub(super) fn delayed_second_order(
 ) -> (DMatrix<f64>, DVector<f64>) {
     let c = coefficients(order);
     let direct = if order.is_multiple_of(2) { 1.0 } else { -1.0 };
-    // Over c_n tau^n, so that the leading coefficient of the denominator is 1.
+    // Divided by c_n tau^n, so that the leading coefficient of the denominator is 1.
     let leading = c[order] * tau_s.powi(order as i32);
     let denominator = |k: usize| c[k] * tau_s.powi(k as i32) / leading;
     let numerator = |k: usize| {
@@ -59,7 +58,7 @@ pub(super) fn delayed_second_order(
         all[(n - 1, 2 + k)] = -denominator(k);
     }
     all[(n - 1, n)] = 1.0;
-    // Powers of p by 1/tau differ by orders of size: scaled by tau the exponential keeps its digits.
+    // Powers of p times 1/tau differ by orders of magnitude: scaled by tau the exponential keeps its digits.
     let scale = |i: usize| {
         if (2..n).contains(&i) {
             tau_s.powi((i - 2) as i32)
@@ -89,7 +88,7 @@ mod tests {
         }
     }
 
-    /// The held system against the frequency response of the delay and the second order themselves.
+    /// The held system compared with the frequency response of the delay and the second-order system.
     #[test]
     fn the_phase_is_that_of_the_delay() {
         let ts = SampleTime::new(0.01).unwrap();

@@ -1,10 +1,10 @@
-//! The state with the parameters, and its model over one sample.
+//! The state with the parameters, and the model of one sample.
 
 use hoid_core::divided_differences::DividedDifferences;
 
 /// Length of X.
 pub(super) const N: usize = 6;
-/// First parameter in X.
+/// Index of the first parameter in X.
 pub(super) const ETA: usize = 2;
 /// Covariance of X by rows.
 pub(super) type Matrix = [[f64; N]; N];
@@ -27,7 +27,7 @@ pub(super) struct Model {
     pub noise: f64,
 }
 
-/// Phi and its derivatives: the two entries that all follow from, with respect to omega and zeta.
+/// Phi and its derivatives: the entries from which all others follow, with derivatives with respect to omega and zeta.
 struct Hold {
     /// `1 - A`, `R/omega^2`, R, `1 - A - 2 zeta R/omega`.
     values: [f64; 4],

@@ -9,7 +9,7 @@
 
 use super::belief::{Belief, Matrix, Model, N};
 
-/// Takes a sample; returns the innovation and its variance as expected.
+/// Takes a sample; returns the innovation and its predicted variance.
 pub(crate) fn step(model: &Model, belief: &mut Belief, e: f64, u: f64) -> [f64; 2] {
     let f = model.jacobian(&belief.x, e);
     belief.x = model.transition(&belief.x, e);

@@ -1,4 +1,4 @@
-//! The filter of state and parameters over samples: start, bounds, restarts.
+//! The joint filter of state and parameters over samples: start, bounds, restarts.
 
 use hoid_core::{
     bounds::within,
@@ -17,19 +17,19 @@ use crate::known_noise::lead_of;
 
 use super::belief::{Belief, ETA, Model, N};
 
-/// Adds a sample to the trusted data; the innovation and its variance as expected.
+/// Takes a sample; returns the innovation and its predicted variance.
 pub(super) type Update = fn(&Model, &mut Belief, f64, f64) -> [f64; 2];
 
-/// Variance of n over that of the remnant: a coloured remnant is less informative than a white one
-/// of the same variance.
+/// Variance of n over that of the remnant: a coloured remnant is less informative than a white one of the same
+/// variance.
 const OUTPUT_NOISE: f64 = 10.0;
-/// Variance of the noise that drives v in addition to the error within one second, over that of the
-/// remnant seen through K_e_dot.
+/// Variance of the noise that drives v in addition to the error within one second, over that of the remnant divided by
+/// K_e_dot.
 const STATE_NOISE: f64 = 10.0;
 /// Drift of K_e and K_e_dot in one second, in units of `g = sqrt(K_e^2 + omega^2 K_e_dot^2)` and
 /// `g/omega` at the crossover omega.
 const GAIN_DRIFT: [f64; 2] = [0.02, 0.05];
-/// The crossover, rad/s.
+/// Crossover frequency, rad/s.
 const CROSSOVER_RAD_S: f64 = 2.0;
 /// Drift of omega_nm and zeta_nm in one second, as a share of them.
 const NEUROMUSCULAR_DRIFT: f64 = 0.003;
@@ -47,13 +47,13 @@ pub(crate) struct JointFilter {
     bounds: [[f64; 2]; OPERATOR],
     delay: DelayLine<Vec<f64>>,
     reported: Reported,
-    /// Innovation variance as expected at the last sample.
+    /// Predicted innovation variance of the last sample.
     expected: f64,
     restarts: u64,
 }
 
 impl JointFilter {
-    /// From the batch fit of the start span.
+    /// Starts from the batch fit of the start span.
     ///
     /// # Errors
     /// [`IdentError::BadStart`] without a fit.
@@ -93,8 +93,7 @@ impl JointFilter {
         })
     }
 
-    /// Keeps the parameters within their bounds and the prior knowledge of them within reason; true
-    /// if that changed something.
+    /// Keeps the parameters within their bounds and their variances within limits; true if something was changed.
     fn hold(&mut self) -> bool {
         let mut cut = false;
         let sound =

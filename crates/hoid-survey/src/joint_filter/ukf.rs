@@ -1,12 +1,11 @@
-//! The unscented Kalman filter: 2 N points `X ± sqrt(N) L_i`, with `L L' = P`, of equal weight are
-//! sent through transition and output, and give their means and covariances (S. J. Julier and J. K.
-//! Uhlmann, *Proceedings of the IEEE* 92 (2004) 401-422, with kappa = 0). The points are drawn
-//! again after the noise of the transition has been added. `X <- X + c/s eps`, `P <- P - c c'/s`,
-//! with c the covariance of X with the output and s the variance of the output.
+//! The unscented Kalman filter: 2 N points `X ± sqrt(N) L_i`, with `L L' = P`, of equal weight pass through transition
+//! and output, and give their means and covariances (S. J. Julier and J. K. Uhlmann, *Proceedings of the IEEE* 92
+//! (2004) 401-422, with kappa = 0). The points are drawn again after the noise of the transition has been added.
+//! `X <- X + c/s eps`, `P <- P - c c'/s`, with c the covariance of X with the output and s the variance of the output.
 
 use super::belief::{Belief, Matrix, Model, N};
 
-/// Takes a sample; returns the innovation and its variance as expected.
+/// Takes a sample; returns the innovation and its predicted variance.
 pub(crate) fn step(model: &Model, belief: &mut Belief, e: f64, u: f64) -> [f64; 2] {
     let moved = points(belief).map(|x| model.transition(&x, e));
     belief.x = mean(&moved);
@@ -61,12 +60,12 @@ fn mean(points: &[[f64; N]; COUNT]) -> [f64; N] {
     std::array::from_fn(|i| points.iter().map(|x| x[i]).sum::<f64>() / COUNT as f64)
 }
 
-/// L with `L L' = P`; a direction that rounding has made negative has none.
+/// L with `L L' = P`; a direction whose variance rounding has made negative is left out.
 fn root(p: &Matrix) -> Matrix {
     let mut l = [[0.0; N]; N];
     for j in 0..N {
         let rest = p[j][j] - (0..j).map(|k| l[j][k] * l[j][k]).sum::<f64>();
-        // A share of rounding of the remainder of a variance.
+        // A remainder below this share of the variance is rounding error.
         if rest > 1e-14 * p[j][j] {
             l[j][j] = rest.sqrt();
             for i in j + 1..N {

@@ -1,4 +1,4 @@
-//! The arithmetic of a sample, in fixed room: what serves these methods alone, in the form of
+//! The arithmetic of a sample, with fixed capacity: parts that only these methods use, in the form of
 //! [`hoid_core`].
 //!
 //! | module | contents |

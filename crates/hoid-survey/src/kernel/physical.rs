@@ -3,17 +3,16 @@
 //! `eta = [K_e, K_e_dot, omega_nm, zeta_nm, c.., d..]`, or with the delay
 //! `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, c.., d..]`. The predictor is that of Box-Jenkins with
 //! the polynomials `theta(eta)` of the exact zero-order hold ([`hoid_core::held_operator`]); its
-//! gradient is `psi_eta = (d theta/d eta)' psi_theta`. The step is that of [`hoid_core::rpem`], but
-//! each factor of forgetting now belongs to a quantity of which the user knows how fast it changes:
-//! operators adapt their gains, and hardly their neuromuscular system.
+//! gradient is `psi_eta = (d theta/d eta)' psi_theta`. The step is that of [`hoid_core::rpem`], but each factor of
+//! forgetting now belongs to a quantity whose rate of change the user knows: operators adapt their gains, and hardly
+//! their neuromuscular system.
 //!
-//! Each parameter stays within its bounds: a step is cut where it meets one. C (and D, with
+//! Each parameter stays within its bounds: a step is cut at the bound. C (and D, with
 //! [`Stable::PredictorAndNoise`]) is kept stable by halving the step.
 //!
-//! With the delay as a parameter `tau_e = l Ts + delta`, B has three coefficients behind
-//! `nk = l + 1` samples; as tau_e grows over a whole sample, B moves on along the past input that
-//! the predictor keeps, without a transient. The model is continuous there, its derivative has a
-//! kink (see [`hoid_core::held_operator`]).
+//! With the delay as a parameter `tau_e = l Ts + delta`, B has three coefficients after a delay of `nk = l + 1`
+//! samples; as tau_e grows over a whole sample, B moves on along the past input that the predictor keeps, without a
+//! transient. The model is continuous there, its derivative has a kink (see [`hoid_core::held_operator`]).
 
 use hoid_core::{
     adaptation::Adaptation,
@@ -26,39 +25,38 @@ use hoid_core::{
     shape::Shape,
 };
 
-/// Place of omega_nm in eta.
+/// Index of omega_nm in eta.
 const OMEGA: usize = 2;
-/// Place of zeta_nm in eta.
+/// Index of zeta_nm in eta.
 const ZETA: usize = 3;
-/// Place of tau_e in eta, where it is a parameter.
+/// Index of tau_e in eta, if it is a parameter.
 const TAU: usize = 4;
 
-/// Parameters of the recursion and their bounds.
+/// Model of the recursion: orders, sample time and bounds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhysicalModel<S, const N: usize> {
-    /// Orders: nc and nd are free, na = 0, nf = 2 and nb = 2, or 3 when tau_e is a parameter.
+    /// Orders: nc and nd are free, na = 0, nf = 2 and nb = 2, or 3 if tau_e is a parameter.
     pub shape: S,
-    /// Smallest delay nk in samples, of which the recursion is given the input `x(t) = e(t - nk)`,
-    /// when tau_e is a parameter.
+    /// Smallest delay nk in samples, for which the recursion receives the input `x(t) = e(t - nk)`, if tau_e is a
+    /// parameter.
     pub smallest_nk: Option<usize>,
     /// Sample time in s.
     pub sample_time: f64,
     /// Least and largest value of each parameter.
     pub bounds: [[f64; 2]; N],
-    /// Which noise polynomials are kept stable.
+    /// Noise polynomials that are kept stable.
     pub stable: Stable,
 }
 
 /// The recursion. N is the capacity for parameters, K that for the errors of its filters
-/// ([`ErrorLayout::filter_errors`]; 0 for the default error bars), L the number of past inputs that
-/// are kept: 2 without tau_e, 3 and the range of the delay with it; at least nc.
+/// ([`ErrorLayout::filter_errors`]; 0 for the default error bars), L the number of past inputs that are kept: 2
+/// without tau_e, 3 plus the range of the delay with it; at least nc.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhysicalRpem<S, const N: usize, const K: usize, const L: usize, A> {
     model: PhysicalModel<S, N>,
     predictor: Predictor<S, N, L>,
     eta: [f64; N],
-    /// Polynomials of eta, their Jacobian with respect to the first parameters, and the whole
-    /// samples of the delay.
+    /// Polynomials of eta, their Jacobian with respect to the first parameters, and the whole samples of the delay.
     polynomials: Polynomials<N>,
     psi: [f64; N],
     adaptation: A,
@@ -80,7 +78,7 @@ hoid_core::state!([S, const N: usize, const K: usize, const L: usize, A: hoid_co
 });
 
 impl<S: Shape, const N: usize> PhysicalModel<S, N> {
-    /// Number of operator parameters in front of c and d.
+    /// Number of operator parameters before c and d.
     fn operator(&self) -> usize {
         self.shape.nb() + 2
     }
@@ -93,7 +91,7 @@ impl<S: Shape, const N: usize> PhysicalModel<S, N> {
         let (operator, mut whole_samples) = (self.operator(), 0);
         if self.smallest_nk.is_some() {
             let samples = eta[TAU] / self.sample_time;
-            // Up to rounding: 0.29/0.01 is 28.999999999999996.
+            // With a tolerance for rounding: 0.29/0.01 is 28.999999999999996.
             let whole = libm::floor(samples * (1.0 + 1e-12) + 1e-12).max(0.0);
             whole_samples = whole as usize;
             let delta = (eta[TAU] - whole * self.sample_time).clamp(0.0, self.sample_time);
@@ -126,9 +124,9 @@ impl<S: Shape, const N: usize> PhysicalModel<S, N> {
 }
 
 impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>> PhysicalRpem<S, N, K, L, A> {
-    /// Starts from eta with filters at rest. `None` when the orders are not those of
-    /// [`PhysicalModel::shape`], N, K or L is too small, eta lies outside the bounds, the bounds
-    /// let omega_nm or zeta_nm become zero, or the noise model is not stable.
+    /// Starts from eta with filters at rest. `None` if the orders are not those of
+    /// [`PhysicalModel::shape`], N, K or L is too small, eta lies outside the bounds, the bounds allow omega_nm or
+    /// zeta_nm to become zero, or the noise model is not stable.
     pub fn new(model: PhysicalModel<S, N>, eta: [f64; N], adaptation: A, bars: ErrorBars<N, K>) -> Option<Self> {
         let shape = model.shape;
         let predictor = Predictor::new(shape, Regressor::Gradient)?;
@@ -160,7 +158,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         Some(recursion)
     }
 
-    /// Lets B start at the delay of the estimate.
+    /// Sets the start of B to the delay of the estimate.
     fn apply_delay(&mut self) {
         if let Some(first) = self.model.smallest_nk {
             let nk = self.polynomials.whole_samples + 1;
@@ -175,7 +173,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         innovation
     }
 
-    /// A gradient by theta as one by eta: `J' psi_theta`.
+    /// Converts a gradient with respect to theta into one with respect to eta: `J' psi_theta`.
     #[inline(always)]
     fn chain_rule(&self, of_theta: [f64; N]) -> [f64; N] {
         let shape = self.model.shape;
@@ -197,8 +195,8 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         row
     }
 
-    /// The step by a sample `x(t) = e(t - nk)`, `u(t)`; nk is [`PhysicalModel::smallest_nk`] when
-    /// the delay is a parameter. Both must be finite.
+    /// Takes a sample `x(t) = e(t - nk)`, `u(t)`; nk is [`PhysicalModel::smallest_nk`] if the delay is a parameter.
+    /// Both must be finite.
     #[inline]
     pub fn step(&mut self, x: f64, u: f64) -> Step {
         let innovation = self.predict(x, u);
@@ -210,8 +208,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
             .update(&self.psi, limited, &self.eta, self.bars.innovation_variance());
         let (operator, noise) = (self.model.operator(), self.model.shape.nc() + self.model.shape.nd());
         let (shape, stable) = (self.model.shape, self.model.stable);
-        // The operator's part of theta is stable by its bounds; only the noise model has to be
-        // tested.
+        // The operator's part of theta is stable by its bounds; only the noise model has to be tested.
         let (allowed, mut eta) = backtrack(&self.eta, &moved.step, |eta| {
             let mut theta = [0.0; N];
             theta[operator - 2..operator - 2 + noise].copy_from_slice(&eta[operator..operator + noise]);
@@ -234,8 +231,8 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         }
     }
 
-    /// Cuts the new estimate where it is outside the bounds. Returns the fraction of the step that
-    /// is left of each parameter, `allowed` inside the bounds, and whether one was cut.
+    /// Cuts the new estimate at the bounds. Returns the remaining fraction of the step of each parameter, `allowed`
+    /// inside the bounds, and whether one was cut.
     #[inline(always)]
     fn cut_at_bounds(&self, step: &[f64; N], allowed: f64, eta: &mut [f64; N]) -> ([f64; N], bool) {
         let (mut fraction, mut cut) = ([allowed; N], false);
@@ -254,7 +251,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         (fraction, cut)
     }
 
-    /// As [`PhysicalRpem::step`], but the estimate stays: only the filters move on.
+    /// As [`PhysicalRpem::step`], but the estimate stays constant: only the filters move on.
     pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
         let innovation = self.predict(x, u);
         let (layout, rows) = self.sensitivities();
@@ -266,8 +263,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         }
     }
 
-    /// As [`PhysicalRpem::step_without_update`] where the output is missing: the one-step
-    /// prediction takes its place.
+    /// As [`PhysicalRpem::step_without_update`] for a missing output, which the one-step prediction replaces.
     pub fn bridge(&mut self, x: f64) {
         self.predict(x, 0.0);
         self.predictor.bridge(&self.polynomials.theta);
@@ -276,7 +272,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         self.correct();
     }
 
-    /// Sensitivities with respect to eta, whose noise parameters are after the operator's.
+    /// Sensitivities with respect to eta, in which the noise parameters follow those of the operator.
     #[inline(always)]
     fn sensitivities(&self) -> (ErrorLayout, Sensitivities<N, K>) {
         if K == 0 {
@@ -308,52 +304,52 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         }
     }
 
-    /// The estimate eta.
+    /// Returns the estimate eta.
     pub fn eta(&self) -> &[f64; N] {
         &self.eta
     }
 
-    /// The polynomials of eta, `[b.. c.. d.. f..]`.
+    /// Returns the polynomials of eta, `[b.. c.. d.. f..]`.
     pub fn theta(&self) -> &[f64; N] {
         &self.polynomials.theta
     }
 
-    /// Jacobian of `[b.., f1, f2]` with respect to the operator's parameters.
+    /// Returns the Jacobian of `[b.., f1, f2]` with respect to the operator's parameters.
     pub fn jacobian(&self) -> &[[f64; 5]; 5] {
         &self.polynomials.jacobian
     }
 
-    /// psi of the last sample.
+    /// Returns psi of the last sample.
     pub fn psi(&self) -> &[f64; N] {
         &self.psi
     }
 
-    /// The adaptation with its covariance.
+    /// Returns the adaptation with its covariance.
     pub fn adaptation(&self) -> &A {
         &self.adaptation
     }
 
-    /// Delay of b0 in samples where tau_e is one of the parameters: its whole samples, and that of the hold.
+    /// Returns the delay of b0 in samples if tau_e is one of the parameters: its whole samples, and that of the hold.
     pub fn nk(&self) -> usize {
         self.polynomials.whole_samples + 1
     }
 
-    /// The adaptation, to be changed from outside.
+    /// Returns the adaptation for changes from outside.
     pub fn adaptation_mut(&mut self) -> &mut A {
         &mut self.adaptation
     }
 
-    /// Covariance of eta over sigma^2.
+    /// Returns the covariance of eta over sigma^2.
     pub fn normalised_covariance(&self) -> [[f64; N]; N] {
         self.adaptation.normalised_covariance(&self.bars)
     }
 
-    /// Innovation variance sigma^2.
+    /// Returns the innovation variance sigma^2.
     pub fn innovation_variance(&self) -> f64 {
         self.bars.innovation_variance()
     }
 
-    /// How often a signal overflowed and the filters were brought to rest.
+    /// Returns the number of overflows after which the filters were reset.
     pub fn restarts(&self) -> u64 {
         self.restarts
     }

@@ -1,4 +1,4 @@
-//! Prior assumptions about a person and of their changes, in seconds, and the first hypothesis.
+//! Prior of a person and of their changes, in seconds, and the first hypothesis.
 
 use std::ops::RangeInclusive;
 
@@ -16,34 +16,33 @@ use crate::kernel::multiple_model::{
 const SPACING_S: f64 = 0.32;
 /// Mean time between two changes, s.
 const BETWEEN_CHANGES_S: f64 = 60.0;
-/// Change of K_e and of K_e_dot to be expected, in the units of [`ChangePrior::gain_jump`].
+/// Prior standard deviation of a change of K_e and of K_e_dot, in the units of [`ChangePrior::gain_jump`].
 const JUMP: [f64; 2] = [0.15, 0.5];
 /// Drift of the gains in one second, in the same units.
 const DRIFT: f64 = 0.005;
-/// The drift just after a change, for K_e and K_e_dot in the same units, for omega_nm and zeta_nm
-/// in those of a change of them; and how long it lasts, s.
+/// Drift just after a change, for K_e and K_e_dot in the same units, for omega_nm and zeta_nm in those of their
+/// changes; and its time constant, s.
 const UNREST: [f64; OPERATOR] = [0.05, 0.25, 0.2, 0.2];
 const UNREST_FOR_S: f64 = 3.0;
-/// Relative change of omega_nm and of zeta_nm to be expected, how many births there are for one of
-/// this kind, and its odds against the other.
+/// Prior standard deviation of a relative change of omega_nm and of zeta_nm, number of births per birth of this kind,
+/// and its odds against the other kind.
 const NEUROMUSCULAR: [f64; 2] = [0.25, 0.4];
 const WHOLE_EVERY: u32 = 4;
 const WHOLE_ODDS: f64 = 0.3;
 /// Crossover at which the gains are compared, rad/s.
 const CROSSOVER_RAD_S: f64 = 2.0;
-/// Memory of the innovation variance, and what of it is left after a change, s.
+/// Memory of the innovation variance, and the part of it that remains after a change, s.
 const LEVEL_MEMORY_S: f64 = 20.0;
 const DOUBT_S: f64 = 1.0;
-/// Births for which a hypothesis is kept whatever it predicts.
+/// Number of births for which a hypothesis is kept whatever it predicts.
 const PROTECTED_BIRTHS: f64 = 4.0;
-/// Age from which a hypothesis can report what changed, s.
+/// Age from which a hypothesis can identify the changed parameters, s.
 const SETTLED_S: f64 = 0.5;
-/// A hypothesis of up to this age represents a change, s.
+/// Largest age of a hypothesis of a recent change, s.
 const RECENT_S: f64 = 4.0;
 
-/// Births for one time at which other delays are proposed, how many of them, the odds of a change
-/// of the delay against one of the gains alone, its standard deviation in s, and the probability of
-/// a delay next to the likeliest.
+/// Number of births per proposal of other delays, number of proposed delays, odds of a change of the delay against one
+/// of the gains alone, its standard deviation in s, and probability of a delay next to the likeliest.
 const DELAYS_EVERY: u32 = 4;
 const DELAYS_PROPOSED: usize = 8;
 const DELAY_ODDS: f64 = 1.0;
@@ -53,7 +52,7 @@ const NEIGHBOUR: f64 = 0.15;
 /// [`DelayPrior::error_per_sample`].
 const WORTH: [f64; OPERATOR] = [0.01, 0.03, 0.04, 0.08];
 
-/// The delays in question, in samples of nk: nk itself, or those of the range that is tracked.
+/// Candidate delays, in samples of nk: nk itself, or those of the tracked range.
 pub(super) fn delays(setup: &Setup, sample_time: SampleTime) -> RangeInclusive<usize> {
     match setup.track_delay_s {
         None => setup.orders.nk..=setup.orders.nk,
@@ -61,7 +60,7 @@ pub(super) fn delays(setup: &Setup, sample_time: SampleTime) -> RangeInclusive<u
     }
 }
 
-/// Prior assumptions about changes, in samples.
+/// Returns the prior of changes, in samples.
 ///
 /// # Errors
 /// As [`physical_bounds`].
@@ -72,7 +71,7 @@ pub(super) fn change_prior(alarm: f64, setup: &Setup, sample_time: SampleTime) -
         sample_time: ts,
         bounds: physical_bounds::<OPERATOR>(setup, sample_time)?,
         birth_interval: spacing as u32,
-        // Where samples are further apart than changes are supposed to be, half of them.
+        // The probability of a change between two births is at most one half.
         hazard: (ts / BETWEEN_CHANGES_S).min(0.5 / spacing),
         gain_jump: JUMP,
         gain_drift: DRIFT * ts.sqrt(),
@@ -103,10 +102,10 @@ pub(super) fn change_prior(alarm: f64, setup: &Setup, sample_time: SampleTime) -
     })
 }
 
-/// The first hypothesis, from the batch fit of the start span, its covariance scaled by a factor.
+/// Returns the first hypothesis, from the batch fit of the start span, with its covariance scaled by a factor.
 ///
 /// # Errors
-/// [`IdentError::BadStart`] without a fit, or where it lies outside the bounds.
+/// [`IdentError::BadStart`] without a fit, or for one outside the bounds.
 pub(super) fn first_hypothesis(
     from: &StartState,
     times: f64,

@@ -1,29 +1,26 @@
-//! The two-sided estimate of a recorded run: what all of its samples show about the operator at
-//! each of them.
+//! The two-sided estimate of a recorded run: the operator at each sample, from all samples of the run.
 //!
 //! After the whitening filter the model of [`crate::kernel::multiple_model`] has no dynamics:
-//! `y(t) = K_e psi_1 + K_e_dot psi_2 + eps`, with signals that the record gives once for all. The
-//! bank of hypotheses may therefore be run over it from either end. At t the run from the front
-//! reports `p(eta_t | y_1..y_t) = sum_f P(f) N(m_f, P_f)`, where f reports when the person changed
-//! last, and the run from the back `p(y_{t+1}..y_N | eta_t)`, in proportion to
-//! `sum_b P(b) N(m_b, P_b)`, where b reports when the person will change next. The product is the
-//! two-filter smoother (D. C. Fraser and J. E. Potter, *IEEE Transactions on Automatic Control* 14
-//! (1969) 387-390), here of two mixtures (G. Kitagawa, *Annals of the Institute of Statistical
-//! Mathematics* 46 (1994) 605-623): with `S = P_f + P_b`,
+//! `y(t) = K_e psi_1 + K_e_dot psi_2 + eps`, with signals that depend only on the record. The bank of hypotheses can
+//! therefore process it from either end. At t the forward run gives `p(eta_t | y_1..y_t) = sum_f P(f) N(m_f, P_f)`,
+//! where f is the time of the last change, and the backward run `p(y_{t+1}..y_N | eta_t)`, in proportion to
+//! `sum_b P(b) N(m_b, P_b)`, where b is the time of the next change. The product is the two-filter smoother (D. C.
+//! Fraser and J. E. Potter, *IEEE Transactions on Automatic Control* 14 (1969) 387-390), here of two mixtures (G.
+//! Kitagawa, *Annals of the Institute of Statistical Mathematics* 46 (1994) 605-623): with `S = P_f + P_b`,
 //!
 //! - `m = m_f + P_f S^-1 (m_b - m_f)`, `P = P_f - P_f S^-1 P_f`;
 //! - `P(f, b) ~ P(f) P(b) N(m_b - m_f; 0, S)`: a past and a future that contradict each other are
 //!   not joined.
 //!
-//! Each hypothesis has an innovation variance s2 that rests on n residuals; the same holds for
-//! `ln s2`, of variance 2/n. What is printed is mean and covariance of the mixture of pairs.
+//! Each hypothesis has an innovation variance s2 from n residuals; the same equations hold for `ln s2`, of variance
+//! 2/n. Mean and covariance of the mixture of pairs are reported.
 //!
-//! The run from the back needs a start about which it is linear: it is the end of the run from the
-//! front, with [`KNOWN_LITTLE`] times the covariance of the start fit, and so is that of the run
-//! from the front. What counts twice is one part in so many. omega_nm and zeta_nm, about which the
-//! filters stand, are those at the end of the causal estimate.
+//! The backward run needs a start about which it is linearised: it is the end of the forward run, with
+//! [`KNOWN_LITTLE`] times the covariance of the start fit, from which the forward run starts too. The start therefore
+//! counts twice only with that small weight. omega_nm and zeta_nm, about which the filters are linearised, are those
+//! at the end of the causal estimate.
 //!
-//! There is time for more hypotheses here: one is born every 0.08 s, and there is room for 64.
+//! More hypotheses are affordable here: one is born every 0.08 s, and there is capacity for 64.
 
 use crate::kernel::multiple_model::{
     bank::Bank,
@@ -40,20 +37,19 @@ use hoid_track::building::{Causal, Reported, Setup, StartState, TwoSided};
 
 use super::prior::{change_prior, first_hypothesis, outside};
 
-/// Room for hypotheses, and time between two births, s.
+/// Capacity for hypotheses, and time between two births, s.
 const HYPOTHESES: usize = 64;
 const SPACING_S: f64 = 0.08;
 /// Multiple of the covariance of the start fit from which both runs start.
 const KNOWN_LITTLE: f64 = 100.0;
-/// Time constants of the neuromuscular system after which the filters have forgotten that they
-/// started at rest.
+/// Time after which the initial rest of the filters no longer matters, in time constants of the neuromuscular system.
 const SETTLED: f64 = 6.0;
-/// Least probability of a hypothesis that is joined, and least share of a pair in the largest.
+/// Least probability of a hypothesis that is joined, and least weight of a pair relative to the largest.
 const LEAST: f64 = 1e-3;
-/// Signals beyond this would overflow in products.
+/// Limit of the signals, beyond which their products would overflow.
 const LARGEST: f64 = 1e60;
 
-/// A hypothesis as it is joined with others.
+/// A hypothesis in the form in which it is joined with others.
 #[derive(Debug, Clone, Copy)]
 struct Side {
     log_weight: f64,
@@ -89,10 +85,10 @@ pub(crate) struct Joined {
     pub variance: f64,
 }
 
-/// Output and signals after the whitening filter; `None` if they are not known.
+/// Output and signals after the whitening filter; `None` if they are unknown.
 type WhitenedSample = Option<(f64, Signals)>;
 
-/// The two-sided estimates of the rows of a causal run.
+/// Returns the two-sided estimates of the rows of a causal run.
 ///
 /// # Errors
 /// [`IdentError::BadStart`] for a start that cannot be used.
@@ -122,7 +118,7 @@ pub(super) fn smooth(
     Ok(joined.iter().map(&mut row).collect())
 }
 
-/// The mixtures of pairs at the requested samples, ascending.
+/// Returns the mixtures of pairs at the requested samples, ascending.
 fn two_sided(
     record: &Record,
     alarm: f64,
@@ -171,7 +167,7 @@ fn two_sided(
     Ok(joined)
 }
 
-/// Output and signals of every sample behind D, for filters about a point that started at rest.
+/// Output and signals of every sample after D, for filters linearised about a point and started at rest.
 fn whitened(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]) -> Vec<WhitenedSample> {
     let (e, u) = (record.input(), record.output());
     let sound = |v: f64| v.abs() <= largest;
@@ -207,7 +203,7 @@ fn whitened(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]
         .collect()
 }
 
-/// The likely hypotheses, the likeliest first: a pair of these leaves out most of the others.
+/// Returns the likely hypotheses, the likeliest first: a pair of these allows most others to be skipped.
 fn sides(bank: &Bank<HYPOTHESES>) -> Vec<Side> {
     let likely = bank.hypotheses().filter(|h| h.probability >= LEAST);
     let mut sides: Vec<Side> = likely.map(Side::of).collect();
@@ -221,7 +217,7 @@ fn join(before: &[Side], after: &[Side]) -> Joined {
     let (mut most, least) = (f64::NEG_INFINITY, LEAST.ln());
     for f in before {
         for b in after {
-            // Not a number where nothing is bounded: such a pair is tried.
+            // NaN if there is no bound: such a pair is computed.
             let highest = f.log_weight + b.log_weight - f.size.max(b.size);
             if highest < most + least || highest - ForwardBackward::half_square(f, b) < most + least {
                 continue;
@@ -234,7 +230,7 @@ fn join(before: &[Side], after: &[Side]) -> Joined {
     }
     pairs.retain(|(log, _)| *log >= most + least);
     let each: Vec<(f64, Joined)> = if pairs.is_empty() {
-        // Nothing could be joined: the prediction from the past alone.
+        // No pair could be joined: the causal estimate is used.
         let shares = before.iter().map(|f| (f.log_weight.exp(), alone(f)));
         shares.collect()
     } else {
@@ -277,7 +273,7 @@ fn alone(f: &Side) -> Joined {
     }
 }
 
-/// A past and a future, with `L L' = S` and `z = L^-1 (m_b - m_f)`.
+/// A pair of a forward and a backward hypothesis, with `L L' = S` and `z = L^-1 (m_b - m_f)`.
 struct ForwardBackward<'a> {
     f: &'a Side,
     b: &'a Side,
@@ -286,9 +282,9 @@ struct ForwardBackward<'a> {
 }
 
 impl<'a> ForwardBackward<'a> {
-    /// Lower bound of the decrease of the log weight by the difference: `z'z` is no less than the
-    /// square of one difference over its variance. As S is larger than either covariance, neither
-    /// of these bounds is crossed except for rounding.
+    /// Lower bound of the decrease of the log weight due to the difference: `z'z` is no less than the square of one
+    /// difference over its variance. As S is larger than either covariance, neither of these bounds is violated except
+    /// by rounding.
     fn half_square(f: &Side, b: &Side) -> f64 {
         let apart = b.level[0] - f.level[0];
         let mut square = 0.0_f64;
@@ -299,7 +295,7 @@ impl<'a> ForwardBackward<'a> {
         0.5 * (square + apart * apart / (f.level[1] + b.level[1])) - 0.01
     }
 
-    /// The pair with the logarithm of its weight up to a constant. `None` where S is not positive.
+    /// Returns the pair with the logarithm of its weight up to a constant. `None` if S is not positive.
     fn of(f: &'a Side, b: &'a Side) -> Option<(f64, Self)> {
         let sum = std::array::from_fn(|i| std::array::from_fn(|j| f.covariance[i][j] + b.covariance[i][j]));
         let root = factor(&sum)?;
@@ -330,7 +326,7 @@ impl<'a> ForwardBackward<'a> {
     }
 }
 
-/// L with `L L' = s`. Known products are added up before they are taken away, as [`cholesky::forward`] does;
+/// L with `L L' = s`. Known products are summed before they are subtracted, as in [`cholesky::forward`];
 /// [`cholesky::factor`] is the same except for rounding.
 fn factor(s: &[[f64; OPERATOR]; OPERATOR]) -> Option<[[f64; OPERATOR]; OPERATOR]> {
     let mut l = [[0.0; OPERATOR]; OPERATOR];
@@ -350,7 +346,7 @@ fn factor(s: &[[f64; OPERATOR]; OPERATOR]) -> Option<[[f64; OPERATOR]; OPERATOR]
     Some(l)
 }
 
-/// T_L in s and its variance, from `E[K_e K_e_dot]/E[K_e^2]`.
+/// Returns T_L in s and its variance, from `E[K_e K_e_dot]/E[K_e^2]`.
 fn lead(row: &Joined) -> [f64; 2] {
     let ([k_e, k_e_dot, ..], c) = (row.eta, &row.covariance);
     let square = k_e * k_e + c[0][0];

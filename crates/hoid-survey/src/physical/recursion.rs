@@ -1,5 +1,5 @@
-//! The recursion in physical parameters after the face of all: room for the parameters, the delay line, the covariance
-//! in units of the coefficients.
+//! The recursion in physical parameters with the common interface: capacity for the parameters, the delay line, the
+//! covariance in units of the coefficients.
 
 use hoid_core::{
     adaptation::Adaptation,
@@ -16,11 +16,11 @@ use hoid_track::{
 
 use crate::kernel::physical::{PhysicalModel, PhysicalRpem};
 
-/// Builds the recursion: the smallest room that holds its parameters, and the orders in its type where
-/// they are those of the operator.
+/// Builds the recursion: with the smallest capacity for its parameters, and with the orders in its type if they are
+/// those of the operator.
 ///
 /// # Errors
-/// [`IdentError`] for options that contradict each other or a start that it cannot take.
+/// [`IdentError`] for options that contradict each other, or a start that it cannot use.
 pub(super) fn build(plan: &Plan<'_>) -> Result<Box<dyn Recursion>, IdentError> {
     let o = plan.setup.polynomial_orders();
     let p = plan.parameters();
@@ -47,14 +47,14 @@ pub(super) fn build(plan: &Plan<'_>) -> Result<Box<dyn Recursion>, IdentError> {
     }
 }
 
-/// Smallest delay in samples, where tau_e is tracked.
+/// Smallest delay in samples, if tau_e is tracked.
 fn smallest_nk(plan: &Plan<'_>) -> Option<usize> {
-    // Up to rounding: 0.29/0.01 is 28.999999999999996.
+    // With a tolerance for rounding: 0.29/0.01 is 28.999999999999996.
     let whole = |low: f64| ((low / plan.sample_time.s() + 1e-9) as usize).saturating_add(1);
     plan.setup.track_delay_s.map(|(low, _)| whole(low))
 }
 
-/// Samples of the input to be kept, where tau_e is tracked.
+/// Number of input samples to be kept, if tau_e is tracked.
 fn taps(plan: &Plan<'_>) -> Option<usize> {
     let (_, longest) = plan.setup.track_delay_s?;
     let all = (longest / plan.sample_time.s()) as usize + 5;

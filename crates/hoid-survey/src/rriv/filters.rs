@@ -1,11 +1,10 @@
-//! The filters of the refined recursion: what D/F makes of a signal, and the response of a model to
-//! an input.
+//! The filters of the refined recursion: signals filtered by D/F, and the response of a model to an input.
 
 use hoid_model::Orders;
 
 use hoid_track::building::{History, bounded, weighted};
 
-/// A signal and what D/F makes of it.
+/// A signal, and its version filtered by D/F.
 #[derive(Debug, Clone)]
 pub(crate) struct Filtered {
     pub raw: History,
@@ -33,7 +32,7 @@ impl Filtered {
     }
 }
 
-/// An input, its response and both filtered.
+/// An input, its response, and both filtered.
 #[derive(Debug, Clone)]
 pub(crate) struct Simulated {
     pub input: History,
@@ -54,19 +53,19 @@ impl Simulated {
         }
     }
 
-    /// `(B/F) q^-nk` of the input, now.
+    /// Returns the current `(B/F) q^-nk` of the input.
     pub fn response(&self, b: &[f64], f: &[f64], nk: usize) -> f64 {
         bounded(weighted(b, &self.input.newest()[nk..]) - weighted(f, self.response.newest()))
     }
 
-    /// `[e_f(t-nk) .., -x_f(t-1) ..]`, in the places of B and F in theta.
+    /// Writes `[e_f(t-nk) .., -x_f(t-1) ..]`, at the positions of B and F in theta.
     pub fn regressors(&self, p: &Parts<'_>, nk: usize, into: &mut [f64]) {
         let now = self.input_filtered.next(p.d, p.f, self.input.newest()[nk]);
         fill_b(now, &self.input_filtered, p.b.len(), into);
         fill_f(&self.response_filtered, p.f.len(), into);
     }
 
-    /// Takes the filters to the next sample.
+    /// Advances the filters to the next sample.
     pub fn advance(&mut self, p: &Parts<'_>, nk: usize) {
         let x = self.response(p.b, p.f, nk);
         self.response.push(x);

@@ -1,9 +1,9 @@
-//! The gain of a vector of instruments: the covariance of the kernel ([`hoid_core::adaptation`])
-//! with z in the place of psi.
+//! The gain for a vector of instruments: the covariance of the kernel ([`hoid_core::adaptation`]) with z in place of
+//! psi.
 //!
-//! The kernel's covariance is that of a recursion with the gradient z; whether its innovation is
-//! that of a gradient or of instruments does not enter the gain. Where rounding has lost it, as by
-//! a jump of the scale of 1e8 and more, it starts again.
+//! The covariance of the kernel is that of a recursion with the gradient z; whether its innovation is that of a
+//! gradient or of instruments does not affect the gain. If rounding makes it invalid, as after a jump of the scale by
+//! 1e8 or more, it restarts.
 
 use hoid_core::state::{State, visit_all};
 use hoid_core::{
@@ -14,10 +14,10 @@ use hoid_core::{
 
 use hoid_track::building::ROOM_WITHOUT_FIT;
 
-/// Room for parameters.
+/// Capacity for parameters.
 pub(crate) const ROOM: usize = 16;
 
-/// P, and what it forgets.
+/// P, and its forgetting.
 #[derive(Debug, Clone)]
 pub(crate) struct Forgetting {
     covariance: Box<Covariance<ROOM>>,
@@ -31,8 +31,8 @@ impl State for Forgetting {
 }
 
 impl Forgetting {
-    /// From P by rows, and a factor in (0, 1] for each parameter. `None` when P is not positive, or
-    /// too large for the room.
+    /// Starts from P by rows, and a factor in (0, 1] for each parameter. `None` if P is not positive, or exceeds the
+    /// capacity.
     pub fn new(start: &[f64], lambda: &[f64]) -> Option<Self> {
         let p = lambda.len();
         let mut matrix = [[0.0; ROOM]; ROOM];
@@ -44,7 +44,7 @@ impl Forgetting {
         Some(Self::of(UdCovariance::from_matrix(&matrix)?, factors))
     }
 
-    /// From a multiple of the unit matrix, with one factor for all.
+    /// Starts from a multiple of the unit matrix, with one factor for all.
     pub fn diagonal(size: f64, lambda: f64) -> Self {
         Self::of(UdCovariance::diagonal([size; ROOM]), [lambda; ROOM])
     }
@@ -59,7 +59,7 @@ impl Forgetting {
         }
     }
 
-    /// Forgets, takes z and writes the gain.
+    /// Forgets, takes z, and writes the gain.
     pub fn gain(&mut self, z: &[f64], gain: &mut [f64]) {
         let mut padded = [0.0; ROOM];
         padded[..z.len()].copy_from_slice(z);

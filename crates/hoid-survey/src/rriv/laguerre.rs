@@ -2,22 +2,22 @@
 //!
 //! As in the batch method ([`hoid_ident::iv`]) the response of e to f_t is an expansion in Laguerre
 //! filters, `L_0 = sqrt(1 - p^2)/(1 - p q^-1)`, `L_k = L_{k-1} (q^-1 - p)/(1 - p q^-1)` (B.
-//! Wahlberg, *IEEE Trans. Automatic Control* 36 (1991) 551-562); its weights follow by recursive
-//! least squares with a long memory. The value at t is made with the weights of t - 1: they hold
-//! the noise of the past alone, and of that one part in memory over filters.
+//! Wahlberg, *IEEE Trans. Automatic Control* 36 (1991) 551-562); its weights follow by recursive least squares with a
+//! long memory. The value at t is computed with the weights of t - 1: they contain only past noise, attenuated by the
+//! ratio of the number of filters to the memory.
 
 use super::forgetting::Forgetting;
 use hoid_track::building::{bounded, weighted};
 
-/// Number of filters. A loop remembers a second or two: 16 filters with a time constant of 16
-/// samples span about 500.
+/// Number of filters. A loop has a memory of a second or two: 16 filters with a time constant of 16 samples span about
+/// 500.
 const FILTERS: usize = 16;
 /// Time constant of the filters in samples.
 const TIME_CONSTANT: f64 = 16.0;
 /// Memory of the weights in samples.
 const MEMORY: f64 = 4096.0;
-/// P of the weights at the start, for signals of unit power: they are drawn to zero by a hundredth
-/// of a sample.
+/// P of the weights at the start, for signals of unit power: the prior at zero has the weight of a hundredth of a
+/// sample.
 const START: f64 = 100.0;
 
 /// Filters and weights.
@@ -27,7 +27,7 @@ pub(crate) struct Following {
     filters: [f64; FILTERS],
     weights: [f64; FILTERS],
     p: Forgetting,
-    /// Mean square of the external signal, and the samples in it.
+    /// Mean square of the external signal, and its number of samples.
     power: f64,
     samples: f64,
 }
@@ -35,7 +35,7 @@ pub(crate) struct Following {
 hoid_core::state!([] Following { pole, filters, weights, p, power, samples });
 
 impl Following {
-    /// At rest, with no weights.
+    /// Builds the filters at rest, with zero weights.
     pub fn new() -> Self {
         Self {
             pole: (-1.0 / TIME_CONSTANT).exp(),
@@ -47,14 +47,14 @@ impl Following {
         }
     }
 
-    /// The part of e(t) that follows the external signal up to t.
+    /// Returns the part of e(t) that follows the external signal up to t.
     pub fn step(&mut self, external: f64, e: f64) -> f64 {
         let external = bounded(external);
         self.filter(external);
         let following = bounded(weighted(&self.weights, &self.filters));
         self.samples += 1.0;
         self.power += (external * external - self.power) / self.samples.min(MEMORY);
-        // In units of the external signal, so that P knows no scale.
+        // In units of the external signal, so that P does not depend on its scale.
         let scale = self.power.sqrt().recip();
         if scale.is_finite() {
             let z = self.filters.map(|v| bounded(scale * v));
@@ -102,7 +102,7 @@ mod tests {
         }
         for i in 0..FILTERS {
             for j in 0..FILTERS {
-                // The impulse responses have died out to rounding.
+                // The impulse responses have decayed to rounding errors.
                 assert!((gram[i][j] - f64::from(u8::from(i == j))).abs() < 1e-12, "{i} {j}");
             }
         }

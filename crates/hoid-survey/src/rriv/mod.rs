@@ -2,30 +2,28 @@
 //! *Recursive Estimation and Time-Series Analysis*, 2nd ed. 2011, ch. 7 and 8; his C is D here;
 //! *Automatica* 52 (2015) 35-46).
 //!
-//! With the auxiliary model, e, u and its noise-free output `x = (B/F) q^-nk e'` are filtered by
-//! D/F (index f), and for
+//! With the auxiliary model, e, u and its noise-free output `x = (B/F) q^-nk e'` are filtered by D/F (index f), and
+//! for
 //!
 //! `phi = [e_f(t-nk) .., -u_f(t-1) ..]`,  `z = [e'_f(t-nk) .., -x_f(t-1) ..]`
 //!
-//! the symmetric form of the method takes the gain from the instruments alone,
+//! the symmetric form of the method computes the gain from the instruments alone,
 //! `g = P z/(1 + z' P z)`, `rho <- rho + g (u_f - phi' rho)`; D follows by recursive least squares
-//! on `xi = u - (B/F) q^-nk e`. Histories are a-posteriori: each filter takes a sample again with
-//! the auxiliary model that has just moved.
+//! on `xi = u - (B/F) q^-nk e`. Histories are a-posteriori: each filter takes a sample again with the updated
+//! auxiliary model.
 //!
-//! **Auxiliary model.** It is the estimate, low-pass filtered with the shortest memory of B and F.
-//! The estimate itself in its place makes its own instruments out of its errors, and with short
-//! memories runs are lost. The innovation that is reported, and the innovation variance, are those
-//! of the auxiliary model, whose filters run in any case.
+//! **Auxiliary model.** It is the estimate, low-pass filtered with the shortest memory of B and F. With the unfiltered
+//! estimate the instruments would depend on its errors, and with short memories some runs diverge. The reported
+//! innovation, and the innovation variance, are those of the auxiliary model, whose filters run in any case.
 //!
-//! **Instruments.** e' is e itself, or the part of e that follows an external signal
-//! ([`super::laguerre`]). With e the method needs the right noise model in a closed loop: z then
-//! holds past noise, which is independent of a white eps only.
+//! **Instruments.** e' is e itself, or the part of e that follows an external signal ([`super::laguerre`]). With e the
+//! method needs the right noise model in a closed loop: z then contains past noise, which is independent only of a
+//! white eps.
 //!
-//! **Covariance.** To first order the errors continue as `t <- (I - A) t - g eps` with rows
-//! `g_i phi'` for B and F and `g_i psi'` for D (psi the gradient for all parameters: D inherits
-//! what B and F are wrong by), so that `sigma^2 C` with `C <- (I - A) C (I - A)' + g g'` is the
-//! covariance of theta, whatever gain was used: for lambda = 1 that of the batch method, with
-//! forgetting about `P/(1 + lambda)`.
+//! **Covariance.** To first order the errors follow `t <- (I - A) t - g eps` with rows
+//! `g_i phi'` for B and F and `g_i psi'` for D (psi the gradient for all parameters: D inherits the errors of B and
+//! F), so that `sigma^2 C` with `C <- (I - A) C (I - A)' + g g'` is the covariance of theta, whatever gain was used:
+//! for lambda = 1 that of the batch method, with forgetting about `P/(1 + lambda)`.
 //!
 //! **Stability.** A step of B and F is halved until the roots of F lie within [`RADIUS`].
 
@@ -53,11 +51,11 @@ use laguerre::Following;
 
 pub use options::RrivOptions;
 
-/// Circle that holds the roots of F: the filters forget within 10 000 samples.
+/// Radius of the circle that contains the roots of F: the filters forget within 10 000 samples.
 const RADIUS: f64 = 0.9999;
-/// Halvings after which a step is left out.
+/// Number of halvings after which a step is omitted.
 const HALVINGS: usize = 20;
-/// Smallest share of the newest theta in that of the filters.
+/// Smallest share of the newest theta in the filtered one.
 const LEAST_SHARE: f64 = 1.0 / 1024.0;
 /// Smallest innovation variance as a share of the one at the start.
 const LEAST: f64 = 1e-16;
@@ -71,7 +69,7 @@ pub(crate) struct RefinedStart<'a> {
     pub covariance: &'a [f64],
     /// Variance of eps.
     pub innovation_variance: f64,
-    /// Number of samples that they come from: how far P is from its level in the long run.
+    /// Number of samples of the fit, from which the distance of P from its stationary level follows.
     pub samples: usize,
 }
 
@@ -82,7 +80,7 @@ pub(crate) struct RefinedRecursion {
     theta: Vec<f64>,
     /// Theta of the filters.
     auxiliary: Vec<f64>,
-    /// Share of the newest theta in it.
+    /// Share of the newest theta in the auxiliary one.
     share: f64,
     /// C, the covariance over sigma^2.
     spread: Vec<f64>,
@@ -90,12 +88,12 @@ pub(crate) struct RefinedRecursion {
     variance: f64,
     least_variance: f64,
     samples: f64,
-    /// Share of the newest sample in the variance when the recursion has run for long.
+    /// Share of the newest sample in the variance, in the stationary state.
     newest_share: f64,
     system_gain: Forgetting,
     noise_gain: Forgetting,
     measured: Simulated,
-    /// With an external signal: the instruments' own filters.
+    /// With an external signal: the filters of the instruments.
     instrument: Option<(Following, Simulated, f64)>,
     output: Filtered,
     /// xi.
@@ -130,7 +128,7 @@ impl State for RefinedRecursion {
     }
 }
 
-/// Vectors of one step, all of the length of theta.
+/// Work vectors of one step, all of the length of theta.
 #[derive(Debug, Clone)]
 struct Work {
     phi: Vec<f64>,
@@ -146,9 +144,8 @@ struct Work {
 }
 
 impl RefinedRecursion {
-    /// From a start, with a forgetting factor in (0, 1] for each parameter; `external` makes the
-    /// instruments of the external signal of each sample (where one is missing, the last one
-    /// holds).
+    /// Starts with a forgetting factor in (0, 1] for each parameter; `external` makes the instruments from the
+    /// external signal of each sample (if one is missing, the last one is kept).
     ///
     /// # Errors
     /// [`IdentError::BadOption`] for orders with A or C, or factors out of range;
@@ -202,13 +199,13 @@ impl RefinedRecursion {
         })
     }
 
-    /// Steps that stability made shorter.
+    /// Returns the number of steps that stability shortened.
     #[cfg(test)]
     pub fn shortened(&self) -> usize {
         self.shortened
     }
 
-    /// Without an output the prediction takes its place.
+    /// If the output is missing, the prediction replaces it.
     fn take(&mut self, sample: Sample, output: Option<f64>, moves: bool) -> StepOutcome {
         let e = bounded(sample.e);
         let nk = self.orders.nk;
@@ -237,8 +234,7 @@ impl RefinedRecursion {
         StepOutcome { innovation, shortened }
     }
 
-    /// The filters' theta takes its step, unless that leads out of the region of stable F, which is
-    /// not convex for nf > 2.
+    /// Moves theta of the filters, unless that leads out of the region of stable F, which is not convex for nf > 2.
     fn follow_theta(&mut self) {
         let w = &mut self.work;
         for (trial, (auxiliary, theta)) in w.trial.iter_mut().zip(self.auxiliary.iter().zip(&self.theta)) {
@@ -249,7 +245,7 @@ impl RefinedRecursion {
         }
     }
 
-    /// Moves theta, C and the variance; true when the step was made shorter.
+    /// Updates theta, C and the variance; true if the step was shortened.
     fn estimate(&mut self, u: f64, innovation: f64) -> bool {
         let Orders { nb, nd, nf, nk, .. } = self.orders;
         let noise = nb..nb + nd;
@@ -295,7 +291,7 @@ impl RefinedRecursion {
         self.theta.copy_from_slice(&w.trial);
         w.gain.iter_mut().for_each(|g| *g *= share);
 
-        // D, on the rest that the system just found leaves.
+        // D, from the residual of the current system.
         let gain = &mut w.short_gain[..nd];
         self.noise_gain.gain(&w.psi[noise.clone()], gain);
         let parts = Parts::of(&self.auxiliary, &self.orders);
@@ -317,7 +313,7 @@ impl RefinedRecursion {
         shortened
     }
 
-    /// `C <- (I - A) C (I - A)' + g g'`. Returns `psi' C psi` before.
+    /// `C <- (I - A) C (I - A)' + g g'`. Returns the previous `psi' C psi`.
     fn spread_on(&mut self, noise: &std::ops::Range<usize>) -> f64 {
         let w = &mut self.work;
         let p = self.theta.len();
@@ -345,12 +341,12 @@ impl RefinedRecursion {
             }
         }
         if (0..p).any(|i| self.spread[i * (p + 1)] < 0.0) {
-            // Lost to rounding, as P can be.
+            // C can become invalid by rounding, as can P.
             self.spread.copy_from_slice(&self.first_spread);
         }
         for i in 0..p {
-            // To first order the recursion can be unstable where it is not: then nothing is known,
-            // and no less than that.
+            // The first-order recursion of C can be unstable where that of theta is stable: the variance is then
+            // limited to that of an unknown parameter.
             let limit = LARGEST_GROWTH * self.first_spread[i * (p + 1)];
             let found = self.spread[i * (p + 1)];
             if limit > 0.0 && found > limit {

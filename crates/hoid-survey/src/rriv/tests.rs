@@ -22,8 +22,8 @@ fn textbook() -> Orders {
     }
 }
 
-/// `u = (B/F) q^-2 e + (1/D) eps` with white e and eps of unit variance; B is `gain` times the
-/// default one from the middle on.
+/// `u = (B/F) q^-2 e + (1/D) eps` with white e and eps of unit variance; B is `gain` times the default one from the
+/// middle on.
 fn open_loop(n: usize, replication: u64, d: &[f64], gain: f64) -> (Vec<f64>, Vec<f64>) {
     let white = |cell| {
         RunSeed {
@@ -59,7 +59,7 @@ fn riv(record: &Record, orders: Orders) -> Fit {
         .unwrap()
 }
 
-/// From a fit, with filters warmed up on its samples.
+/// Starts from a fit, with filters warmed up on its samples.
 fn from_fit(fit: &Fit, warm: &Record, lambda: &[f64], external: bool) -> RefinedRecursion {
     let start = RefinedStart {
         theta: fit.model().theta(),
@@ -106,14 +106,13 @@ fn without_forgetting_it_comes_to_the_batch_estimate() {
             for (i, found) in errors(&recursion).into_iter().enumerate() {
                 let error = batch.parameters()[i].1.standard_error.unwrap();
                 worst = worst.max((recursion.theta()[i] - batch.model().theta()[i]).abs() / error);
-                // The start weighs 5 % of the samples.
+                // The start has the weight of 5 % of the samples.
                 assert!((found / error - 1.0).abs() < 0.02, "{orders}, {i}: {}", found / error);
             }
             assert!((recursion.innovation_variance() / batch.innovation_variance() - 1.0).abs() < 2e-3);
         }
         println!("{orders}: farthest {worst:.3} standard errors");
-        // Of second order: filters and instruments of the past were those of an estimate of the
-        // past.
+        // A second-order effect: past filters and instruments were those of past estimates.
         assert!(worst < 0.15, "{orders}: {worst}");
     }
 }
@@ -174,7 +173,7 @@ fn it_follows_a_jump_of_the_gain() {
     }
 }
 
-/// e and u of sample t, made of white noise.
+/// e and u of sample t, from white noise.
 type Shape = fn(usize, f64) -> (f64, f64);
 
 #[test]
@@ -357,7 +356,7 @@ fn a_missing_output_is_bridged_by_its_prediction() {
         }
     }
     assert_eq!(recursion.theta(), theta);
-    // 780 squares of unit variance have a relative spread of 5 %; the noise forgets the gap in
-    // about five samples.
+    // 780 squares of unit variance have a relative spread of 5 %; the noise model forgets the gap in about five
+    // samples.
     assert!((squares / count - 1.0_f64).abs() < 0.2, "{}", squares / count);
 }

@@ -80,7 +80,7 @@ fn every_fit_is_the_batch_fit_of_its_window() {
             1e3 * slow / f64::from(fits)
         );
         assert_eq!(recursion.failures, 0);
-        // The last step of a search is good to sqrt(1e-12 N) standard errors.
+        // The last step of a search is accurate to sqrt(1e-12 N) standard errors.
         assert!(farthest < 1e-3, "{farthest}");
     }
 }
@@ -142,7 +142,7 @@ fn without_excitation_the_last_theta_stays() {
         recursion.step(still);
     });
     assert_eq!(recursion.theta(), theta);
-    // And it wakes up again.
+    // It then moves again.
     samples(&record).skip(2000).take(1000).for_each(|s| {
         recursion.step(s);
     });
@@ -197,7 +197,7 @@ fn a_window_follows_samples_without_fitting() {
     assert!((0.5..1.6).contains(&ratio), "{ratio}");
 }
 
-/// e and u of sample t, made of white noise.
+/// e and u of sample t, from white noise.
 type Shape = fn(usize, f64) -> (f64, f64);
 
 #[test]

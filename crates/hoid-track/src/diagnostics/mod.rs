@@ -1,9 +1,9 @@
-//! Findings for and against a trace, and what the estimate of one sample is worth.
+//! Verdict on a trace, and the reliability of the estimate of one sample.
 //!
-//! A trace is as good as its start and as its rows. For the start fit all findings of [`hoid_ident::diagnostics`]
-//! count, none as more than a doubt: the recursion may leave it. A change inside the start span is a note for methods
-//! that forget, a doubt for those that do not. For the rows from which the estimate moves on, at most [`ROWS`] are
-//! examined, evenly apart:
+//! A trace depends on its start and on its rows. All findings of [`hoid_ident::diagnostics`] about the start fit
+//! count, as doubts at most: the recursion may leave it. A change inside the start span is a note for methods that
+//! forget and a doubt for the others. Of the rows in which the estimate moves, at most [`ROWS`] are examined, at equal
+//! distances:
 //!
 //! | kind | observation |
 //! |---|---|
@@ -55,22 +55,22 @@ use hoid_numerics::statistics::upper_median;
 use self::operators::{Operator, operator_findings};
 use crate::trace::Trace;
 
-/// Rows that are examined.
+/// Largest number of rows that are examined.
 const ROWS: usize = 400;
 /// VAF in % of the simulated start fit below which it explains little.
 const LEAST_START_VAF: f64 = 20.0;
-/// Shares of steps and samples beyond which something is reported.
+/// Shares of steps and of samples beyond which a finding is reported.
 const SHORTENED: f64 = 0.05;
 const FAULTS: f64 = 0.1;
-/// Standard error over its median beyond which the covariance has blown up.
+/// Ratio of a standard error to its median beyond which the covariance has blown up.
 const BLOWN_UP: f64 = 30.0;
 
 impl Trace {
-    /// Verdict on the trace, on the record that it was made of and with the search that chose its
-    /// orders, where there was one.
+    /// Returns the verdict on the trace, for the record from which it was made and the search that chose its orders,
+    /// if there was one.
     ///
     /// # Errors
-    /// The errors of the residuals of the start fit.
+    /// Errors of the residuals of the start fit.
     pub fn verdict(&self, record: &Record, choice: Option<&Choice>) -> Result<Verdict, IdentError> {
         let mut all = self.start_findings(record, choice)?;
         let rows = self.rows_judged();
@@ -101,7 +101,7 @@ impl Trace {
         Ok(Verdict::of(all))
     }
 
-    /// Findings of the start fit, none graver than a doubt.
+    /// Findings of the start fit, limited to doubts.
     fn start_findings(&self, record: &Record, choice: Option<&Choice>) -> Result<Vec<Finding>, IdentError> {
         let (Some(fit), Some((from, to))) = (self.start(), self.options().start_span(record)) else {
             return Ok(Vec::new());
@@ -109,8 +109,8 @@ impl Trace {
         let span = [record.span(from, to)?];
         let of_start = |finding: &Finding| Finding {
             severity: match finding.kind {
-                // One that forgets is there to follow it; one that weighs the start against all that
-                // comes starts between the two.
+                // A method that forgets follows the change; one that weights the start against all later samples
+                // starts between the two.
                 "not-constant" if !self.options().method.is_model_of_change() => Severity::Note,
                 _ => finding.severity.min(Severity::Doubt),
             },
@@ -133,7 +133,7 @@ impl Trace {
         Ok(all)
     }
 
-    /// Parameters of the last row that are the prior before the first sample.
+    /// Finding of the parameters of the last row that still have their prior values.
     fn supposed_finding(&self) -> Option<Finding> {
         let row = self.len().checked_sub(1)?;
         let operator = self
@@ -156,8 +156,8 @@ impl Trace {
         })
     }
 
-    /// Rows from which the estimate moves on, evenly apart, the last among them. A method that starts
-    /// itself has nothing before its first estimate.
+    /// Rows in which the estimate moves, at equal distances, including the last. A method that starts itself has no
+    /// estimate before its first one.
     fn rows_judged(&self) -> Vec<usize> {
         let from = self.updated_from_s() - self.sample_time().s() / 2.0;
         let mut first = self.times_s().partition_point(|t| *t < from);
@@ -171,9 +171,9 @@ impl Trace {
         rows
     }
 
-    /// A standard error that grew without bound, of the coefficients that have one.
+    /// Finding of a standard error that grew without bound, among the coefficients that have one.
     fn covariance_finding(&self, rows: &[usize]) -> Option<Finding> {
-        // The start may start from nothing.
+        // A start from nothing has large standard errors.
         let rows = &rows[rows.len() / 2..];
         let names = self.parameter_names();
         let estimates: Vec<Vec<Estimate>> = rows.iter().map(|row| self.parameters(*row)).collect();

@@ -9,12 +9,11 @@ use hoid_model::{
 use super::operators::is_other;
 use crate::tracker::Tracker;
 
-/// After a restart the estimate is doubtful for so long, s.
+/// Time after a restart for which the estimate is doubtful, s.
 const UNSETTLED_S: f64 = 10.0;
 
 impl Tracker {
-    /// Reliability of the estimate of this moment, for the operator that [`Tracker::operator`]
-    /// gives.
+    /// Reliability of the current estimate, for the operator that [`Tracker::operator`] returns.
     pub fn level(&self, operator: &Result<OperatorEstimate, NotConvertible>) -> VerdictLevel {
         if self.theta().iter().any(|v| !v.is_finite()) {
             return VerdictLevel::NotDetermined;
@@ -32,7 +31,7 @@ impl Tracker {
         if self.options().method.starts_itself() && self.covariance().is_none() {
             return VerdictLevel::NotDetermined;
         }
-        // Without an error of any of them, nothing states that they are known.
+        // Without a standard error of any of them, they may be unknown.
         let known = |e: &Estimate| e.standard_error.is_some_and(|s| s > 0.0);
         if !self.parameters().iter().any(known) {
             return VerdictLevel::Doubtful;
@@ -65,7 +64,7 @@ impl Tracker {
 
 fn level_of_operator(operator: &OperatorEstimate, sample_time: SampleTime) -> VerdictLevel {
     let mut gains = gain_findings(&[("", *operator)]);
-    // Who answers like a gain has no lead to be determined.
+    // A person who responds like a pure gain has no lead to determine.
     if !is_open(&operator.k_e) && is_open(&operator.k_e_dot) {
         gains.retain(|finding| finding.kind != "undetermined-parameter");
     }

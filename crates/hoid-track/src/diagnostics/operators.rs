@@ -1,5 +1,5 @@
-//! The operators of the rows of a trace: how many there are, whether their gains are known and have
-//! a sign and a lead that a person has, and whether poles and delay are those of one.
+//! Findings about the operators of the rows of a trace: how many rows have one, whether the gains are determined and
+//! have a plausible sign and lead, and whether poles and delay are plausible for a person.
 
 use hoid_ident::diagnostics::{is_open, leads_backwards, neuromuscular_finding};
 use hoid_model::{
@@ -9,10 +9,10 @@ use hoid_model::{
 
 use crate::trace::Trace;
 
-/// For one row, or why there is none.
+/// The operator of one row, or the reason why it has none.
 pub(super) type Operator = Result<OperatorEstimate, NotConvertible>;
 
-/// True if the coefficients are not meant to be an operator.
+/// True if the coefficients do not represent an operator.
 pub(super) fn is_other(operator: &Operator) -> bool {
     matches!(
         operator,
@@ -20,17 +20,16 @@ pub(super) fn is_other(operator: &Operator) -> bool {
     )
 }
 
-/// Shares of the rows beyond which something is reported.
+/// Shares of the rows beyond which a finding is reported.
 const NOT_CONVERTIBLE: f64 = 0.05;
 const MOST: f64 = 0.5;
 const QUARTER: f64 = 0.25;
 const SIGN: f64 = 0.02;
 const NEGATIVE_LEAD: f64 = 0.1;
-/// Upper bound of omega_nm of the physical recursions as a share of the Nyquist frequency, less
-/// rounding.
+/// Upper bound of omega_nm in the physical recursions as a share of the Nyquist frequency, less rounding.
 const AT_FASTEST: f64 = 0.4999;
 
-/// Findings about the operators in the rows of a trace.
+/// Returns the findings about the operators of the rows of a trace.
 pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Finding> {
     let mut all = Vec::new();
     if operators.is_empty() || operators.iter().all(is_other) {
@@ -46,7 +45,7 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
             "{:.0} % of the rows do not correspond to any operator{reason}",
             100.0 * lacking
         );
-        // A gain of zero in all rows is not a model of another form: nothing was found.
+        // A gain of zero in all rows is not a model of another form: no response was found.
         let nothing = operators.iter().all(|o| matches!(o, Err(NotConvertible::ZeroGain)));
         all.push(match nothing {
             true => Finding::undetermined("not-convertible", words),
@@ -55,7 +54,7 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
     }
     let rows_with = |is: &dyn Fn(&OperatorEstimate) -> bool| share(found.iter().filter(|o| is(o)).count(), found.len());
     let remembers = trace.options().method.memories().is_some();
-    // Where the response is known, gain and lead are one way to report it, which may not be theirs.
+    // If the response is known, gain and lead are one description of it, which need not be the right one.
     let of_response = |finding: Finding| match trace.response_is_known {
         true => Finding {
             severity: Severity::Note,
@@ -99,7 +98,7 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
     all
 }
 
-/// A gain that changes its sign: no one does, a channel that was turned over does.
+/// Finding of a gain that changes its sign: people do not change it, but an inverted channel does.
 fn sign_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
     let beyond = |e: &Estimate, sign: f64| e.standard_error.is_some_and(|s| sign * e.value > 3.0 * s);
     let positive = rows_with(&|o| beyond(&o.k_e, 1.0));
@@ -116,7 +115,7 @@ fn sign_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
     })
 }
 
-/// A lead below zero: no one has one; a gain and a lead that represent a lag do.
+/// Finding of a negative lead: people have none, but gain and lead that approximate a lag can have one.
 fn lead_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
     let negative = rows_with(&leads_backwards);
     (negative > NEGATIVE_LEAD).then(|| {
@@ -135,7 +134,7 @@ fn lead_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
 /// Share of the rows whose operator has a property.
 type ShareOfRows<'a> = dyn Fn(&dyn Fn(&OperatorEstimate) -> bool) -> f64 + 'a;
 
-/// Gains that are open in most rows. With a memory it may be longer; a method without one has no such option.
+/// Finding of gains that are undetermined in most rows. A method with a memory is advised to use a longer one.
 fn gains_over_rows(rows_with: &ShareOfRows<'_>, remembers: bool) -> Option<Finding> {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     let both = rows_with(&|o| is_open(&o.k_e) && is_open(&o.k_e_dot));

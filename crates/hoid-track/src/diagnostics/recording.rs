@@ -1,5 +1,5 @@
-//! Information of the recording itself about a trace: what the guard did, an idle head, and whether
-//! the last seconds are followed by the last row.
+//! Findings of the recording about a trace: what the guard did, an idle head, and whether the last row follows the
+//! last seconds.
 
 use hoid_ident::diagnostics::{is_open, leads_backwards, operator_step};
 use hoid_model::{Finding, Record};
@@ -10,20 +10,20 @@ use crate::{
     trace::Trace,
 };
 
-/// Share of samples held back beyond which it is a doubt.
+/// Share of held-back samples beyond which the finding is a doubt.
 const HELD: f64 = 0.01;
-/// Spans that are named one by one.
+/// Largest number of spans that are named one by one.
 const NAMED: usize = 3;
-/// Lengths of the end of the record at which the last row is held against it, s.
+/// Lengths of the end of the record with which the last row is compared, s.
 const LAST_S: [f64; 2] = [16.0, 30.0];
-/// Changes from which there are many, and s of the record for each.
+/// Number of changes from which there are many, and the least length of record per change, s.
 const MANY: usize = 3;
 const FOR_EACH_S: f64 = 30.0;
-/// p-value of one of ten comparisons below which they differ.
+/// p-value of one of ten comparisons below which the two differ.
 const UNLIKELY: f64 = 1e-4;
 
 impl Trace {
-    /// Actions of the guard.
+    /// Findings from the actions of the guard.
     pub(super) fn guard_findings(&self) -> Vec<Finding> {
         let mut all = Vec::new();
         let of = |is: &dyn Fn(&TrackFault) -> bool| -> Vec<TrackFault> {
@@ -75,8 +75,8 @@ impl Trace {
         all
     }
 
-    /// Where e and u stay constant and the estimate continues, which was requested: nothing arrives there, and its
-    /// error bars go to zero with the innovations ([`crate::stationary`]).
+    /// Finding of spans in which e and u stay constant and the estimate continues, as requested: they carry no
+    /// information, and the error bars go to zero with the innovations ([`crate::stationary`]).
     pub(super) fn learnt_at_rest(&self, record: &Record) -> Option<Finding> {
         if self.options().method.guard() != Some(GuardChoice::No) {
             return None;
@@ -97,13 +97,13 @@ impl Trace {
         })
     }
 
-    /// Evidence of the last seconds of the record against the last row: a delay that is another now, or an estimate
-    /// that has not come back. A step of [`operator_step`] that is [`UNLIKELY`] next to its own error and that of the
-    /// row; of a delay that is a whole number of samples, beyond one and a half.
+    /// Compares the last seconds of the record with the last row: the delay may have changed, or the estimate may not
+    /// have come back. A finding is a step of [`operator_step`] that is [`UNLIKELY`], given its own error and that of
+    /// the row; for a delay in whole samples, a step beyond one and a half samples.
     pub(super) fn not_followed(&self, record: &Record) -> Option<Finding> {
         let row = self.len().checked_sub(1)?;
         let operator = self.operator(row).ok()?;
-        // A gain and a lead that represent another form answer otherwise than the estimate does.
+        // Gain and lead that approximate another form have another response than the estimate.
         if self.response_is_known && (is_open(&operator.k_e) || leads_backwards(&operator)) {
             return None;
         }
@@ -146,7 +146,7 @@ impl Trace {
         worst.map(|(_, words)| Finding::doubt("not-followed", words))
     }
 
-    /// An estimate that is not valid at the end, whatever it was before.
+    /// Finding of an estimate that is not valid at the end, whatever it was before.
     pub(super) fn last_row_finding(&self) -> Option<Finding> {
         let operator = self.operator(self.len().checked_sub(1)?).ok()?;
         let nothing = is_open(&operator.k_e) && is_open(&operator.k_e_dot) && !self.response_is_known;
@@ -158,7 +158,7 @@ impl Trace {
         })
     }
 
-    /// More changes than people make.
+    /// Finding of more changes than people make.
     pub(super) fn many_changes_finding(&self) -> Option<Finding> {
         let changes = self.changes().len();
         let length = self.times_s().last()? - self.times_s().first()?;
@@ -173,7 +173,7 @@ impl Trace {
         })
     }
 
-    /// An idle head of the record.
+    /// Finding of an idle head of the record.
     pub(super) fn idle_finding(&self, record: &Record) -> Option<Finding> {
         let idle_s = self.idle_s();
         let (from, _) = self.options().start_span(record)?;
@@ -193,7 +193,7 @@ impl Trace {
     }
 }
 
-/// The first spans as text.
+/// Names the first spans as text.
 fn named(faults: &[TrackFault]) -> String {
     let one = |f: &TrackFault| format!("{} in {} at {:.2} to {:.2} s", f.kind, f.channel, f.from_s, f.to_s);
     let mut text = faults.iter().take(NAMED).map(one).collect::<Vec<_>>().join("; ");

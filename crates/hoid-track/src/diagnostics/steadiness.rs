@@ -1,7 +1,7 @@
-//! Whether the response is constant where the trace reports no change, and whether e answers to u.
+//! Tests whether the response is constant where the trace reports no change, and whether e responds to u.
 //!
-//! The gains of the basis and the delay are fitted to each stretch between two declared changes, and held against
-//! jumps, drifts and sways ([`hoid_ident::diagnostics::unsteady`]).
+//! The gains of the basis and the delay are fitted to each stretch between two declared changes, and tested for jumps,
+//! drifts and slow oscillations ([`hoid_ident::diagnostics::unsteady`]).
 
 use std::ops::Range;
 
@@ -11,19 +11,20 @@ use hoid_model::{Finding, Record};
 use super::structure::columns;
 use crate::trace::Trace;
 
-/// Probability below which a response is not the same throughout a stretch. Instants of a jump, and frequencies and phases
-/// of a sway, are counted one by one though neighbours are alike: of steady people less than one in a hundred is below.
+/// Probability below which a response varies within a stretch. Instants of a jump, and frequencies and phases of an
+/// oscillation, are counted one by one although neighbours are correlated: less than one in a hundred steady people is
+/// below it.
 const UNLIKELY_STEP: f64 = 0.02;
 const UNLIKELY_DRIFT: f64 = 0.01;
 const UNLIKELY_SWAY: f64 = 0.05;
-/// Share of what older e and u leave of e that the latest u explains, below which e does not answer: in loops it is
-/// above one half, of two runs with the same forcing below .03.
+/// Share of the part of e unexplained by older e and u that the latest u explains; below it e does not respond to u.
+/// In closed loops it is above one half, for two runs with the same forcing below .03.
 const NO_ANSWER: f64 = 0.05;
-/// A declared change is in neither of the stretches next to it for so long, s.
+/// Time before and after a declared change that belongs to neither stretch, s.
 const ABOUT_S: f64 = 5.0;
 
 impl Trace {
-    /// The stretches in which no change is reported, in samples of the record.
+    /// Stretches without a reported change, in samples of the record.
     fn stretches(&self, record: &Record) -> Vec<Range<usize>> {
         let ts = self.sample_time().s();
         let sample = |t: f64| ((t - record.time_s(0)) / ts).round().clamp(0.0, record.len() as f64) as usize;
@@ -44,7 +45,7 @@ impl Trace {
         all
     }
 
-    /// Test result for each stretch, the most significant first; p-values count the stretches.
+    /// Test result for each stretch, the most significant first; the p-values account for the number of stretches.
     pub(super) fn unsteady(&self, record: &Record) -> Vec<Unsteady> {
         let Some((_, signals)) = self.signals(record) else {
             return Vec::new();
@@ -64,8 +65,8 @@ impl Trace {
         all
     }
 
-    /// The response goes another way than the trace reports. A method that forgets, or that has a model of how people
-    /// drift, does not report that they are constant between its changes.
+    /// Finding of a response that varies otherwise than the trace reports. A method that forgets, or that models how
+    /// people drift, does not assume that they are constant between changes.
     pub(super) fn unsteady_finding(&self, record: &Record) -> Option<Finding> {
         self.options().method.lag_of_basis_s()?;
         let unlikely = |found: &Unsteady| match found.course {
@@ -104,12 +105,12 @@ impl Trace {
         ))
     }
 
-    /// How e answers to u.
+    /// Response of e to u.
     pub(super) fn answer(&self, record: &Record) -> Option<LoopResponse> {
         answer(record.input(), record.output(), 0, self.sample_time().s())
     }
 
-    /// u does not come back in e.
+    /// Finding that e does not respond to u.
     pub(super) fn answer_finding(&self, record: &Record) -> Option<Finding> {
         let found = self.answer(record).filter(|found| found.share < NO_ANSWER)?;
         Some(Finding::doubt(

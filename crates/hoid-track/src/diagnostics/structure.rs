@@ -1,9 +1,9 @@
-//! Whether the operator of the last row has the structure that the person has.
+//! Tests whether the operator of the last row has the structure of the person.
 //!
-//! The numerator, corrections of the poles and of the delay, and a level are what the basis of people can estimate;
-//! together they span the six signals of its filter, and one after its lag once more is the correction of the lag,
-//! where that is all that is missed. Whether the errors before, since the last change, carry more information about u
-//! is the question ([`hoid_ident::diagnostics::residual_response()`]).
+//! The basis of people can estimate the numerator, corrections of the poles and of the delay, and a level; together
+//! they span the six signals of its filter. The last of these filtered once more by the lag gives a correction of the
+//! lag, for the case that only the lag is wrong. The test asks whether earlier errors, since the last change, carry
+//! more information about u ([`hoid_ident::diagnostics::residual_response()`]).
 
 use hoid_core::adaptive::basis::{Basis, Point, Signals};
 use hoid_ident::diagnostics::{ResidualResponse, residual_response};
@@ -11,18 +11,18 @@ use hoid_model::{Finding, Record};
 
 use crate::{guard::GuardKind, trace::Trace};
 
-/// Probability below which a structure is missed.
+/// Probability below which part of the structure is missing.
 const UNLIKELY: f64 = 1e-3;
-/// Probability from which another lag explains what is left.
+/// Probability from which another lag explains the residual.
 const OF_LAG: f64 = 0.02;
-/// Seconds that are examined, at most, and at the start not: the filter is at rest there.
+/// Longest span that is examined, s, and the part left out at the start, where the filter is at rest.
 const LONGEST_S: f64 = 120.0;
 const SETTLING_S: f64 = 10.0;
-/// Lag of the basis where the method has none of its own, s.
+/// Lag of the basis for methods without one, s.
 const LAG_S: f64 = 3.0;
 
 impl Trace {
-    /// Evidence of the record against the structure.
+    /// Finding of the record against the structure.
     pub(super) fn missed_structure(&self, record: &Record) -> Option<Finding> {
         let found = self.residual_response(record)?;
         (found.p_value < UNLIKELY).then(|| {
@@ -39,7 +39,7 @@ impl Trace {
         })
     }
 
-    /// The test itself, where the method has a basis.
+    /// The test itself, for methods with a basis.
     pub(super) fn residual_response(&self, record: &Record) -> Option<ResidualResponse> {
         self.options().method.lag_of_basis_s()?;
         let ts = self.sample_time().s();
@@ -61,7 +61,7 @@ impl Trace {
         of(&columns)
     }
 
-    /// From when the filters of the basis have settled: what was not tracking is in them until it has faded.
+    /// Time from which the filters of the basis have settled: samples without tracking remain in them until then.
     pub(super) fn settled_s(&self, record: &Record) -> f64 {
         let outliers = [GuardKind::Outlier, GuardKind::Step];
         let hostile = self.faults().iter().filter(|fault| !outliers.contains(&fault.kind));
@@ -88,7 +88,7 @@ impl Trace {
     }
 }
 
-/// A signal filtered by the lag once more: with it the lag of the basis has a correction, as poles and delay have.
+/// Filters a signal by the lag once more: the basis then has a correction of the lag, as of poles and delay.
 fn slower(signal: &[f64], lag_s: f64, sample_time_s: f64) -> Vec<f64> {
     let pole = (-sample_time_s / lag_s).exp();
     let step = |state: &mut f64, z: &f64| {
@@ -98,7 +98,7 @@ fn slower(signal: &[f64], lag_s: f64, sample_time_s: f64) -> Vec<f64> {
     signal.iter().scan(0.0, step).collect()
 }
 
-/// Rows as columns.
+/// Transposes rows to columns.
 pub(super) fn columns<const N: usize>(rows: &[[f64; N]]) -> Vec<Vec<f64>> {
     (0..N).map(|j| rows.iter().map(|row| row[j]).collect()).collect()
 }
@@ -125,7 +125,7 @@ mod tests {
         simulator.run(seed, false).unwrap()
     }
 
-    /// The same with another response to the error on its way: this share of K_e, so many samples later.
+    /// The same record with an additional response to the error: this share of K_e, this many samples later.
     fn with_echo(record: &Record, share: f64, later: usize) -> Record {
         let e = record.input();
         let echo = |k: usize| k.checked_sub(later).map_or(0.0, |k| share * 0.09 * e[k]);
@@ -156,7 +156,7 @@ mod tests {
         let record = run(0).span(0.0, 25.0).unwrap();
         let trace = track(&record, &TrackOptions::default_for(Method::adaptive(), 29), 50).unwrap();
         assert_eq!(trace.residual_response(&record), None);
-        // A method without this basis is not asked.
+        // A method without this basis is not tested.
         let record = run(0);
         let trace = track(&record, &TrackOptions::default_for(Method::rls(), 29), 50).unwrap();
         assert_eq!(trace.missed_structure(&record), None);

@@ -22,8 +22,7 @@ fn judged(record: &Record, options: &TrackOptions) -> Verdict {
     track(record, options, 10).unwrap().verdict(record, None).unwrap()
 }
 
-/// The recursion of the text, without a guard, reported 11.3293 ± .0096 rad/s of a person who had
-/// gone.
+/// The recursion of the thesis, without a guard, reported 11.3293 ± .0096 rad/s for a person who had left.
 #[test]
 fn a_rest_from_which_is_learnt_is_a_doubt() {
     let record = simulated(Condition::C1);
@@ -57,7 +56,7 @@ fn a_method_that_starts_itself_says_what_it_supposes() {
     assert_eq!(tracker.level(&tracker.operator()), VerdictLevel::Trustworthy);
 }
 
-/// A change of nothing.
+/// A change without any difference.
 fn change() -> crate::Change {
     let same = [Estimate::fixed(1.0); 2];
     crate::Change {
@@ -75,7 +74,7 @@ fn change() -> crate::Change {
     }
 }
 
-/// An output of zero has no gain: that is not a doubtful operator, it is none.
+/// An output of zero has no gain: the operator is not doubtful, there is none.
 #[test]
 fn an_output_that_is_zero_is_not_determined() {
     let record = simulated(Condition::C1);
@@ -87,7 +86,7 @@ fn an_output_that_is_zero_is_not_determined() {
     assert_eq!(verdict.level, VerdictLevel::NotDetermined, "{verdict}");
 }
 
-/// A trace with an operator in each row, as recursions in its parameters have it.
+/// A trace with an operator in each row, as recursions in physical parameters have it.
 fn in_the_operators_parameters(record: &Record, every: usize) -> Trace {
     let options = TrackOptions::default_for(Method::rpem(), 29)
         .with(&[("memory", "20s")])
@@ -97,7 +96,7 @@ fn in_the_operators_parameters(record: &Record, every: usize) -> Trace {
     trace
 }
 
-/// A trace of C1 whose rows are as they are wanted.
+/// A trace of C1 with changed rows.
 fn changed(change: impl FnOnce(&mut Trace)) -> Vec<&'static str> {
     let record = simulated(Condition::C1);
     let mut trace = in_the_operators_parameters(&record, 100);
@@ -206,7 +205,7 @@ fn the_output_of_another_run_is_told() {
     assert!(!kinds(&judged(&record, &typical())).contains(&"no-answer"));
 }
 
-/// u is scaled after the person: what the loop does of it is another matter.
+/// u is scaled after the person; the effect in the loop is another matter.
 #[test]
 fn a_gain_that_drifts_and_one_that_sways_are_told() {
     let record = simulated(Condition::C1);
@@ -234,7 +233,7 @@ fn who_answers_like_a_gain_is_trustworthy_and_no_remedy_is_refused() {
     let verdict = lead_is_open(in_the_operators_parameters(&record, 10));
     let found = verdict.findings().iter().find(|f| f.kind == "undetermined-parameter");
     assert_eq!(found.map(|f| f.severity), Some(Severity::Note), "{verdict}");
-    // Without a memory none is asked to be longer.
+    // Without a memory, no longer one is advised.
     assert!(
         !lead_is_open(track(&record, &typical(), 10).unwrap())
             .to_string()

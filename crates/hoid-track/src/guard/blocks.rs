@@ -1,4 +1,4 @@
-//! The end of a block: what is judged, learnt and kept once a second.
+//! Tests, learning and snapshots at the end of a block, once a second.
 
 use hoid_core::guard::{
     channel::ChannelGuard,
@@ -9,7 +9,7 @@ use super::{FLOOR, Guard, LARGEST, LEAST_AGE, SOUND_EVERY, event::GuardKind};
 use crate::recursion::Recursion;
 
 impl Guard {
-    /// A second is over.
+    /// Ends a block.
     #[cold]
     pub(super) fn end_block(&mut self, recursion: &mut dyn Recursion) {
         self.channels.iter_mut().for_each(ChannelGuard::end_block);
@@ -66,7 +66,7 @@ impl Guard {
         }
     }
 
-    /// The tails of signals without prior knowledge start to be learnt.
+    /// Starts to learn the tails of signals without prior knowledge.
     fn learn_tails(&mut self, block: &Block) {
         if !self.profile.is_known() {
             for (channel, means) in self.channels.iter_mut().zip(block.differences) {
@@ -90,7 +90,7 @@ impl Guard {
         }
     }
 
-    /// Puts the recursion back to before the last samples of which there were so many.
+    /// Restores the recursion to its state before the last `samples` samples, or earlier.
     fn go_back(&self, recursion: &mut dyn Recursion, samples: u64) {
         let least = samples.max(LEAST_AGE * u64::from(self.block_length));
         let sound = (0..2)
@@ -102,7 +102,7 @@ impl Guard {
         };
     }
 
-    /// Limits that follow from the long-run values.
+    /// Sets the limits that follow from the long-run values.
     pub(super) fn set_limits(&mut self) {
         if !self.profile.is_known() {
             return;
@@ -124,7 +124,7 @@ impl Guard {
     }
 }
 
-/// The kind and the channel of a trouble.
+/// Returns the kind and the channel of a trouble.
 fn named(trouble: Trouble) -> (GuardKind, usize) {
     match trouble {
         Trouble::FrozenInput => (GuardKind::Frozen, 0),

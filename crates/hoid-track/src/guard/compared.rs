@@ -1,6 +1,6 @@
-//! When the model of the start is compared with the estimate: in the first [`COMPARED`] of every
-//! [`EVERY`] blocks, so that it costs little, and in all blocks for [`SUSPECT_FOR`] after something
-//! unusual. Its filters start at rest, and have [`SETTLING`] blocks to forget that.
+//! Schedule of the comparison of the estimate with the model of the start: in the first [`COMPARED`] of every
+//! [`EVERY`] blocks, which keeps the cost low, and in all blocks for [`SUSPECT_FOR`] after something unusual. The
+//! filters of the model start at rest and have [`SETTLING`] blocks to settle.
 
 use hoid_core::{
     delay::DelayLine,
@@ -11,11 +11,11 @@ use hoid_core::{
     state::{State, visit_all},
 };
 
-/// Blocks of a round, and how many of them are compared.
+/// Blocks of a round, and number of them that are compared.
 const EVERY: u32 = 44;
 const COMPARED: u32 = 11;
 const SETTLING: u32 = 3;
-/// Blocks that are compared after something unusual.
+/// Number of blocks that are compared after something unusual.
 const SUSPECT_FOR: u32 = 30;
 
 /// The model of the start with its delay line.
@@ -23,7 +23,7 @@ const SUSPECT_FOR: u32 = 30;
 pub(super) struct Reference {
     model: ReferenceModel,
     delay: DelayLine<Vec<f64>>,
-    /// Blocks of the round that are over, and how many are compared in it.
+    /// Blocks of the round so far, and number of blocks that are compared in it.
     over: u32,
     compared: u32,
 }
@@ -47,14 +47,13 @@ impl Reference {
         }
     }
 
-    /// A round starts, with all at rest.
+    /// Starts a round, with all filters at rest.
     pub fn begin(&mut self) {
         self.model.reset();
         (self.over, self.compared) = (0, SUSPECT_FOR);
     }
 
-    /// Something is unusual: what is reported about this block does not count, and the next ones
-    /// are compared.
+    /// Reports something unusual: this block does not count, and the next ones are compared.
     pub fn suspect(&mut self) {
         if self.over >= self.compared {
             self.begin();
@@ -73,10 +72,10 @@ impl Reference {
         }
     }
 
-    /// A block is over; true if the estimate has gone diverged.
+    /// Ends a block; true if the estimate has diverged.
     pub fn end_block(&mut self, block: &Block, length: u32) -> bool {
         self.over += 1;
-        // Blocks with samples that were held back carry no information.
+        // Blocks with held-back samples carry no information.
         let counts = self.over > SETTLING && self.over <= self.compared && block.innovations == length;
         let astray = if counts {
             self.model.end_block(block.innovation)

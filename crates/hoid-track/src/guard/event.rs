@@ -1,27 +1,27 @@
-//! Events found by the guard, and what it did.
+//! Events found by the guard, and its actions.
 
 use hoid_model::SampleTime;
 
-/// The findings.
+/// Kind of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GuardKind {
-    /// One to a few samples that the signal does not predict and that it comes back from.
+    /// One to a few samples that the signal does not predict and after which it returns.
     Outlier,
-    /// A jump that the signal does not come back from.
+    /// A jump after which the signal does not return.
     Step,
     /// Samples that are not numbers, for longer than an outlier lasts.
     Missing,
-    /// A signal 30 times as large as it was.
+    /// A signal 30 times as large as before.
     Level,
     /// A signal that stays constant.
     Frozen,
-    /// Two signals that are nearly silent.
+    /// Both signals are nearly silent.
     Idle,
-    /// e is as u was, and u as e was.
+    /// e is as u was before, and u as e was.
     Swapped,
-    /// A model that predicts u worse than the past of u does.
+    /// The model predicts u worse than the past of u does.
     Misfit,
-    /// An estimate that predicts u worse than the start fit does.
+    /// The estimate predicts u worse than the start fit does.
     Diverged,
 }
 
@@ -37,18 +37,18 @@ hoid_model::named_choice!(GuardKind, "kind of fault", 9, {
     Diverged => "astray",
 });
 
-/// The actions taken.
+/// Action of the guard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GuardAction {
-    /// Predictions replaced the samples; the estimate stayed.
+    /// Predictions replaced the samples; the estimate stayed constant.
     Held,
-    /// Held back at first, then taken as they came, as if nothing had been.
+    /// Held back at first, then taken as recorded; the result is that without a guard.
     Accepted,
     /// The estimate stays constant from here on.
     Paused,
     /// The estimate, which had stayed constant, moves again.
     Resumed,
-    /// The estimate moves again, from where it was before the span.
+    /// The estimate moves again, from its state before the span.
     Restarted,
     /// The estimate moves again, from the start of the recursion.
     Relearnt,
@@ -63,7 +63,7 @@ hoid_model::named_choice!(GuardAction, "action", 6, {
     Relearnt => "relearnt",
 });
 
-/// Which signal.
+/// Signal of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GuardChannel {
     /// e.
@@ -80,43 +80,43 @@ hoid_model::named_choice!(GuardChannel, "channel", 3, {
     Both => "e, u",
 });
 
-/// A span that was not as it should be, and the actions taken, as told at one of its samples or after it.
+/// A faulty span and the action taken, as reported at one of its samples or after it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GuardEvent {
-    /// The findings.
+    /// Kind of the event.
     pub kind: GuardKind,
-    /// In which signal.
+    /// Signal of the event.
     pub channel: GuardChannel,
-    /// Samples since the first one of it.
+    /// Number of samples since the first one of the span.
     pub ago: u64,
-    /// Samples of it so far.
+    /// Number of samples of the span so far.
     pub samples: u64,
-    /// Largest distance from the prediction for outliers and steps, largest magnitude for levels, in
-    /// the unit of the signal; zero if it has no size.
+    /// Largest distance from the prediction for outliers and steps, largest magnitude for levels, in the unit of the
+    /// signal; zero for other kinds.
     pub size: f64,
-    /// The actions taken.
+    /// Action of the guard.
     pub action: GuardAction,
 }
 
-/// A span of a run that was not as it should be, and the actions taken.
+/// A faulty span of a run, and the action taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackFault {
-    /// The findings.
+    /// Kind of the event.
     pub kind: GuardKind,
-    /// In which signal.
+    /// Signal of the event.
     pub channel: GuardChannel,
     /// Time of its first sample, s.
     pub from_s: f64,
     /// Time of the sample after its last, s.
     pub to_s: f64,
-    /// As [`GuardEvent::size`].
+    /// Size, as [`GuardEvent::size`].
     pub size: f64,
-    /// The actions taken.
+    /// Action of the guard.
     pub action: GuardAction,
 }
 
 impl GuardEvent {
-    /// In times, for what was reported at a sample at `now_s`.
+    /// Converts to times, for an event that was reported at `now_s`.
     pub fn at(&self, now_s: f64, sample_time: SampleTime) -> TrackFault {
         let ts = sample_time.s();
         let from_s = now_s - self.ago as f64 * ts;
@@ -132,12 +132,12 @@ impl GuardEvent {
 }
 
 impl TrackFault {
-    /// True for a span in which the estimate stayed constant, of which the end is not known.
+    /// True for a span in which the estimate stayed constant and whose end is not known.
     pub fn is_open(&self) -> bool {
         self.action == GuardAction::Paused
     }
 
-    /// Puts a fault after those before it; the end of a pause takes the place of its start.
+    /// Appends a fault to those before it; the end of a pause replaces its start.
     pub(crate) fn put(self, behind: &mut Vec<Self>) {
         if behind.last().is_some_and(Self::is_open) {
             behind.pop();

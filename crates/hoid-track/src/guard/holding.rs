@@ -1,4 +1,4 @@
-//! Samples that are held back, and the treatment of them: taken again, or taken as they came.
+//! Held-back samples, and what happens to them afterwards: interpolated, or taken as recorded.
 
 use hoid_core::guard::profile::CHANNELS;
 
@@ -9,7 +9,7 @@ use super::{
 use crate::recursion::{Recursion, Sample};
 
 impl Guard {
-    /// A sample that is held back, or the one with which the signals are back.
+    /// Handles a sample that is held back, or the one with which the signals have returned.
     #[cold]
     pub(super) fn hold(
         &mut self,
@@ -78,8 +78,8 @@ impl Guard {
         }
     }
 
-    /// True for an excursion of u, over with sample x at a place of the ring, that a hand makes: out by a jump, and
-    /// back over several samples.
+    /// True for an excursion of u, ended by sample x at a place of the ring, that a hand can make: it leaves by a jump
+    /// and returns over several samples.
     fn is_pulse(&self, place: usize, held: u32, size: f64, x: f64, largest_move: f64) -> bool {
         let Some(last) = place.checked_sub(1).map(|k| self.ring[k].values[1]) else {
             return false;
@@ -90,8 +90,8 @@ impl Guard {
             && (x - last).abs() <= 0.5 * size
     }
 
-    /// Both signals are back: the recursion takes the samples since before they went, those that were
-    /// held back on a parabola from the last good one and its slope to the next good one.
+    /// Handles the return of both signals: the recursion takes the samples again from before the excursion, with the
+    /// held-back ones on a parabola through the last good one, with its slope, and the next good one.
     fn take_again(&mut self, recursion: &mut dyn Recursion, sample: Sample) -> Guarded {
         for c in 0..CHANNELS {
             let mut last = self.channels_before[c].last();
@@ -130,9 +130,9 @@ impl Guard {
                 u: raw.values[1],
                 ..sample
             };
-            // e acts only after the delay: a current innovation does not know it. A tenth of a second of interpolated u
-            // moves an estimate by less than the clock of births of a bank of hypotheses does that is stopped for as
-            // long.
+            // e acts only after the delay, so that the current innovation does not contain it. A tenth of a second of
+            // interpolated u moves an estimate by less than stopping the clock of births of a bank of hypotheses for
+            // as long.
             outcome = Some(if raw.moves {
                 recursion.step(taken)
             } else {
@@ -143,7 +143,7 @@ impl Guard {
         Guarded { outcome, held: false }
     }
 
-    /// A signal that has been held back for too long to be an outlier.
+    /// Handles a signal that has been held back for too long to be an outlier.
     fn lasting(&mut self, recursion: &mut dyn Recursion, c: usize, sample: Sample) -> Guarded {
         let x = [sample.e, sample.u];
         let (held, size) = (u64::from(self.channels[c].held()), self.channels[c].size());
@@ -184,9 +184,9 @@ impl Guard {
                 [_, false] => recursion.bridge(taken),
             }
         }
-        // e jumps with its target and moves as before, while the person answers only after their delay.
+        // e jumps with its target and moves as before, while the person responds only after the delay.
         let ring = &self.ring[..self.in_ring];
-        // More is held than is there only in numbers that were changed.
+        // More is held than there is only if the saved numbers were changed.
         let first = self.in_ring.saturating_sub(held as usize);
         let behind = ring[first..].iter().map(|raw| raw.values[0]);
         let is_target = c == 0 && !ring.iter().any(|raw| raw.held[1]) && self.channels_before[0].moves_as_usual(behind);

@@ -1,5 +1,5 @@
-//! A guard in front of a recursion: what is done with samples and spans that no tracking makes. What they are is
-//! reported by [`hoid_core::guard`].
+//! A guard in front of a recursion: treatment of samples and spans that no tracking produces. [`hoid_core::guard`]
+//! detects them.
 //!
 //! | found | what reaches the recursion | estimate | afterwards |
 //! |---|---|---|---|
@@ -10,25 +10,24 @@
 //! | frozen, idle, larger or rescaled, swapped, misfit (by blocks of a second) | the samples, into the filters alone | is put back to before it | continues from there once the span is over and the filters have settled |
 //! | an estimate that has gone diverged by [`hoid_core::guard::reference`] | the samples, into the filters alone | is put back to the start | continues from there once the filters have settled |
 //!
-//! **Steps and pulses.** `e = r - y`: a step of the target moves e by the same within one sample, and y continues; so
-//! does u, for the person answers after their delay. A jump of e that stays, after which e moves as it did while u
-//! continues as predicted, is tracking and is not told. A sensor that is disturbed lets go as fast as it took hold:
-//! what comes back by a jump is an outlier. A hand that is fast goes out of a dead zone at once but comes back over
-//! several samples: an excursion of u of [`PULSE_S`] or more within [`PULSE`] times its mean magnitude, whose last step
-//! is within what u moves anyway, is a pulse, taken as it came.
+//! **Steps and pulses.** `e = r - y`: a step of the target moves e by the same amount within one sample, and y
+//! continues; so does u, since the person responds after the delay. A jump of e that stays, after which e moves as
+//! before while u continues as predicted, is tracking and is not reported. A disturbed sensor recovers as fast as it
+//! failed: an excursion that ends by a jump is an outlier. A fast hand leaves a dead zone at once but returns over
+//! several samples: an excursion of u of [`PULSE_S`] or more within [`PULSE`] times its mean magnitude, whose last
+//! step is within the normal moves of u, is a pulse and is taken as recorded.
 //!
-//! **Putting back.** The numbers of a recursion are few ([`hoid_core::state`]). They are kept when a
-//! sample is first held back, every [`SOUND_EVERY`] blocks in which all was well (the last two are
-//! kept, of which the one is taken that is older than what the rules need to see a trouble), and at
-//! the start. The ring of samples that may have to be taken again is [`LONGEST_S`] long. Memory is
-//! bounded, nothing is allocated once the snapshots have their size.
+//! **Restoring.** The numbers of a recursion are few ([`hoid_core::state`]). They are stored when a sample is first
+//! held back, every [`SOUND_EVERY`] blocks without trouble (the last two are kept; the one that is older than the time
+//! in which the rules detect a trouble is used), and at the start. The ring of samples that may have to be taken again
+//! is [`LONGEST_S`] long. Memory is bounded, and nothing is allocated once the snapshots have their size.
 //!
-//! **Filters have settled** after the delay and [`SETTLE_S`]: the slowest poles of people's
-//! neuromuscular systems (omega zeta of 2 to 4 rad/s) leave less than 2 % after that time.
+//! **Filters have settled** after the delay and [`SETTLE_S`]: the slowest poles of people's neuromuscular systems
+//! (omega zeta of 2 to 4 rad/s) leave less than 2 % after that time.
 //!
 //! A misfit, exchanged channels or a larger level that last for [`GIVEN_UP_S`] are accepted as the new signals: the
-//! recursion restarts from its start, and the typical levels are estimated again. When after that the signals are as
-//! they were before, so is the default. Silence has no end.
+//! recursion restarts from its start, and the typical levels are estimated again. If the signals then return to their
+//! former levels, the former typical levels are used again. Silence has no time limit.
 //!
 //! | file | contents |
 //! |---|---|
@@ -67,36 +66,36 @@ pub use event::{GuardAction, GuardChannel, GuardEvent, GuardKind, TrackFault};
 pub use options::{GuardChoice, GuardOptions};
 pub(crate) use snapshot::Snapshot;
 
-/// Longest run of samples that is held back, s.
+/// Longest run of held-back samples, s.
 const LONGEST_S: f64 = 0.1;
 /// Settling time beyond the delay, s.
 pub(crate) const SETTLE_S: f64 = 2.0;
 /// Length of a block, s.
 const BLOCK_S: f64 = 1.0;
-/// Sound blocks between two snapshots, and the least age in blocks of one that is gone back to.
+/// Sound blocks between two snapshots, and least age in blocks of the snapshot that is restored.
 const SOUND_EVERY: u32 = 5;
 const LEAST_AGE: u64 = 4;
-/// Magnitude in units of the typical mean magnitude beyond which a signal is not what it was.
+/// Magnitude, in units of the typical mean magnitude, beyond which the level of a signal has changed.
 const LARGEST: f64 = 30.0;
-/// Least limit of outliers in units of the mean magnitude: e passes a low-pass filter before it
-/// meets an innovation, u is in the innovation itself.
+/// Lower limit of outliers in units of the mean magnitude: e passes a low-pass filter before it reaches an innovation,
+/// u enters the innovation directly.
 const FLOOR: [f64; CHANNELS] = [0.3, 1e-3];
-/// A pulse of the hand takes no less, s, and goes no further, in units of the mean magnitude.
+/// Shortest pulse of the hand, s, and its largest size in units of the mean magnitude.
 const PULSE_S: f64 = 0.03;
 const PULSE: f64 = 6.0;
-/// A misfit or swapped channels of so long are the new typical level, s.
+/// Time after which a misfit or swapped channels are accepted as the new typical level, s.
 const GIVEN_UP_S: f64 = 120.0;
 
 /// Decision of the guard on a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Guarded {
-    /// Report of the recursion; no innovation where the sample did not reach it as it came.
+    /// Outcome of the recursion; without innovation if the sample did not reach it as recorded.
     pub outcome: Option<StepOutcome>,
     /// True if the sample was held back or the estimate is paused.
     pub held: bool,
 }
 
-/// A sample as it came; NaN for a value that is not a number.
+/// A sample as recorded; NaN for a value that is not a number.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Raw {
     values: [f64; CHANNELS],
@@ -109,16 +108,16 @@ hoid_core::state!([] Raw { values, held, moves });
 /// A pause.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Pause {
-    /// One more than the place of its kind in [`GuardKind::ALL`]; 0 for none.
+    /// One more than the index of its kind in [`GuardKind::ALL`]; 0 for none.
     kind: usize,
     channel: usize,
     first: u64,
     size: f64,
-    /// True if the last block was not as it should be.
+    /// True if the last block had a trouble.
     bad_block: bool,
-    /// Samples in a row that are as they should be.
+    /// Number of consecutive samples without trouble.
     good: u64,
-    /// Samples of a larger level, of a misfit or of swapped channels.
+    /// Number of samples of a larger level, of a misfit or of swapped channels.
     doubtful: u64,
 }
 
@@ -142,20 +141,20 @@ pub(crate) struct Guard {
     channels: [ChannelGuard; CHANNELS],
     profile: Profile,
     resting: Resting,
-    /// The typical values before it was learnt again.
+    /// The typical values before they were learnt again.
     former: Profile,
     block: Block,
     in_block: u32,
     sound_blocks: u32,
     centre: [f64; CHANNELS],
     largest: [f64; CHANNELS],
-    /// Before the samples that are being held back: recursion, channels, and those samples.
+    /// State before the held-back samples: recursion, channels, and those samples.
     before: Snapshot,
     channels_before: [ChannelGuard; CHANNELS],
     ring: Vec<Raw>,
     in_ring: usize,
     sound: [Snapshot; 2],
-    /// Number of the sample at which each was taken; 0 for none.
+    /// Number of the sample at which each snapshot was taken; 0 for none.
     sound_at: [u64; 2],
     start: Snapshot,
     reference: Option<Reference>,
@@ -196,7 +195,7 @@ impl State for Guard {
         if let Some(reference) = &mut self.reference {
             reference.visit(each);
         }
-        // The next one that is held back has its place.
+        // The next held-back sample takes its place.
         self.in_ring = self.in_ring.min(self.ring.len().saturating_sub(1));
         self.pause.kind = self.pause.kind.min(GuardKind::ALL.len());
         self.pause.channel = self.pause.channel.min(GuardChannel::ALL.len() - 1);
@@ -204,9 +203,9 @@ impl State for Guard {
 }
 
 impl Guard {
-    /// A guard of a recursion at its start, with a delay of nk samples. Typical values are learnt
-    /// from the record of the start span, or where there is none from the first seconds, in which
-    /// only what is not a number is held back.
+    /// Builds the guard of a recursion at its start, with a delay of nk samples. Typical values are learnt from the
+    /// record of the start span or, without one, from the first seconds, in which only values that are not numbers are
+    /// held back.
     pub fn new(recursion: &mut dyn Recursion, nk: usize, span: Option<&Record>, sample_time: SampleTime) -> Self {
         let ts = sample_time.s();
         let longest = (LONGEST_S / ts).round().max(1.0) as u32;
@@ -249,7 +248,7 @@ impl Guard {
         guard
     }
 
-    /// Takes a sample, whose values are NaN if they are not numbers, to the recursion or not.
+    /// Takes a sample, with NaN for values that are not numbers, and decides whether it reaches the recursion.
     #[inline]
     pub fn take(&mut self, recursion: &mut dyn Recursion, sample: Sample, moves: bool) -> Guarded {
         self.samples += 1;
@@ -306,7 +305,7 @@ impl Guard {
         });
     }
 
-    /// Findings and actions at the last sample.
+    /// Returns the event at the last sample.
     pub fn event(&self) -> Option<GuardEvent> {
         self.event
     }
@@ -316,12 +315,12 @@ impl Guard {
         self.pause.kind > 0
     }
 
-    /// Restarts so far.
+    /// Returns the number of restarts so far.
     pub fn restarts(&self) -> u64 {
         self.restarts
     }
 
-    /// Seconds since the last restart, where there was one.
+    /// Returns the seconds since the last restart, if there was one.
     pub fn since_restart_s(&self) -> Option<f64> {
         (self.restarts > 0).then(|| (self.samples - self.restarted_at) as f64 * self.sample_time.s())
     }

@@ -5,12 +5,12 @@ use hoid_ident::{
     settings::{Kind, Value},
 };
 
-/// Whether a guard is in front of a recursion.
+/// Whether a recursion has a guard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GuardChoice {
-    /// It does.
+    /// With a guard.
     Yes,
-    /// The samples reach the recursion as they come.
+    /// Without a guard: the samples reach the recursion as recorded.
     No,
 }
 

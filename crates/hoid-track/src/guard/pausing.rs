@@ -1,4 +1,4 @@
-//! Pauses: the estimate stays constant, and the samples go into the filters where they can.
+//! Pauses: the estimate stays constant, and the samples enter only the filters, if possible.
 
 use hoid_core::guard::profile::{Block, CHANNELS};
 
@@ -13,7 +13,7 @@ impl Guard {
         (x - self.centre[c]).abs() > self.largest[c]
     }
 
-    /// The estimate stays constant from here on.
+    /// Starts a pause.
     pub(super) fn begin_pause(&mut self, kind: GuardKind, channel: usize, samples: u64, size: f64) {
         self.in_ring = 0;
         let place = GuardKind::ALL.iter().position(|k| *k == kind).unwrap_or(0);
@@ -31,7 +31,7 @@ impl Guard {
         self.tell(kind, channel, samples, size, GuardAction::Paused, 0);
     }
 
-    /// A sample of a pause: into the filters, where it can be.
+    /// Handles a sample of a pause: it enters the filters if possible.
     #[cold]
     pub(super) fn paused(&mut self, recursion: &mut dyn Recursion, sample: Sample) -> Guarded {
         self.resting.doubt();
@@ -89,7 +89,7 @@ impl Guard {
         Guarded { outcome, held: true }
     }
 
-    /// The estimate moves again.
+    /// Ends a pause.
     fn end_pause(&mut self, action: GuardAction) {
         let Pause {
             channel, first, size, ..
@@ -105,7 +105,7 @@ impl Guard {
         self.tell(kind, channel, self.samples - first, size, action, 0);
     }
 
-    /// The recursion starts again from its start, and nothing is known about the signals.
+    /// Restarts the recursion from its start and forgets the typical values of the signals.
     pub(super) fn learn_anew(&mut self, recursion: &mut dyn Recursion) {
         self.start.restore(recursion);
         self.former = std::mem::take(&mut self.profile);

@@ -1,10 +1,10 @@
-//! Typical values, from the record of the start span.
+//! Typical values from the record of the start span.
 //!
-//! For each mean of a block ([`hoid_core::guard::profile`]) the median over all blocks is taken, and of each difference
-//! the largest of three estimates of its 99 % quantile: itself, and those that follow from the 50 and 95 % quantiles of
-//! Gaussian errors. A few outliers in the span change neither; heavy tails count. Samples at which a signal stays
-//! constant are left out of the quantiles, as they are while it runs ([`hoid_core::guard::channel`]); where u rested is
-//! learnt too.
+//! For each mean of a block ([`hoid_core::guard::profile`]) the median over all blocks is taken, and for each
+//! difference the largest of three estimates of its 99 % quantile: its own, and those that follow from the 50 and 95 %
+//! quantiles for Gaussian errors. A few outliers in the span change neither; heavy tails count. Samples at which a
+//! signal stays constant are left out of the quantiles, as during a run ([`hoid_core::guard::channel`]); the rests of
+//! u are learnt too.
 
 use hoid_core::guard::{
     channel::ORDERS,
@@ -17,13 +17,13 @@ use super::Guard;
 
 /// Quantiles of the magnitude of a Gaussian number, in standard deviations.
 const QUANTILES: [(f64, f64); 3] = [(0.5, 0.6745), (0.95, 1.96), (0.99, 2.5758)];
-/// The quantile further in, by its own count.
+/// The inner quantile, by its own count.
 const INNER: f64 = 0.9;
-/// Least blocks of a record that reports the default.
+/// Least number of blocks of a record from which typical values are learnt.
 const LEAST: usize = 5;
 
 impl Guard {
-    /// Learns the default from a record.
+    /// Learns the typical values from a record.
     pub(super) fn prime(&mut self, record: &Record) {
         let output = record.output();
         let silent;
@@ -90,25 +90,25 @@ impl Guard {
     }
 }
 
-/// The median; zero of nothing.
+/// Median; zero for no values.
 fn middle(values: Vec<f64>) -> f64 {
     quantile(values, 0.5)
 }
 
-/// A quantile of the finite values; zero of none.
+/// Quantile of the finite values; zero if there are none.
 fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     values.retain(|v| v.is_finite());
     upper_quantile(&mut values, share).unwrap_or(0.0)
 }
 
-/// True for each first difference that is more than a signal that stays constant has.
+/// True for each first difference that is larger than those of a constant signal.
 fn moving(signal: &[f64]) -> Vec<bool> {
     let sizes: Vec<f64> = signal.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     let mean = mean(&sizes);
     sizes.iter().map(|size| *size > STILL * mean).collect()
 }
 
-/// The 99 % quantile of the magnitudes, by its own count or by those further in.
+/// The 99 % quantile of the magnitudes, by its own count or from the inner quantiles.
 fn tail(values: &[f64]) -> f64 {
     let magnitudes: Vec<f64> = values.iter().map(|v| v.abs()).collect();
     let scale = QUANTILES.map(|(share, deviations)| quantile(magnitudes.clone(), share) / deviations);

@@ -1,13 +1,13 @@
-//! The numbers of a recursion, kept to go back to them.
+//! The numbers of a recursion, stored so that they can be restored.
 
 use hoid_core::state::State;
 
 use crate::recursion::Recursion;
 
-/// Longest snapshot that saved numbers may ask for.
+/// Longest snapshot that is accepted from saved numbers.
 const LONGEST: usize = 1 << 20;
 
-/// The numbers of a recursion. Their memory grows to the largest that was taken, and is kept.
+/// The numbers of a recursion. Their memory grows to the largest snapshot and is kept.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Snapshot {
     numbers: Vec<f64>,
@@ -23,13 +23,13 @@ impl State for Snapshot {
 }
 
 impl Snapshot {
-    /// Keeps the numbers as they are.
+    /// Stores the numbers.
     pub fn take(&mut self, recursion: &mut dyn Recursion) {
         self.numbers.clear();
         recursion.visit(&mut |number| self.numbers.push(*number));
     }
 
-    /// Puts them back; false if nothing was kept.
+    /// Restores the numbers; false if none are stored.
     pub fn restore(&self, recursion: &mut dyn Recursion) -> bool {
         let mut kept = self.numbers.iter();
         recursion.visit(&mut |number| {

@@ -1,5 +1,5 @@
-//! A recursive method with its options, and those that track people: the default, and the two of the thesis. Those that
-//! they are compared with are in `hoid-survey`, and so is the list of all.
+//! A recursive method with its options, and the methods that track people: the default, and the two of the thesis. The
+//! methods for comparison, and the list of all, are in `hoid-survey`.
 
 mod adaptive;
 mod rls;
@@ -53,17 +53,17 @@ impl Deref for Method {
 }
 
 impl Method {
-    /// Gains in a basis that people share: Box-Jenkins with nc = 0.
+    /// Returns the method with gains in a basis that people share: Box-Jenkins with nc = 0.
     pub fn adaptive() -> Self {
         AdaptiveOptions::default().into()
     }
 
-    /// Recursive least squares: ARX and FIR.
+    /// Returns recursive least squares: ARX and FIR.
     pub fn rls() -> Self {
         RlsOptions::default().into()
     }
 
-    /// Recursive prediction-error method for every structure.
+    /// Returns the recursive prediction-error method for every structure.
     pub fn rpem() -> Self {
         RpemOptions::default().into()
     }
@@ -72,23 +72,23 @@ impl Method {
         &mut *self.0
     }
 
-    /// Known properties of it.
+    /// Returns its known properties.
     pub fn spec(&self) -> MethodSpec {
         spec(&*self.0)
     }
 
-    /// Whether orders, delay or memory are those of a polynomial in samples; else the rate is free, and
-    /// a high one is lowered ([`hoid_model::Decimation`]).
+    /// True if orders, delay or memory count samples; otherwise the rate is free, and a high one is lowered
+    /// ([`hoid_model::Decimation`]).
     pub fn counts_samples(&self) -> bool {
         !(self.starts_itself() || self.is_model_of_change())
     }
 
-    /// Name as on the command line.
+    /// Returns its name on the command line.
     pub fn name(&self) -> &'static str {
         self.about().name
     }
 
-    /// Its options by name.
+    /// Returns its options by name.
     pub fn settings(&self) -> &dyn Settings {
         &*self.0
     }
@@ -96,8 +96,7 @@ impl Method {
     /// Sets an option from its text.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for an option that the method does not have, or a text that is not
-    /// a value of it.
+    /// [`IdentError::BadOption`] for an option that the method does not have, or a text that is not a valid value.
     pub fn set(&mut self, name: &str, text: &str) -> Result<(), IdentError> {
         if self.0.set(name, text)? {
             return Ok(());
@@ -107,7 +106,7 @@ impl Method {
         Err(bad(name, format!("with the method {}", self.name()), &expected))
     }
 
-    /// With an option set from its text.
+    /// Returns the method with an option set from its text.
     ///
     /// # Errors
     /// As [`Method::set`].
@@ -116,10 +115,10 @@ impl Method {
         Ok(self)
     }
 
-    /// Starts with an earlier fit of the person.
+    /// Starts from an earlier fit of the person.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a method that starts with the record.
+    /// [`IdentError::BadOption`] for a method that starts from the record.
     pub fn start_from(&mut self, fit: FittedOperator) -> Result<(), IdentError> {
         let source = fit.source.clone();
         match self.0.set_person_prior(PersonPrior::Fit(Box::new(fit))) {
@@ -132,8 +131,8 @@ impl Method {
         }
     }
 
-    /// The operator's orders with the noise model that the method takes when none is named: that of the
-    /// structure, or of the order that the method names.
+    /// Returns the operator's orders with the default noise model of the method: that of the structure, or of the
+    /// order that the method names.
     pub fn default_orders(&self, nk: usize) -> Orders {
         let orders = self.default_structure().operator_orders(nk);
         match self.default_nd() {
@@ -142,8 +141,7 @@ impl Method {
         }
     }
 
-    /// The structure that the method takes when none is named: Box-Jenkins, or the first that it
-    /// serves.
+    /// Returns the default structure of the method: Box-Jenkins, or the first that it supports.
     pub fn default_structure(&self) -> Structure {
         let served = self.about().structures;
         match served.first() {
@@ -153,7 +151,7 @@ impl Method {
     }
 }
 
-/// [`Method::adaptive`]: it needs no start, and works for recorded people.
+/// [`Method::adaptive`]: it needs no start fit, and works for recorded people.
 impl Default for Method {
     fn default() -> Self {
         Self::adaptive()

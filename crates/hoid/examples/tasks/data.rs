@@ -1,4 +1,4 @@
-//! The data that we and the peers share, written as plain numbers.
+//! The data that hoid and the peers share, written as plain numbers.
 //!
 //! | file | holds |
 //! |---|---|
@@ -12,17 +12,17 @@ use std::{fmt::Write, path::Path};
 
 use hoid::{model::Channel, prelude::*, sim::Signals};
 
-/// Delay of the operator of C1 and its hold, samples.
+/// Delay of the operator of C1 plus its hold, samples.
 pub const NK: usize = 29;
 
-/// One run of C1 and what made it.
+/// One run of C1 and the settings of its simulation.
 pub struct Shared {
     pub simulator: Simulator,
     pub noise: Vec<f64>,
     pub record: Record,
 }
 
-/// The seed of a replication.
+/// Returns the seed of a replication.
 pub fn run_seed(replication: u64) -> RunSeed {
     RunSeed {
         seed: 1,
@@ -73,7 +73,7 @@ impl Shared {
 }
 
 impl Shared {
-    /// Input and output of the measurement of a run.
+    /// Returns input and output of the measurement of a run.
     pub fn measured(&self, run: &Signals) -> Record {
         let from = run.e.len() - self.record.len();
         let channel = |name, values: &[f64]| Channel::new(name, "deg", values[from..].to_vec());

@@ -1,4 +1,4 @@
-//! One point of how cost grows, in a process of its own, so that its peak memory is its own.
+//! One point of the growth of the cost, in a separate process, so that its peak memory is its own.
 //!
 //! | name | N is |
 //! |---|---|
@@ -19,7 +19,7 @@ use hoid::{
 
 use super::{data::NK, traced};
 
-/// Samples of the tables over parameters.
+/// Number of samples in the tables over parameters.
 const SAMPLES: usize = 8192;
 /// A run below this time is repeated, s.
 const SHORT_S: f64 = 0.3;
@@ -100,9 +100,8 @@ fn work(name: &str, parameters: Option<usize>) -> Box<dyn Fn(&Record)> {
     }
 }
 
-/// A record of the operator in an open loop: slow noise through the held operator, and
-/// autoregressive noise on the output. Made without further memory, for the memory of the
-/// estimators is in question.
+/// A record of the operator in an open loop: slow noise through the held operator, and autoregressive noise on the
+/// output. Made without further memory, since the memory of the estimators is measured.
 fn record(samples: usize) -> Record {
     let mut state = 1_u64;
     let mut uniform = move || {
@@ -127,12 +126,12 @@ fn record(samples: usize) -> Record {
     Record::new(SampleTime::HUNDREDTH, e, u).unwrap()
 }
 
-/// Writes the record instead, for the command line.
+/// Writes the record for the command line instead.
 fn write(record: &Record, file: &str) {
     hoid::io::write_record(std::path::Path::new(file), record).unwrap();
 }
 
-/// Largest resident memory so far, bytes; zero if the system does not report.
+/// Returns the largest resident memory so far, bytes; zero if the system does not report it.
 fn resident_peak() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));

@@ -1,5 +1,5 @@
-//! The tasks by which hoid is compared with what people would use instead: our side. `cargo xtask bench` runs it next
-//! to the peers in `crates/hoid/benches/peers` and makes the table of the book.
+//! The tasks for the comparison of hoid with alternative programs: the part of hoid. `cargo xtask bench` runs it
+//! together with the peers in `crates/hoid/benches/peers` and makes the table of the book.
 //!
 //! `cargo run --release -p hoid --example tasks -- DIRECTORY [--task NAME,...] [--seconds S | --times K] [--reproduce M]`
 //!
@@ -19,7 +19,7 @@
 //! | `delays` | Box-Jenkins for nk = 20 to 40: the losses on common samples, and the best once more |
 //! | `reproduce` | `hoid reproduce` with M replications, on all cores |
 //!
-//! `-- DIRECTORY --growth NAME N` measures one point of how cost grows ([`growth`]).
+//! `-- DIRECTORY --growth NAME N` measures one point of the growth of the cost ([`growth`]).
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod data;
@@ -148,7 +148,7 @@ fn run(task: &str, shared: &Shared, effort: Effort) -> (f64, Vec<f64>) {
             .map_answer(|()| Vec::new())
         }
         "cell" => {
-            // As many runs at a time as there are lanes, in memory that was used before.
+            // As many runs at a time as there are lanes, in existing memory.
             let beside = InstructionSet::Best.lanes().unwrap();
             let (mut noises, mut runs) = (vec![shared.noise.clone(); beside], Vec::new());
             median(effort, || {
@@ -269,7 +269,7 @@ impl<T> Measured<T> for (f64, T) {
     }
 }
 
-/// How long and how often a task is run.
+/// Duration and number of the runs of a task.
 #[derive(Clone, Copy)]
 struct Effort {
     seconds: f64,
@@ -282,7 +282,7 @@ impl Default for Effort {
     }
 }
 
-/// Runs the work once to warm up, and then as long and as often as the effort reports at least.
+/// Runs the work once to warm up, and then at least as long and as often as the effort requires.
 fn median<T>(effort: Effort, mut work: impl FnMut() -> T) -> (f64, T) {
     let begun = Instant::now();
     let mut answer = black_box(work());

@@ -1,7 +1,7 @@
 //! The hypotheses with their probabilities, for output and signals after the whitening filter.
 //!
-//! At each sample the probability of a hypothesis is multiplied by the density that it gave to the
-//! innovation, and all are normalised. At every birth the likeliest is the parent of new ones:
+//! At each sample the probability of a hypothesis is multiplied by its predictive density of the innovation, and all
+//! are normalised. At every birth the likeliest is the parent of new ones:
 //!
 //! - **a change of the gains**, and at every few births one of omega_nm and zeta_nm too, with the
 //!   prior probability of such a change since the last birth;
@@ -13,7 +13,7 @@
 //!   delays move on by one each time, so that each candidate has its turn, and the number of
 //!   hypotheses is bounded however many delays there are.
 //!
-//! A newborn takes the slot of the least likely hypothesis that is old enough to be judged.
+//! A new hypothesis replaces the least likely one that is old enough to be pruned.
 
 use hoid_core::state::{State, visit_all};
 
@@ -30,7 +30,7 @@ pub struct Bank<const M: usize> {
     prior: ChangePrior,
     hypotheses: [Option<Hypothesis>; M],
     samples: u64,
-    /// Samples until the next birth.
+    /// Number of samples until the next birth.
     until_birth: u32,
     births: u32,
     /// Sample from which hypotheses of a change of omega_nm and zeta_nm are born.
@@ -64,8 +64,8 @@ pub struct Mixture {
     pub variance: f64,
 }
 
-/// Delays on either side of the likeliest that are proposed as an alternative that may have been
-/// true throughout.
+/// Number of delays on either side of the likeliest that are proposed as alternatives that may have been true
+/// throughout.
 const NEIGHBOURS: usize = 3;
 /// Least probability of a hypothesis, relative to the likeliest: none is lost for ever.
 const LEAST_PROBABILITY: f64 = 1e-12;
@@ -79,9 +79,8 @@ impl<const M: usize> Bank<M> {
         }
     }
 
-    /// Starts from one hypothesis. `None` when M is below two, the start is not finite or not
-    /// within the bounds, the bounds let omega_nm or zeta_nm become zero, or a number of the prior
-    /// is outside its range.
+    /// Starts from one hypothesis. `None` if M is below two, the start is not finite or not within the bounds, the
+    /// bounds allow omega_nm or zeta_nm to become zero, or a number of the prior is outside its range.
     pub fn new(first: Hypothesis, prior: ChangePrior) -> Option<Self> {
         let within_bounds = first
             .eta
@@ -107,8 +106,8 @@ impl<const M: usize> Bank<M> {
         Some(bank)
     }
 
-    /// The update by a sample: output and signals after the whitening filter, `None` if they are
-    /// not known. Returns the innovation.
+    /// Updates the bank by a sample: output and signals after the whitening filter, `None` if they are unknown.
+    /// Returns the innovation.
     pub fn update(&mut self, sample: Option<(f64, DelayedSignals<'_>)>, point: [f64; 2]) -> f64 {
         let innovation = self.update_hypotheses(sample, point);
         if self.detector.update(&self.hypotheses, self.samples, &self.prior) {
@@ -117,12 +116,11 @@ impl<const M: usize> Bank<M> {
         innovation
     }
 
-    /// Drops the young hypotheses of a change of omega_nm and zeta_nm, and lets new ones be born
-    /// only after the settling time.
+    /// Drops the young hypotheses of a change of omega_nm and zeta_nm, and allows new ones only after the settling
+    /// time.
     ///
-    /// The change of the gains itself passes through the neuromuscular system, and until it has
-    /// settled the response is that of neither set of gains: it would be taken for a change of
-    /// omega_nm and zeta_nm.
+    /// The change of the gains itself passes through the neuromuscular system, and until it has settled the response
+    /// is that of neither set of gains: it would be taken for a change of omega_nm and zeta_nm.
     fn suspend_neuromuscular(&mut self) {
         self.neuromuscular_from = self.samples + self.prior.settling_time;
         let mut rest = 0.0;
@@ -169,7 +167,7 @@ impl<const M: usize> Bank<M> {
         innovation
     }
 
-    /// The hypotheses whose turn it is.
+    /// Creates the hypotheses that are due.
     fn give_birth(&mut self) {
         self.births = self.births.wrapping_add(1);
         let probability = self.prior.hazard * f64::from(self.prior.birth_interval);
@@ -185,12 +183,12 @@ impl<const M: usize> Bank<M> {
         }
     }
 
-    /// Counts a sample; the estimate stays.
+    /// Counts a sample; the estimate stays constant.
     pub fn skip(&mut self) {
         self.samples += 1;
     }
 
-    /// Brings the sum of the probabilities to one. Those that are too small, or not finite, become
+    /// Normalises the sum of the probabilities to one. Those that are too small, or not finite, become
     /// [`LEAST_PROBABILITY`].
     fn normalise(&mut self) {
         let mut most = 0.0;
@@ -217,14 +215,14 @@ impl<const M: usize> Bank<M> {
         }
     }
 
-    /// The hypothesis that the gains change now, and with `neuromuscular` omega_nm and zeta_nm too.
+    /// Creates the hypothesis that the gains change now, and with `neuromuscular` omega_nm and zeta_nm too.
     fn spawn_changed(&mut self, probability: f64, neuromuscular: bool) {
         if let Some((slot, parent)) = self.parent() {
             self.spawn(self.with_change(&parent, neuromuscular), probability, slot);
         }
     }
 
-    /// Hypotheses of the delays next to the likeliest, where there are none.
+    /// Creates hypotheses of the delays next to the likeliest, if there are none.
     fn spawn_neighbouring_delays(&mut self) {
         let Some((slot, parent)) = self.parent() else { return };
         let delay = self.prior.delay;
@@ -247,7 +245,7 @@ impl<const M: usize> Bank<M> {
         }
     }
 
-    /// Hypotheses that the gains and the delay change now, with the probability of all together.
+    /// Creates hypotheses that the gains and the delay change now, with the given total probability.
     fn spawn_changed_delays(&mut self, probability: f64) {
         let Some((slot, parent)) = self.parent() else { return };
         let delay = self.prior.delay;
@@ -273,8 +271,8 @@ impl<const M: usize> Bank<M> {
         }
     }
 
-    /// The likeliest hypothesis, and its slot. One of a recent change of omega_nm and zeta_nm has
-    /// no children: what a change of the gains seems to do to them in passing is not handed on.
+    /// Returns the likeliest hypothesis, and its slot. One of a recent change of omega_nm and zeta_nm has no children:
+    /// the transient effect of a change of the gains on them is not handed on.
     fn parent(&self) -> Option<(usize, Hypothesis)> {
         let (mut likeliest, mut highest) = (None, 0.0);
         for (slot, h) in self.hypotheses.iter().enumerate() {
@@ -288,15 +286,15 @@ impl<const M: usize> Bank<M> {
         likeliest
     }
 
-    /// A child that reports that the operator changes now.
+    /// A child, which assumes that the operator changes now.
     fn with_change(&self, parent: &Hypothesis, neuromuscular: bool) -> Hypothesis {
         let mut child = parent.with_change(self.samples, neuromuscular, &self.prior);
         child.before.delay = self.delay();
         child
     }
 
-    /// Puts a child into the slot of the least likely that is old enough to be pruned; there is no
-    /// child when that is its parent.
+    /// Puts a child into the slot of the least likely hypothesis that is old enough to be pruned; there is no child if
+    /// that is its parent.
     fn spawn(&mut self, mut child: Hypothesis, probability: f64, parent: usize) {
         let (mut slot, mut lowest) = (None, f64::INFINITY);
         for (i, h) in self.hypotheses.iter().enumerate() {
@@ -320,7 +318,7 @@ impl<const M: usize> Bank<M> {
         self.hypotheses[slot] = Some(child);
     }
 
-    /// Mean of the mixture.
+    /// Returns the mean of the mixture.
     pub fn mixture(&self) -> Mixture {
         let mut mixture = Mixture {
             eta: [0.0; OPERATOR],
@@ -335,7 +333,7 @@ impl<const M: usize> Bank<M> {
         mixture
     }
 
-    /// Covariance of eta.
+    /// Returns the covariance of eta.
     pub fn covariance(&self) -> [[f64; OPERATOR]; OPERATOR] {
         let mean = self.mixture().eta;
         let mut covariance = [[0.0; OPERATOR]; OPERATOR];
@@ -352,8 +350,8 @@ impl<const M: usize> Bank<M> {
         covariance
     }
 
-    /// T_L in s and its variance, `E[K_e K_e_dot]/E[K_e^2]`: the T for which
-    /// `E (K_e_dot - T K_e)^2` is least.
+    /// Returns T_L in s and its variance, `E[K_e K_e_dot]/E[K_e^2]`: the T that minimises
+    /// `E (K_e_dot - T K_e)^2`.
     pub fn lead_time(&self, covariance: &[[f64; OPERATOR]; OPERATOR]) -> [f64; 2] {
         let [k_e, k_e_dot, ..] = self.mixture().eta;
         let square = k_e * k_e + covariance[0][0];
@@ -363,38 +361,38 @@ impl<const M: usize> Bank<M> {
         [lead_time, variance.max(0.0) / square]
     }
 
-    /// Number of candidate delays.
+    /// Returns the number of candidate delays.
     pub fn delays(&self) -> usize {
         self.prior.delay.count
     }
 
-    /// Mean and variance of the delay, in samples beyond the shortest.
+    /// Returns mean and variance of the delay, in samples beyond the shortest.
     pub fn delay(&self) -> [f64; 2] {
         delay_of(self.hypotheses())
     }
 
-    /// The delay of the likeliest hypothesis.
+    /// Returns the delay of the likeliest hypothesis.
     pub fn likeliest_delay(&self) -> usize {
         let likeliest = self.hypotheses().max_by(|a, b| a.probability.total_cmp(&b.probability));
         likeliest.map_or(0, |h| h.extra_delay)
     }
 
-    /// The hypotheses.
+    /// Returns the hypotheses.
     pub fn hypotheses(&self) -> impl Iterator<Item = &Hypothesis> {
         self.hypotheses.iter().flatten()
     }
 
-    /// Logarithm of the posterior odds that the operator changed within the change window.
+    /// Returns the logarithm of the posterior odds that the operator changed within the change window.
     pub fn log_odds(&self) -> f64 {
         self.detector.log_odds()
     }
 
-    /// The change that was declared at the last sample, if one was.
+    /// Returns the change that was declared at the last sample, if there was one.
     pub fn change(&self) -> Option<Change> {
         self.detector.change()
     }
 
-    /// Samples so far.
+    /// Returns the number of samples so far.
     pub fn samples(&self) -> u64 {
         self.samples
     }

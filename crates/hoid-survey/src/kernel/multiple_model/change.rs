@@ -1,17 +1,17 @@
-//! When the operator changed, and in what.
+//! Time of a change of the operator, and the parameters that changed.
 //!
-//! `Lambda = ln(sum of P(h) over those born within the last T)/(sum of P(h) over those that are older))`: the logarithm
-//! of the posterior odds of a change. It is the likelihood ratio of Willsky and Jones (A. S. Willsky and H. L. Jones,
-//! *IEEE Transactions on Automatic Control* 21 (1976) 108-112), with the size of the change and its time averaged out
-//! instead of maximised, so that its expectation does not grow with the number of times that are tried. A change is
-//! declared when Lambda is over the threshold and the likeliest of the recent hypotheses is old enough to report what
-//! changed. The next is declared only after Lambda has been below zero, when the new values have become the established
-//! ones, or when more proves to have changed: the neuromuscular system, by the same odds of such hypotheses against all
-//! others, or the delay, by three standard errors.
+//! `Lambda = ln(sum of P(h) over those born within the last T)/(sum of P(h) over those that are older))`: the
+//! logarithm of the posterior odds of a change. It is the likelihood ratio of Willsky and Jones (A. S. Willsky and H.
+//! L. Jones, *IEEE Transactions on Automatic Control* 21 (1976) 108-112), with the size of the change and its time
+//! averaged out instead of maximised, so that its expectation does not grow with the number of times that are tried. A
+//! change is declared if Lambda exceeds the threshold and the likeliest of the recent hypotheses is old enough to
+//! identify the changed parameters. The next is declared only after Lambda has been below zero, when the new values
+//! have become the established ones, or if further parameters prove to have changed: the neuromuscular system, by the
+//! same odds of such hypotheses against all others, or the delay, by three standard errors.
 //!
-//! The likeliest of the recent hypotheses assumes since when, and what held before: the change of each quantity over
-//! its standard error reports in what the operator changed. For the innovation variance that is `ln(s2/s1)/sqrt(2/n)`
-//! with the n samples since.
+//! The likeliest of the recent hypotheses has a time of the change and an estimate before it: the change of each
+//! parameter over its standard error shows which parameters changed. For the innovation variance that is
+//! `ln(s2/s1)/sqrt(2/n)` with the n samples since then.
 
 use super::{
     hypothesis::{Hypothesis, Snapshot},
@@ -22,16 +22,16 @@ use hoid_core::state::{State, visit_all};
 /// A change that was declared.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Change {
-    /// Samples since the change, as the likeliest hypothesis has it.
+    /// Number of samples since the change, for the likeliest hypothesis.
     pub samples_ago: u64,
     /// Lambda.
     pub log_odds: f64,
-    /// The operator before.
+    /// The operator before the change.
     pub before: Snapshot,
-    /// The current operator.
+    /// The operator after the change.
     pub after: Snapshot,
-    /// Change of K_e, K_e_dot, omega_nm, zeta_nm, of the innovation variance and of the delay, each
-    /// over its standard error.
+    /// Changes of K_e, K_e_dot, omega_nm, zeta_nm, of the innovation variance and of the delay, each over its standard
+    /// error.
     pub z: [f64; OPERATOR + 2],
 }
 
@@ -39,7 +39,7 @@ pub struct Change {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChangeDetector {
     log_odds: f64,
-    /// A change was declared; one of the neuromuscular system too; one of the delay too.
+    /// Whether a change was declared, one of the neuromuscular system, and one of the delay.
     declared: bool,
     declared_neuromuscular: bool,
     declared_delay: bool,
@@ -82,12 +82,11 @@ impl Default for ChangeDetector {
 
 /// Change of the delay over its standard error from which it is declared.
 const DELAY_THRESHOLD: f64 = 3.0;
-/// Added to both sides of the odds, so that Lambda stays finite.
+/// Number added to both sides of the odds, so that Lambda stays finite.
 const REGULARISATION: f64 = 1e-12;
 
 impl ChangeDetector {
-    /// The update by the hypotheses after a sample. True if Lambda rises above zero: a change
-    /// starts.
+    /// Updates the detector by the hypotheses after a sample. True if Lambda rises above zero: a change starts.
     pub fn update(&mut self, hypotheses: &[Option<Hypothesis>], now: u64, prior: &ChangePrior) -> bool {
         let sums = Sums::over(hypotheses, now, prior);
         let before = self.log_odds;
@@ -101,8 +100,7 @@ impl ChangeDetector {
         self.log_odds > 0.0 && before <= 0.0
     }
 
-    /// Declares the change that the likeliest of the recent hypotheses represents, once it has
-    /// settled and if there is something new in it.
+    /// Declares the change of the likeliest of the recent hypotheses, once it has settled and if it has something new.
     fn declare(&mut self, sums: &Sums<'_>, hypotheses: &[Option<Hypothesis>], now: u64, prior: &ChangePrior) {
         let Some(h) = sums.likeliest.filter(|h| now - h.born >= prior.settling_time) else {
             return;
@@ -128,12 +126,12 @@ impl ChangeDetector {
         }
     }
 
-    /// Lambda.
+    /// Returns Lambda.
     pub fn log_odds(&self) -> f64 {
         self.log_odds
     }
 
-    /// The change that was declared at the last sample.
+    /// Returns the change that was declared at the last sample.
     pub fn change(&self) -> Option<Change> {
         self.change
     }
@@ -143,7 +141,7 @@ impl ChangeDetector {
 struct Sums<'a> {
     recent: f64,
     older: f64,
-    /// For the recent ones in which omega_nm and zeta_nm changed too.
+    /// Sum for the recent ones in which omega_nm and zeta_nm changed too.
     neuromuscular: f64,
     likeliest: Option<&'a Hypothesis>,
 }
@@ -175,14 +173,13 @@ fn log_odds(probability: f64, of_others: f64) -> f64 {
     libm::log((probability + REGULARISATION) / (of_others + REGULARISATION))
 }
 
-/// True for a hypothesis within the change window. The first, born at sample 0, does not correspond
-/// to any change.
+/// True for a hypothesis within the change window. The first, born at sample 0, does not correspond to any change.
 fn is_recent(h: &Hypothesis, now: u64, prior: &ChangePrior) -> bool {
     h.born > 0 && now - h.born < prior.change_window
 }
 
-/// Mean and variance of the delay over hypotheses, in samples beyond the shortest. The variance
-/// includes that of rounding to whole samples, 1/12.
+/// Mean and variance of the delay over hypotheses, in samples beyond the shortest. The variance includes that of
+/// rounding to whole samples, 1/12.
 pub(super) fn delay_of<'a>(hypotheses: impl Iterator<Item = &'a Hypothesis>) -> [f64; 2] {
     let (mut sum, mut first, mut second) = (0.0, 0.0, 0.0);
     for h in hypotheses {
@@ -195,7 +192,7 @@ pub(super) fn delay_of<'a>(hypotheses: impl Iterator<Item = &'a Hypothesis>) -> 
     [mean, (second / sum - mean * mean).max(0.0) + 1.0 / 12.0]
 }
 
-/// The change that a hypothesis represents, with the delay after it.
+/// Returns the change of a hypothesis, with the delay after it.
 fn change_of(h: &Hypothesis, delay: [f64; 2], now: u64, log_odds: f64) -> Change {
     let (before, after) = (h.before, Snapshot { delay, ..h.snapshot() });
     let samples_ago = now - h.born;

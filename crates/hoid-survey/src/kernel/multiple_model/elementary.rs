@@ -1,11 +1,11 @@
-//! `ln(1 + x)` and `e^x` without a call, for the density of every hypothesis at every sample.
+//! `ln(1 + x)` and `e^x` without a function call, for the density of every hypothesis at every sample.
 
 /// ln 2 in two parts, the first with so few digits that its multiples are exact.
 const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
 /// Bits of the mantissa of an f64.
 const MANTISSA: u32 = 52;
 
-/// `ln(1 + x)` for x that is not negative, in a third of the time where x is small: with
+/// `ln(1 + x)` for x >= 0, in a third of the time for small x: with
 /// `z = x/(2 + x)`, `2 (z + z^3/3 + z^5/5 + ...)`, whose next term is below 1e-16 of the first.
 #[inline(always)]
 pub(crate) fn log1p(x: f64) -> f64 {
@@ -21,10 +21,11 @@ pub(crate) fn log1p(x: f64) -> f64 {
     2.0 * z * sum
 }
 
-/// Adding and taking away 3/2 2^52 rounds to the nearest whole number, which then are the last bits.
+/// Adding and subtracting 3/2 2^52 rounds to the nearest whole number, which is then in the last bits.
 const ROUNDS: f64 = 6_755_399_441_055_744.0;
 
-/// `e^x` without a call, to 4e-16 between -700 and 700 and libm's beyond: `2^k e^r` with
+/// `e^x` without a function call, with a relative error of 4e-16 between -700 and 700, and by libm beyond: `2^k e^r`
+/// with
 /// `|r| <= ln(2)/2`, by Taylor's series.
 #[inline(always)]
 pub(crate) fn exp(x: f64) -> f64 {

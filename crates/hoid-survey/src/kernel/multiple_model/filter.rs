@@ -1,8 +1,7 @@
-//! The recursion: the filters of the signals, and after them the bank of hypotheses.
+//! The recursion: the filters of the signals, followed by the bank of hypotheses.
 //!
-//! A sample passes the [`Response`] to the held error, the whitening filter D and the ring of
-//! delayed signals to the [`Bank`]. Now and then the linearisation point of the response follows
-//! the estimate.
+//! A sample passes the [`Response`] to the held error, the whitening filter D and the ring of delayed signals, and
+//! reaches the [`Bank`]. The linearisation point of the response follows the estimate at intervals.
 
 use super::{
     bank::Bank,
@@ -13,7 +12,7 @@ use super::{
 };
 use hoid_core::{bounds::within, recursion::Step};
 
-/// Samples between two moves of the linearisation point.
+/// Number of samples between two moves of the linearisation point.
 const RELINEARISE_EVERY: u64 = 64;
 /// Largest relative move of the point: the states of the filters move along their first derivative.
 const LARGEST_MOVE: f64 = 0.1;
@@ -45,16 +44,16 @@ impl<const M: usize, const D: usize, B> MultipleModelFilter<M, D, B> {
 }
 
 impl<const M: usize, const D: usize> MultipleModelFilter<M, D> {
-    /// Starts from one hypothesis with filters at rest, for a delay that is known. `None` when the
-    /// order of the noise model is above D, and as [`Bank::new`].
+    /// Starts from one hypothesis with filters at rest, for a known delay. `None` if the order of the noise model is
+    /// above D, and as [`Bank::new`].
     pub fn new(first: Hypothesis, d: &[f64], prior: ChangePrior) -> Option<Self> {
         Self::with_delays(first, d, prior, [[0.0; 6]; 1])
     }
 }
 
 impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> MultipleModelFilter<M, D, B> {
-    /// As [`MultipleModelFilter::new`] with several candidate delays. `None` too when the memory is not
-    /// of [`DelayPrior::count`](super::prior::DelayPrior::count) signals.
+    /// As [`MultipleModelFilter::new`] with several candidate delays. Also `None` if the memory is not of
+    /// [`DelayPrior::count`](super::prior::DelayPrior::count) signals.
     pub fn with_delays(first: Hypothesis, d: &[f64], prior: ChangePrior, memory: B) -> Option<Self> {
         let ring = SignalRing::new(memory);
         if d.len() > D || ring.count() != prior.delay.count {
@@ -75,8 +74,7 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
         })
     }
 
-    /// The step by a sample `x(t) = e(t - nk)`, `u(t)`, with nk of the shortest delay. Both must be
-    /// finite.
+    /// Takes a sample `x(t) = e(t - nk)`, `u(t)`, with nk of the shortest delay. Both must be finite.
     pub fn step(&mut self, x: f64, u: f64) -> Step {
         let signals = self.response.step(x);
         let (y, r) = self.whitened(u, &signals);
@@ -91,7 +89,7 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
         }
     }
 
-    /// As [`MultipleModelFilter::step`], but the estimate stays: only the filters move on.
+    /// As [`MultipleModelFilter::step`], but the estimate stays constant: only the filters move on.
     pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
         self.bank.skip();
         let signals = self.response.step(x);
@@ -105,8 +103,7 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
         }
     }
 
-    /// As [`MultipleModelFilter::step_without_update`] where the output is missing: the one-step
-    /// prediction takes its place.
+    /// As [`MultipleModelFilter::step_without_update`] for a missing output, which the one-step prediction replaces.
     pub fn bridge(&mut self, x: f64) {
         self.bank.skip();
         let signals = self.response.step(x);
@@ -138,8 +135,7 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
         eta[0] * psi[0] + eta[1] * psi[1]
     }
 
-    /// Puts a sample into the histories, and moves the linearisation point toward the estimate when
-    /// it is time.
+    /// Puts a sample into the histories, and moves the linearisation point toward the estimate if it is due.
     fn remember(&mut self, u: f64, signals: Signals) {
         if !(u.abs() < LARGEST && signals.iter().all(|s| s.abs() < LARGEST)) {
             self.response.reset();
@@ -165,17 +161,17 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
         }
     }
 
-    /// The hypotheses with their probabilities.
+    /// Returns the hypotheses with their probabilities.
     pub fn bank(&self) -> &Bank<M> {
         &self.bank
     }
 
-    /// Coefficients of D after the 1.
+    /// Returns the coefficients of D after the 1.
     pub fn d(&self) -> &[f64] {
         &self.d[..self.order]
     }
 
-    /// How often a signal overflowed and the filters were brought to rest.
+    /// Returns the number of overflows after which the filters were reset.
     pub fn restarts(&self) -> u64 {
         self.restarts
     }

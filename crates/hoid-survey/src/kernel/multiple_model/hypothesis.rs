@@ -1,5 +1,4 @@
-//! One hypothesis: a Kalman filter of the operator's parameters, given that they last changed at
-//! its birth.
+//! One hypothesis: a Kalman filter of the operator's parameters, given that they last changed at its birth.
 //!
 //! With `y = D u` and `r` the whitened signals, the innovation and its negative gradient at eta are
 //!
@@ -7,15 +6,15 @@
 //! `psi_2 = r_2 + d_omega r_4 + d_zeta r_6`, `psi_3 = K_e r_3 + K_e_dot r_4`,
 //! `psi_4 = K_e r_5 + K_e_dot r_6`,
 //!
-//! with `d_omega`, `d_zeta` the distances from the linearisation point of the filters. The
-//! predictive distribution of eps is that of Student with the variance `v = sigma^2 + psi' P psi`
-//! and n degrees of freedom, the residuals that sigma^2 rests on; its density is
+//! with `d_omega`, `d_zeta` the distances from the linearisation point of the filters. The predictive distribution of
+//! eps is Student's with the variance `v = sigma^2 + psi' P psi` and n degrees of freedom, the number of residuals of
+//! sigma^2; its density is
 //! `v^{-1/2} exp(-(n + 1)/2 ln(1 + eps^2/(n v)) - 1/(4 n))` up to a factor (the Gamma functions
 //! give `-1/(4 n) + O(n^{-3})`).
 //!
-//! An innovation beyond the limit counts as one at the limit, in the density and in sigma^2, and as
-//! a measurement of so large a variance that it lies there (P. J. Huber, *Robust Statistics*, 1981,
-//! section 7.3): an outlier carries no information about which hypothesis predicts better.
+//! An innovation beyond the limit counts as one at the limit, in the density and in sigma^2, and as a measurement with
+//! a variance so large that it is at the limit (P. J. Huber, *Robust Statistics*, 1981, section 7.3): an outlier
+//! carries no information about which hypothesis predicts better.
 
 use super::{
     elementary::{exp, log1p},
@@ -24,12 +23,12 @@ use super::{
 };
 use hoid_core::{innovation_variance::InnovationVariance, state::State, ud_covariance::UdCovariance};
 
-/// Variances and signals beyond this would overflow in products.
+/// Limit of variances and signals, beyond which their products would overflow.
 pub(super) const LARGEST: f64 = 1e60;
 /// Largest square of an innovation over its variance that enters sigma^2.
 const LARGEST_SQUARE: f64 = 9.0;
-/// Largest relative distance of omega_nm and zeta_nm from the linearisation point: the first
-/// derivatives hold no further.
+/// Largest relative distance of omega_nm and zeta_nm from the linearisation point, up to which the first derivatives
+/// are valid.
 const LARGEST_DISTANCE: f64 = 0.5;
 /// Least innovation variance relative to that at the start, for a span without any signal.
 const LEAST_VARIANCE: f64 = 1e-9;
@@ -51,7 +50,7 @@ pub struct Hypothesis {
     pub neuromuscular_changed: bool,
     /// Its delay, in samples beyond the shortest.
     pub extra_delay: usize,
-    /// The estimate just before its birth.
+    /// The estimate before its birth.
     pub before: Snapshot,
     least_variance: f64,
 }
@@ -74,7 +73,7 @@ pub struct Snapshot {
 hoid_core::state!([] Hypothesis { eta, covariance, innovation_variance, probability, born, neuromuscular_changed, extra_delay, before, least_variance });
 hoid_core::state!([] Snapshot { eta, gain_covariance, neuromuscular_variance, innovation_variance, delay });
 
-/// The numbers of a slot of the bank: whether there is a hypothesis, and its own.
+/// Visits the numbers of a slot of the bank: whether it is occupied, and those of its hypothesis.
 pub(super) fn visit_slot(slot: &mut Option<Hypothesis>, each: &mut dyn FnMut(&mut f64)) {
     let mut is_there = slot.is_some();
     is_there.visit(each);
@@ -98,8 +97,7 @@ pub fn gradient(eta: &[f64; OPERATOR], r: &Signals, point: [f64; 2]) -> [f64; OP
     ]
 }
 
-/// The value within `low` and `high`. Not `f64::clamp`, which panics where the bounds are not
-/// ordered numbers.
+/// Limits a value to `low` and `high`. Not `f64::clamp`, which panics unless the bounds are ordered numbers.
 #[inline(always)]
 fn bounded(value: f64, low: f64, high: f64) -> f64 {
     if value < low {
@@ -126,8 +124,7 @@ impl Hypothesis {
         }
     }
 
-    /// From the estimate at the start, its covariance and the innovation variance. `None` unless
-    /// the covariance is positive.
+    /// Starts from an estimate, its covariance and the innovation variance. `None` unless the covariance is positive.
     pub fn new(
         eta: [f64; OPERATOR],
         covariance: &[[f64; OPERATOR]; OPERATOR],
@@ -149,7 +146,7 @@ impl Hypothesis {
         Some(first)
     }
 
-    /// The update by a sample: the innovation, and its predictive density.
+    /// Updates the hypothesis by a sample: returns the innovation, and its predictive density.
     #[inline(always)]
     pub fn step(&mut self, y: f64, r: &Signals, point: [f64; 2], prior: &ChangePrior) -> (f64, f64) {
         let psi = gradient(&self.eta, r, point);
@@ -191,8 +188,8 @@ impl Hypothesis {
         [g, g / square]
     }
 
-    /// Adds the drift of the parameters between two births, faster just after a change. It ends
-    /// where they are known no better than after a change.
+    /// Adds the drift of the parameters between two births, which is faster just after a change. It ends when their
+    /// uncertainty is that after a change.
     pub fn drift(&mut self, now: u64, prior: &ChangePrior) {
         let scales = self.gain_scales(prior);
         // The first, born at sample 0, does not correspond to any change.
@@ -223,12 +220,12 @@ impl Hypothesis {
         }
     }
 
-    /// The same with the delay `extra_delay` samples beyond the shortest.
+    /// Returns the hypothesis with a delay `extra_delay` samples beyond the shortest.
     pub fn with_extra_delay(self, extra_delay: usize) -> Self {
         Self { extra_delay, ..self }
     }
 
-    /// The hypothesis that the delay is, and was, another one near its own.
+    /// Returns the hypothesis that the delay is, and was, another one near its own.
     pub fn with_neighbouring_delay(&self, extra_delay: usize, prior: &ChangePrior) -> Self {
         let mut other = self.with_extra_delay(extra_delay);
         let (scales, away) = (self.gain_scales(prior), extra_delay.abs_diff(self.extra_delay) as f64);
@@ -240,7 +237,7 @@ impl Hypothesis {
         other
     }
 
-    /// The hypothesis that the gains change now, and with `neuromuscular` omega_nm and zeta_nm too.
+    /// Returns the hypothesis that the gains change now, and with `neuromuscular` omega_nm and zeta_nm too.
     pub fn with_change(&self, now: u64, neuromuscular: bool, prior: &ChangePrior) -> Self {
         let mut child = *self;
         let scales = self.gain_scales(prior);
@@ -267,7 +264,7 @@ impl Hypothesis {
         self.covariance.rank_one_update(variance, unit);
     }
 
-    /// The estimate now.
+    /// Returns the current estimate.
     pub fn snapshot(&self) -> Snapshot {
         let p = &self.covariance;
         Snapshot {
@@ -279,7 +276,7 @@ impl Hypothesis {
         }
     }
 
-    /// True when every number inside is finite.
+    /// True if all numbers are finite.
     pub fn is_valid(&self) -> bool {
         self.covariance.is_valid()
             && self.eta.iter().all(|e| e.is_finite())

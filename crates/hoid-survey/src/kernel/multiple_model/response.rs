@@ -1,19 +1,18 @@
-//! Response of the neuromuscular system to a held error and to its rate, with derivatives by
-//! omega_nm and zeta_nm.
+//! Response of the neuromuscular system to a held error and to its rate, with derivatives with respect to omega_nm and
+//! zeta_nm.
 //!
 //! With the exact hold of [`hoid_core::held_operator`] for the gains `[1, 0]` and `[0, 1]`,
 //!
 //! `x(t) = b0 e(t) + b1 e(t-1) - f1 x(t-1) - f2 x(t-2)`,
 //! `x'(t) = b0' e(t) + b1' e(t-1) - f1' x(t-1) - f2' x(t-2) - f1 x'(t-1) - f2 x'(t-2)`,
 //!
-//! where `'` is the derivative by omega_nm or zeta_nm. The filters are linearised about a point
-//! `[omega, zeta]`. When it moves, their states move along its derivative: a filter whose past
-//! belongs to another point would have a kink there, which the whitening filter, a difference of
-//! high order, makes larger than the noise.
+//! where `'` is the derivative with respect to omega_nm or zeta_nm. The filters are linearised about a point
+//! `[omega, zeta]`. When it moves, their states move along its derivative: a filter whose past belongs to another
+//! point would have a kink there, which the whitening filter, a difference of high order, amplifies above the noise.
 
 use hoid_core::held_operator::held_operator;
 
-/// x1, x2, their derivatives by omega_nm, their derivatives by zeta_nm.
+/// x1, x2, their derivatives with respect to omega_nm and to zeta_nm.
 pub type Signals = [f64; 6];
 
 /// The filters.
@@ -32,7 +31,7 @@ pub struct Response {
 hoid_core::state!([] Response { point, b, f, input, past });
 
 impl Response {
-    /// At rest at the point `[omega_nm, zeta_nm]` (rad/s, 1). Ts in s.
+    /// Builds the filters at rest at the point `[omega_nm, zeta_nm]` (rad/s, 1). Ts in s.
     pub fn new(point: [f64; 2], sample_time: f64) -> Self {
         let mut response = Self {
             point,
@@ -57,7 +56,7 @@ impl Response {
         }
     }
 
-    /// The signals of a sample, from its delayed error.
+    /// Returns the signals of a sample, from its delayed error.
     #[inline(always)]
     pub fn step(&mut self, e: f64) -> Signals {
         let ([f1, f2], [x1, x2]) = (&self.f, &self.past);
@@ -79,7 +78,7 @@ impl Response {
         x
     }
 
-    /// Moves the point, and the past signals here and in `elsewhere` along their first derivative.
+    /// Moves the point, and the past signals here and in `elsewhere`, along their first derivative.
     pub fn move_to<'a>(&mut self, point: [f64; 2], elsewhere: impl IntoIterator<Item = &'a mut Signals>) {
         let by = [point[0] - self.point[0], point[1] - self.point[1]];
         if by == [0.0; 2] || !point.iter().all(|a| a.is_finite()) {
@@ -95,13 +94,13 @@ impl Response {
         self.set(point);
     }
 
-    /// Brings the filters to rest.
+    /// Resets the filters.
     pub fn reset(&mut self) {
         self.input = 0.0;
         self.past = [[0.0; 6]; 2];
     }
 
-    /// The linearisation point `[omega_nm, zeta_nm]`.
+    /// Returns the linearisation point `[omega_nm, zeta_nm]`.
     #[inline(always)]
     pub fn point(&self) -> [f64; 2] {
         self.point

@@ -1,8 +1,8 @@
 //! The signals of the last samples, from which those for every delay are read.
 //!
-//! The response to an error that arrives k samples later is the response k samples ago. So one
-//! filter gives the signals for all delays between the shortest and the longest, and a ring buffer
-//! keeps those of the last samples, after the whitening filter.
+//! The response to an error that arrives k samples later is the response k samples ago. One filter therefore gives the
+//! signals for all delays between the shortest and the longest, and a ring buffer keeps those of the last samples,
+//! after the whitening filter.
 
 use super::response::Signals;
 
@@ -14,7 +14,7 @@ pub struct DelayedSignals<'a> {
 }
 
 impl<'a> DelayedSignals<'a> {
-    /// For a delay that is known.
+    /// The signals for a known delay.
     pub fn known(signals: &'a Signals) -> Self {
         Self {
             ring: std::slice::from_ref(signals),
@@ -22,7 +22,7 @@ impl<'a> DelayedSignals<'a> {
         }
     }
 
-    /// For a delay that is `extra_delay` samples longer than the shortest.
+    /// Returns the signals for a delay `extra_delay` samples longer than the shortest.
     ///
     /// # Panics
     /// Beyond the longest.
@@ -53,18 +53,18 @@ impl<B: AsMut<[Signals]>> hoid_core::state::State for SignalRing<B> {
 }
 
 impl<B: AsRef<[Signals]> + AsMut<[Signals]>> SignalRing<B> {
-    /// Zeros, as many as the memory holds.
+    /// A ring of zeros, of the size of the memory.
     pub fn new(mut memory: B) -> Self {
         memory.as_mut().fill([0.0; 6]);
         Self { memory, newest: 0 }
     }
 
-    /// Number of delays.
+    /// Returns the number of delays.
     pub fn count(&self) -> usize {
         self.memory.as_ref().len()
     }
 
-    /// Adds the signals of a sample for the shortest delay, in the place of the oldest.
+    /// Adds the signals of a sample for the shortest delay, in place of the oldest.
     #[inline(always)]
     pub fn push(&mut self, signals: Signals) {
         let memory = self.memory.as_mut();
@@ -76,7 +76,7 @@ impl<B: AsRef<[Signals]> + AsMut<[Signals]>> SignalRing<B> {
         memory[self.newest] = signals;
     }
 
-    /// The signals of the newest sample.
+    /// Returns the signals of the newest sample.
     #[inline(always)]
     pub fn newest(&self) -> DelayedSignals<'_> {
         DelayedSignals {
@@ -85,7 +85,7 @@ impl<B: AsRef<[Signals]> + AsMut<[Signals]>> SignalRing<B> {
         }
     }
 
-    /// All signals in memory.
+    /// Returns all signals in memory.
     pub fn iter_mut(&mut self) -> std::slice::IterMut<'_, Signals> {
         self.memory.as_mut().iter_mut()
     }

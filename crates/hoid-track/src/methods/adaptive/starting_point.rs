@@ -1,4 +1,4 @@
-//! Where the recursion starts: the basis, how well it is known, and the estimate of an earlier fit.
+//! Start of the recursion: the basis, its uncertainty, and the estimate of an earlier fit.
 //!
 //! **A fit** has coordinates x of an operator Y(x) with covariance C. The recursion has gains theta of
 //! the responses x_i of a basis made at the fit's delay, neuromuscular system and lag, and corrections
@@ -7,8 +7,8 @@
 //! `theta = argmin sum_k |(sum_i theta_i h_i(w_k) - Y(w_k))/Y(w_k)|^2`,
 //!
 //! and the derivatives of the state s = (theta, level, corrections) along x follow from the same problem for dY/dx,
-//! except for those that are corrections: `S = J C J'`. For the forms with a lag, and of a gain with a lead, the
-//! nearest is the operator itself.
+//! except for the corrections themselves: `S = J C J'`. For the forms with a lag, and for a gain with a lead, the
+//! nearest operator is the operator itself.
 //!
 //! The remnant of the fit is `v = (C/D) eps` with the impulse response g, whose autocovariances over
 //! the variance of eps are `r_k = sum_j g_j g_{j+k}`.
@@ -25,25 +25,23 @@ use hoid_model::{Complex64, FittedOperator, SampleTime, operator_family::Coordin
 
 use crate::person_prior::PersonPrior;
 
-/// Spread of the fixed dynamics where nothing is known: shares of omega and zeta, and s for the
-/// delay.
+/// Prior spread of the fixed dynamics without prior knowledge: shares of omega and zeta, and s for the delay.
 const WIDE: [f64; DYNAMICS] = [0.45, 0.75, 0.15];
-/// Frequencies at which the gains of a fit are found, rad/s: the range, and how many.
+/// Frequencies at which the gains of a fit are computed, rad/s: range and number.
 const FREQUENCIES: ([f64; 2], usize) = ([0.3, 8.0], 24);
-/// Lags that a basis may have, s: beyond the longest a lag cannot be distinguished from an
-/// integration.
+/// Range of the lag of a basis, s: beyond the longest a lag cannot be distinguished from an integration.
 const LAGS_S: [f64; 2] = [0.05, 10.0];
-/// Root mean square of the relative misfit beyond which a form has no place in the basis.
+/// Root mean square of the relative misfit beyond which the basis does not represent a form.
 const MISFIT: f64 = 0.1;
-/// Seconds that the remnant of a fit counts for.
+/// Time that the remnant of a fit counts as, s.
 const REMNANT_S: f64 = 20.0;
-/// Longest remnant that is summed, s, and what may be left of it.
+/// Longest remnant that is summed, s, and its largest remainder.
 const LONGEST_S: f64 = 60.0;
 const LEFT: f64 = 1e-6;
-/// The level of u that is not known before the first second, in standard deviations of the remnant.
+/// Prior standard deviation of the level of u, in standard deviations of the remnant.
 const LEVEL: f64 = 3.0;
 
-/// The basis at the start, and how far a person is from it.
+/// The basis at the start, and the prior spread of a person about it.
 pub(super) struct StartingPoint {
     pub point: Point,
     /// Shares of omega and zeta, and s for the delay.
@@ -51,13 +49,13 @@ pub(super) struct StartingPoint {
 }
 
 impl StartingPoint {
-    /// From the prior; `tau_s` is the delay, for an error that is straight between samples, and whether it has been
-    /// given.
+    /// Computes the starting point from the prior; `tau_s` is the delay for an error that is linear between samples,
+    /// and `is_given` whether it was given.
     pub fn of(prior: &PersonPrior, tau_s: f64, is_given: bool, sample_time: SampleTime) -> Result<Self, IdentError> {
         let DefaultOperator {
             mut point, mut spread, ..
         } = DefaultOperator::with_delay(tau_s);
-        // An error that is held comes half a sample later than one that is straight.
+        // A held error is half a sample later than one that is linear between samples.
         let hold = 0.5 * sample_time.s();
         let of_delay = |otherwise: f64| if is_given { GIVEN_DELAY_S } else { otherwise };
         spread[2] = of_delay(spread[2]);
@@ -91,7 +89,7 @@ impl StartingPoint {
                 let lag = match rate.map(|i| fit.operator.coordinates()[i]) {
                     Some(rate) => 1.0 / rate.max(1.0 / LAGS_S[1]),
                     None if fit.operator.form().has_pole() => LAGS_S[1],
-                    // A square of a lead without a lag is nearest to one with a short lag.
+                    // The square of a lead without a lag is nearest to one with a short lag.
                     None if fit.operator.form().degree() == 2 => LAGS_S[0],
                     None => LAG_S,
                 };
@@ -113,10 +111,10 @@ fn no_place(fit: &FittedOperator, why: &str) -> IdentError {
     }
 }
 
-/// The estimate of a fit in a basis that `StartingPoint::of` has made for it.
+/// Returns the estimate of a fit in a basis that `StartingPoint::of` has made for it.
 ///
 /// # Errors
-/// [`IdentError::BadStart`] for a form that is not near to any gains.
+/// [`IdentError::BadStart`] for a form that no gains approximate.
 pub(super) fn initial_estimate(
     fit: &FittedOperator,
     basis: &Basis,
@@ -140,7 +138,7 @@ pub(super) fn initial_estimate(
     let coordinates = fit.operator.form().coordinates(true);
     let p = coordinates.len();
     let point = basis.point();
-    // Rows of J by the coordinates, then S = J C J'.
+    // Rows of J for the coordinates, then S = J C J'.
     let columns: Vec<[f64; STATES]> = (0..p)
         .map(|j| {
             let mut column = [0.0; STATES];
@@ -177,12 +175,12 @@ pub(super) fn initial_estimate(
     })
 }
 
-/// Rounding leaves nothing that is not symmetric.
+/// Makes the matrix exactly symmetric.
 fn symmetric(c: &[[f64; STATES]; STATES]) -> [[f64; STATES]; STATES] {
     std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (c[i][j] + c[j][i])))
 }
 
-/// Autocovariances of `C/D` over the variance of eps; `None` if it does not die out.
+/// Autocovariances of `C/D` over the variance of eps; `None` if the impulse response does not decay.
 fn remnant(fit: &FittedOperator, sample_time: SampleTime) -> Option<Lags> {
     let (c, d) = &fit.noise;
     let longest = (LONGEST_S / sample_time.s()) as usize;
@@ -207,17 +205,17 @@ fn remnant(fit: &FittedOperator, sample_time: SampleTime) -> Option<Lags> {
     Some(lags)
 }
 
-/// The problem of the nearest gains.
+/// The least-squares problem of the nearest gains.
 struct Nearest {
-    /// For the operator, held.
+    /// Responses of the operator, held.
     responses: Vec<hoid_model::operator_family::FamilyResponse>,
-    /// For the basis, over the operator's.
+    /// Responses of the basis, over those of the operator.
     basis: Vec<[Complex64; GAINS]>,
 }
 
 impl Nearest {
-    /// Amount by which the covariance of the state is to be larger, so that the response is nowhere better known than
-    /// by the fit: gains of one lag cannot report how a lag that is not known goes with the frequency.
+    /// Increase of the covariance of the state such that the response is nowhere better known than from the fit: gains
+    /// of one lag cannot represent how an unknown lag varies with frequency.
     fn lost(&self, fit: &FittedOperator, coordinates: &[Coordinate], columns: &[[f64; STATES]]) -> f64 {
         let p = coordinates.len();
         let sizes = |g: &[Complex64]| -> [f64; 2] {
@@ -270,7 +268,7 @@ impl Nearest {
         }
     }
 
-    /// Gains whose response is nearest to a target, and the root mean square of the relative misfit.
+    /// Returns the gains whose response is nearest to a target, and the root mean square of the relative misfit.
     fn gains(&self, target: impl Fn(usize) -> Complex64) -> ([f64; GAINS], f64) {
         let count = self.basis.len();
         let relative = |k: usize| target(k) / self.responses[k].value;
@@ -293,8 +291,7 @@ impl Nearest {
     }
 }
 
-/// The solution of three equations, by the determinants of Cramer: the responses of the basis are far
-/// from dependent.
+/// Solves three equations by Cramer's rule: the responses of the basis are far from linearly dependent.
 fn solved(a: [[f64; GAINS]; GAINS], b: [f64; GAINS]) -> [f64; GAINS] {
     let determinant = |m: &[[f64; GAINS]; GAINS]| {
         m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])
@@ -319,7 +316,7 @@ mod tests {
     use super::*;
     use crate::{Method, TrackOptions, Tracker};
 
-    /// A fit of a form with errors of some percent that go together.
+    /// A fit of a form with correlated errors of some percent.
     fn fitted(form: Form, x: &[f64]) -> FittedOperator {
         let p = x.len();
         let size = |i: usize| 0.03 * x[i].abs().max(0.3);
@@ -349,7 +346,7 @@ mod tests {
             (Form::Lead, vec![2.0, 0.4, 2.3, -1.2, 0.18], 0.001),
             (Form::LeadLag, vec![1.4, 0.5, 0.25, 2.4, -1.4, 0.153], 0.01),
             (Form::Lead2Lag, vec![1.4, 0.3, 0.4, 2.4, -1.4, 0.2], 0.01),
-            // Hardly a lag: the basis has the longest that it may have.
+            // Hardly any lag: the basis has the longest lag allowed.
             (Form::LeadLag, vec![1.4, 0.5, 0.02, 2.4, -1.4, 0.2], 0.15),
             (Form::Lag, vec![1.4, 5.0, 2.4, -1.4, 0.2], 0.01),
         ] {
@@ -374,9 +371,8 @@ mod tests {
                     (response.phase_deg(), along(|r| r.im).to_degrees()),
                 ] {
                     let ratio = found.standard_error.unwrap() / expected;
-                    // A lag that is not known is a phase that is not known, which the gains cannot report at low
-                    // frequencies, where it is small compared with the gain's; elsewhere they carry a little more
-                    // information.
+                    // An unknown lag is an unknown phase, which the gains cannot represent at low frequencies, where
+                    // it is small compared with the gain's; elsewhere they carry a little more information.
                     assert!((ratio > 0.9 || omega < 1.0) && ratio < 1.5, "{form} {omega}: {ratio}");
                 }
             }

@@ -24,7 +24,7 @@ fn it_starts_without_a_fit_and_finds_a_steady_person() {
     let record = record(Condition::C1);
     let trace = track(&record, &options(), 100).unwrap();
     assert!(trace.start().is_none());
-    // There is an estimate from the second second on.
+    // The estimate starts in the second second.
     assert!(trace.operator(2).is_ok() && trace.covariance(2).is_some());
     let last = trace.operator(trace.len() - 1).unwrap();
     let [k_e, k_e_dot] = [0.09, 0.036];

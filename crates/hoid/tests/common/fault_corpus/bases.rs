@@ -1,8 +1,8 @@
-//! The runs without faults, and their truth.
+//! The runs without faults, and their true values.
 //!
-//! Each case has a run of condition C1 and one of C2 of the thesis, and a virtual person of one to
-//! three runs: their form, remnant, plant, rate and whether their disturbance was recorded follow
-//! from the number of the case. Who changes (C3 to C6) is left out: their truth is not one number.
+//! Each case has a run of condition C1 and one of C2 of the thesis, and a virtual person with one to three runs: form,
+//! remnant, plant, rate and whether the disturbance was recorded follow from the number of the case. People who change
+//! (C3 to C6) are left out: their true values are not constant.
 
 use hoid::{
     model::{FamilyOperator, Form},
@@ -18,7 +18,7 @@ use super::table::Table;
 /// True values by name.
 pub type Truth = Vec<(String, f64)>;
 
-/// Who acts.
+/// Kind of operator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Who {
     C1,
@@ -38,11 +38,11 @@ impl Who {
     }
 }
 
-/// Runs of one operator, and one run of another for the fault that needs them.
+/// Runs of one operator, and one run of another for the fault that needs it.
 #[derive(Debug, Clone)]
 pub struct Base {
     pub who: Who,
-    /// What kind of run: `C1`, or `person, pulsed`.
+    /// Kind of run: `C1`, or `person, pulsed`.
     pub label: String,
     pub form: Form,
     pub runs: Vec<Table>,
@@ -52,7 +52,7 @@ pub struct Base {
 }
 
 impl Base {
-    /// The run that gets the fault.
+    /// Index of the run that gets the fault.
     pub fn faulty(&self) -> usize {
         self.runs.len() / 2
     }
@@ -108,14 +108,14 @@ fn of_text(who: Who, seed: u64, case: u64) -> Result<Base, SimError> {
 }
 
 fn of_person(seed: u64, case: u64) -> Result<Base, SimError> {
-    // A part of the corpus, every tenth case report, must have all kinds of people too.
+    // A tenth of the corpus, every tenth case, must have all kinds of people too.
     let i = (case + case / 10) as usize;
     let task = Task {
         sample_time: SampleTime::new([1.0 / 60.0, 0.01][i / 2 % 2])?,
         ..Task::default()
     };
     let kind = RemnantKind::ALL[i % 5];
-    // Every other has a lead, which the trackers and polynomials know; an integrator has none.
+    // Every other has a lead, which trackers and polynomials represent; an integrator has none.
     let lead = i.is_multiple_of(2);
     let plant = if lead {
         Plant::ALL[1 + i / 2 % 2]
@@ -145,7 +145,7 @@ fn of_person(seed: u64, case: u64) -> Result<Base, SimError> {
 
 fn named(operator: &FamilyOperator) -> Truth {
     let all = operator.named().into_iter();
-    // An infinite T_I is not a number to be off from.
+    // An infinite T_I has no error.
     all.filter(|p| p.value.is_finite())
         .map(|p| (p.name.to_owned(), p.value))
         .collect()

@@ -1,4 +1,4 @@
-//! How each fault comes into a recording.
+//! Insertion of each fault into a recording.
 
 use hoid::prelude::RunSeed;
 
@@ -11,14 +11,15 @@ use super::{
 #[derive(Debug, Clone)]
 pub struct Injected {
     pub table: Table,
-    /// Where the fault shows, s from the first sample; of what stays, the moment it starts.
+    /// Start of the fault, s from the first sample; for a lasting fault, its first moment.
     pub from_s: f64,
     pub to_s: f64,
-    /// The first row that is another and the first after the last such, by the rows of the recording without the fault.
+    /// The first row that differs and the first after the last such row, by the rows of the recording without the
+    /// fault.
     pub rows: (usize, usize),
 }
 
-/// Numbers in [0, 1) of a case, by SplitMix64 (G. L. Steele et al., OOPSLA 2014).
+/// Returns a number in [0, 1) for a case, by SplitMix64 (G. L. Steele et al., OOPSLA 2014).
 pub fn uniform(seed: u64, case: u64, draw: u64) -> f64 {
     let mut z = seed
         .wrapping_mul(0x9e37_79b9_7f4a_7c15)
@@ -29,7 +30,7 @@ pub fn uniform(seed: u64, case: u64, draw: u64) -> f64 {
     ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// Puts a fault into a recording. `second` is that of another person.
+/// Inserts a fault into a recording. `second` is that of another person.
 pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64) -> Injected {
     let mut table = clean.clone();
     let n = clean.len();
@@ -47,7 +48,7 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
     let until = |length: usize| at.saturating_add(length).min(n);
     let (on, size) = (fault.kind.on, fault.size);
     let seconds = if size == WHOLE { n } else { samples(size) };
-    // Rows that differ; the visible text is the same except for what stays.
+    // Rows that differ; the printed text is the same except for lasting faults.
     let mut rows = (at, n);
     let mut stays = false;
     match fault.kind.what {
@@ -89,7 +90,7 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
             each(&mut table, on, rows, |_, _, is_e| if is_e { e } else { u });
         }
         What::Idle | What::IdleNoisy => {
-            // Before the run, inside it, after it.
+            // Before, inside and after the run.
             let at = match fault.place {
                 FaultPosition::Start => 0,
                 FaultPosition::End => n,
@@ -194,7 +195,7 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
     }
 }
 
-/// Changes the values of the channels in some rows: of a value, its row and whether it is of e.
+/// Changes the values of the channels in some rows: `change` gets a value, its row and whether it is of e.
 fn each(table: &mut Table, on: On, rows: (usize, usize), change: impl Fn(f64, usize, bool) -> f64) {
     for k in rows.0..rows.1 {
         if on.e() {

@@ -1,12 +1,13 @@
-//! Reliability of a result, against the truth.
+//! Judgement of a result, compared with the true values.
 //!
-//! The error of a parameter is its distance from the truth in its own standard errors; a delay that
-//! is found on the grid of samples alone has one sample for an error. A parameter that is reported as
-//! not determined, or has no error at all, claims nothing.
+//! The error of a parameter is its distance from the true value in its own standard errors; a delay that is found only
+//! on the grid of samples has an error of one sample. A parameter that is reported as not determined, or has no
+//! standard error, makes no claim.
 //!
-//! A trace is wrong where it is at its last row or [`LATER_S`] after the fault. Its recovery is the time from the end
-//! of the fault to the last row at which a parameter is off by more than [`NEAR_ERRORS`] of its errors and by more than
-//! [`NEAR_SHARE`] of its truth. Its lasting error is the largest that it had for [`LASTING_S`] on end.
+//! A trace is wrong if it is wrong at its last row or [`LATER_S`] after the fault. Its recovery is the time from the
+//! end of the fault to the last row at which a parameter is off by more than [`NEAR_ERRORS`] of its errors and by more
+//! than [`NEAR_SHARE`] of its true value. Its lasting error is the largest that it had for [`LASTING_S`] without
+//! interruption.
 
 use serde_json::Value;
 
@@ -14,25 +15,25 @@ use super::bases::Truth;
 
 /// Standard errors from which a number is wrong.
 pub const WRONG: f64 = 4.0;
-/// How near a report must be to its fault, s.
+/// Largest distance of a report from its fault, s.
 pub const NEAR_S: f64 = 1.0;
-/// When a trace is examined once more, s after the fault.
+/// Time after the fault at which a trace is examined again, s.
 pub const LATER_S: f64 = 20.0;
 const NEAR_ERRORS: f64 = 2.5;
 const NEAR_SHARE: f64 = 0.1;
 const LASTING_S: f64 = 5.0;
-/// Findings that report faults of the recording, and of nothing else.
+/// Findings that only report faults of the recording.
 const OF_FAULTS: [&str; 4] = ["faults", "held-back", "hostile-span", "restarted"];
 
 /// Known properties of a case.
 #[derive(Debug, Clone)]
 pub struct CaseTruth {
     pub truth: Truth,
-    /// The truth after the fault, where that is another person.
+    /// True values after the fault, if there is another person then.
     pub then: Option<Truth>,
-    /// Where the fault shows, s; `None` in a clean run.
+    /// Span of the fault, s; `None` in a clean run.
     pub span_s: Option<(f64, f64)>,
-    /// Name of the file that has it.
+    /// Name of the file with the fault.
     pub file: String,
     pub sample_time: f64,
 }
@@ -40,26 +41,26 @@ pub struct CaseTruth {
 /// The judgement of one result.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CaseOutcome {
-    /// The parameter that is off most, and by how many standard errors.
+    /// The parameter with the largest error, and its error in standard errors.
     pub worst: Option<(String, f64)>,
     pub wrong: bool,
-    /// The verdict in a word; "refused" where there is no result.
+    /// The verdict in a word; "refused" without a result.
     pub level: String,
     /// Findings against the result, by kinds.
     pub kinds: Vec<String>,
-    /// Whether a finding that is more than a note reports faults.
+    /// True if a finding that is more than a note reports faults.
     pub of_faults: bool,
-    /// Faults that are reported, and whether one is at the right place.
+    /// Number of reported faults, and whether one is at the right place.
     pub told: usize,
     pub placed: bool,
-    /// Of traces: seconds until it was near the truth for good; infinite where it never was.
+    /// For traces: time until it was near the true values for good, s; infinite if it never was.
     pub recovery_s: Option<f64>,
-    /// Of traces: the largest error that lasted, in standard errors.
+    /// For traces: the largest lasting error, in standard errors.
     pub lasting: Option<f64>,
 }
 
 impl CaseOutcome {
-    /// A record that the program refuses.
+    /// Outcome for a record that the program refuses.
     pub fn refused() -> Self {
         Self {
             level: "refused".to_owned(),
@@ -67,18 +68,18 @@ impl CaseOutcome {
         }
     }
 
-    /// Whether the user is reported that something is amiss.
+    /// True if the user is warned.
     pub fn flagged(&self) -> bool {
         self.level != "trustworthy" || self.placed
     }
 
-    /// What must not be.
+    /// True for the outcome that must not occur: wrong and not flagged.
     pub fn silently_wrong(&self) -> bool {
         self.wrong && !self.flagged()
     }
 }
 
-/// One parameter: its value, and its standard error where it claims one.
+/// One parameter: its value, and its standard error if it has one.
 pub type Claim = (String, f64, f64);
 
 /// A row of a trace.
@@ -122,7 +123,7 @@ pub fn of_trace(json: &Value, rows: &[Row], known: &CaseTruth) -> CaseOutcome {
         let after: Vec<&Row> = rows.iter().filter(|row| row.t >= behind).collect();
         let far = |row: &&&Row| !is_near(&row.claims, truth_at(row.t));
         let last = after.last()?.t;
-        // A trace that ends with the fault, or so soon after that nothing can be reported.
+        // A trace that ends with the fault, or so soon after it that nothing can be reported.
         (last - behind > 1.0).then(|| match after.iter().rfind(far) {
             Some(row) if row.t >= last => f64::INFINITY,
             Some(row) => row.t - behind,
@@ -151,7 +152,7 @@ fn reported(json: &Value, known: &CaseTruth) -> CaseOutcome {
     };
     let meets = |fault: &Value| {
         let Some((from, to)) = known.span_s else { return false };
-        // A fault of the whole file, as its unit of time, has no place.
+        // A fault of the whole file, such as its unit of time, has no place.
         let begins = fault["from"].as_f64().unwrap_or(0.0);
         let ends = fault["to"].as_f64().unwrap_or(f64::INFINITY);
         begins <= to + NEAR_S && ends >= from - NEAR_S
@@ -204,7 +205,7 @@ fn is_near(claims: &[Claim], truth: &Truth) -> bool {
     !claims.is_empty() && claims.iter().all(near)
 }
 
-/// The largest error that was there for [`LASTING_S`] on end, of (t, error).
+/// Returns the largest error that lasted for [`LASTING_S`], of (t, error).
 fn lasting(errors: &[(f64, f64)]) -> Option<f64> {
     let (first, last) = (errors.first()?.0, errors.last()?.0);
     if last - first < LASTING_S {

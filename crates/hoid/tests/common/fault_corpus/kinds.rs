@@ -1,6 +1,6 @@
 //! The faults: kinds, sizes, places, and the cases in their order.
 
-/// In which channel a fault is.
+/// Channel of a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum On {
     E,
@@ -18,30 +18,30 @@ impl On {
     }
 }
 
-/// What happens.
+/// Kind of change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum What {
     /// Nothing: a clean run.
     Nothing,
-    /// One sample off, by standard deviations of its channel.
+    /// One sample off, in standard deviations of its channel.
     Spike,
     /// Samples off by 10 standard deviations, of either sign; their number.
     Burst,
-    /// Cells that are empty; their number.
+    /// Empty cells; their number.
     Missing,
     /// 360 deg added for some seconds.
     Wrap,
-    /// A level that changes and stays, by percent of the standard deviation.
+    /// A lasting change of the level, in percent of the standard deviation.
     Step,
-    /// A level of the whole record, by percent of the standard deviation.
+    /// A level of the whole record, in percent of the standard deviation.
     Offset,
-    /// A straight line over the whole record, by standard deviations at its end.
+    /// A straight line over the whole record, in standard deviations at its end.
     Drift,
-    /// A value that is held for some seconds.
+    /// A constant value for some seconds.
     Frozen,
-    /// Some seconds of zeros put in before, inside or after the run.
+    /// Some seconds of zeros inserted before, inside or after the run.
     Idle,
-    /// The same with a trace of noise: 0.001 standard deviations.
+    /// The same with a little noise: 0.001 standard deviations.
     IdleNoisy,
     /// Zeros in place of the signal for some seconds.
     Dropout,
@@ -51,19 +51,19 @@ pub enum What {
     ScaledLong,
     /// The time in ms.
     Milliseconds,
-    /// e and u exchanged for some seconds, or wholly.
+    /// e and u exchanged for some seconds, or throughout.
     Swapped,
-    /// The sign turned for some seconds, or wholly.
+    /// The sign inverted for some seconds, or throughout.
     Flipped,
-    /// Values held at some standard deviations from the mean.
+    /// Values limited to some standard deviations from the mean.
     Saturated,
     /// Values rounded to steps of some standard deviations.
     Quantised,
-    /// Rows that are gone for some seconds, the time counted as if nothing were.
+    /// Rows missing for some seconds, with the time counted as if none were.
     Lost,
-    /// Rows that are duplicated for some seconds, the time counted on.
+    /// Rows duplicated for some seconds, with the time counted on.
     Duplicated,
-    /// u later by some samples from here on.
+    /// u delayed by some samples from here on.
     Late,
     /// A record of a given number of samples.
     Short,
@@ -78,7 +78,7 @@ pub struct Kind {
     pub on: On,
 }
 
-/// Where in the record.
+/// Position in the record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FaultPosition {
     /// At 6 % of its length.
@@ -87,7 +87,7 @@ pub enum FaultPosition {
     Middle,
     /// At 90 %.
     End,
-    /// All of it, or where the kind reports.
+    /// All of it, or as defined by the kind.
     Whole,
 }
 
@@ -108,7 +108,7 @@ const ALL: &[FaultPosition] = &[FaultPosition::Whole];
 /// The whole record.
 pub const WHOLE: f64 = f64::INFINITY;
 
-/// A line for each kind: name, unit of its size, channels, sizes, places.
+/// A line per kind: name, unit of its size, channels, sizes, places.
 type Line = (
     What,
     &'static str,
@@ -178,7 +178,7 @@ impl Kind {
         on: On::Both,
     };
 
-    /// As tables have it: `spike, e`.
+    /// Name in the tables: `spike, e`.
     pub fn name(self) -> String {
         let Some((_, name, _, channels, ..)) = LINES.iter().find(|line| line.0 == self.what) else {
             return "none".to_owned();
@@ -220,7 +220,7 @@ pub fn faults() -> Vec<Fault> {
     for (what, _, _, channels, sizes, places) in LINES {
         for &on in channels {
             for &size in sizes {
-                // What has the whole record has no place in it; a wrap starts somewhere.
+                // A fault of the whole record has no position in it; a wrap starts somewhere.
                 let places = if size == WHOLE && what != What::Wrap {
                     ALL
                 } else {

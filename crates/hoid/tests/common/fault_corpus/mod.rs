@@ -1,15 +1,13 @@
-//! What does a fault of a recording do to a result, and does the result report it? Virtual runs
-//! whose operator is known get one fault each, are given to the program `hoid` as files, and what
-//! comes back is judged.
+//! Effect of a fault of a recording on a result, and whether the result reports it. Virtual runs with a known operator
+//! get one fault each and are passed to the program `hoid` as files; its results are judged.
 //!
-//! A result is *wrong* where a parameter that is reported as determined lies more than
-//! [`judge::WRONG`] of its standard errors from the truth. It is *flagged* where the verdict is not
-//! "trustworthy", where a fault is reported at its place (within [`judge::NEAR_S`]), or where the
-//! program refuses the record. What must not be is a result that is wrong and not flagged; what is
-//! useless is a flag on a result that is right.
+//! A result is *wrong* if a parameter that is reported as determined differs by more than
+//! [`judge::WRONG`] of its standard errors from the true value. It is *flagged* if the verdict is not "trustworthy",
+//! if a fault is reported at its place (within [`judge::NEAR_S`]), or if the program refuses the record. A result that
+//! is wrong and not flagged must not occur; a flag on a correct result is useless.
 //!
-//! Methods that estimate wrongly on clean runs too, as `rls` with its own noise model, do so here:
-//! the clean runs are a row of the same table.
+//! Methods that estimate wrongly on clean runs too, such as `rls` with its own noise model, do so here as well: the
+//! clean runs are a row of the same table.
 //!
 //! | file | contents |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! The program, run on a case: what the user gets is what is judged.
+//! The program, run on a case: the output for the user is judged.
 
 use std::{
     fs::{self, File},
@@ -16,15 +16,15 @@ use super::{
     kinds::{Fault, What},
 };
 
-/// A run of the program that takes longer is ended, s.
+/// Time limit of a run of the program, s.
 const LONGEST_S: u64 = 120;
-/// Every n samples a row of a trace.
+/// Number of samples per row of a trace.
 const EVERY: &str = "10";
 
-/// How a record is evaluated, with default options.
+/// Method by which a record is evaluated, with default options.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Way {
-    /// `identify --form` the true one: the grey box.
+    /// `identify --form` with the true form: the grey box.
     GreyBox,
     /// `identify --structure bj`.
     BoxJenkins,
@@ -62,8 +62,8 @@ impl Way {
         !matches!(self, Self::GreyBox | Self::BoxJenkins)
     }
 
-    /// Those that a run is evaluated by: the grey box knows all operators, the others a gain with a
-    /// lead; of people, by the three that are meant for them.
+    /// Methods for a run: the grey box represents all operators, the others a gain with a lead; for people, the three
+    /// methods that are intended for them.
     pub fn of(base: &Base) -> &'static [Self] {
         const LEAD: [Way; 4] = [Way::GreyBox, Way::Adaptive, Way::MultipleModel, Way::Physical];
         match (base.who, base.form) {
@@ -84,14 +84,14 @@ pub struct Outcome {
     pub way: Way,
     pub seconds: f64,
     pub judged: CaseOutcome,
-    /// What the program reported when it gave no result.
+    /// Message of the program without a result.
     pub refusal: Option<String>,
 }
 
-/// Evaluates a fault in the runs of `who` in each of the ways that are requested and fit.
+/// Evaluates a fault in the runs of `who` by each of the requested methods that apply.
 ///
 /// # Errors
-/// Report of the simulation or the file system.
+/// Errors of the simulation or the file system.
 pub fn outcomes(
     program: &Path,
     seed: u64,
@@ -128,7 +128,7 @@ pub fn outcomes(
     all
 }
 
-/// The files of a case, the one with the fault last, and the prior knowledge of it.
+/// Writes the files of a case, the one with the fault last, and returns what is known of it.
 fn write(base: &Base, fault: &Fault, folder: &Path, seed: u64, case: u64) -> Result<(Vec<PathBuf>, CaseTruth), String> {
     let injected = inject(fault, &base.runs[base.faulty()], &base.second, seed, case);
     let mut files = Vec::new();
@@ -184,7 +184,7 @@ fn run(
     Ok(Ok(judge::of_trace(&json, &rows(&text), known)))
 }
 
-/// What a command wrote to its error stream and its output; nothing of one that failed.
+/// Returns the error stream and the output of a command; the message if it failed.
 fn finished(command: &mut Command, folder: &Path) -> Result<(String, String), String> {
     let (output, errors) = (folder.join("output"), folder.join("errors"));
     let create = |path: &Path| File::create(path).map_err(|e| format!("{}: {e}", path.display()));

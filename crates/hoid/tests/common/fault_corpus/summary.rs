@@ -15,7 +15,7 @@ pub struct Numbers {
     pub wrong: usize,
     /// Wrong and not flagged.
     pub silent: usize,
-    /// Right and flagged all the same.
+    /// Right but flagged.
     pub useless: usize,
     pub refused: usize,
     /// With a fault reported at the right place.
@@ -52,13 +52,13 @@ fn percent(of: usize, all: usize) -> String {
     }
 }
 
-/// The middle one; `None` of none.
+/// Returns the median; `None` for no values.
 pub fn median(mut all: Vec<f64>) -> Option<f64> {
     all.sort_by(f64::total_cmp);
     all.get(all.len() / 2).copied()
 }
 
-/// By method, for the runs of the text and for those of people: the gate.
+/// By method, for the runs of the thesis and for those of people: the acceptance test.
 pub fn by_way(all: &[Outcome]) -> String {
     let mut text = "| runs | method | results | wrong | wrong and not flagged | flagged, of those right | refused | \
                     fault reported at its place |\n|---|---|---|---|---|---|---|---|\n"
@@ -90,7 +90,7 @@ pub fn by_way(all: &[Outcome]) -> String {
     text
 }
 
-/// By kind and size, a column for each method.
+/// By kind and size, a column per method.
 pub fn by_fault(all: &[Outcome]) -> String {
     let mut text = format!(
         "| fault | size | {} |\n|---|---|{}\n",
@@ -106,7 +106,7 @@ pub fn by_fault(all: &[Outcome]) -> String {
     text
 }
 
-/// Of trackers by kind and size: the median recovery time in s and how many never recover.
+/// For trackers by kind and size: the median recovery time in s and the number that never recover.
 pub fn recovery(all: &[Outcome]) -> String {
     let trackers: Vec<Way> = Way::ALL.into_iter().filter(|way| way.tracks()).collect();
     let names: Vec<&str> = trackers.iter().map(|way| way.name()).collect();
@@ -143,7 +143,7 @@ pub fn recovery(all: &[Outcome]) -> String {
     text
 }
 
-/// Of clean runs: false flags, by kind of run and method.
+/// For clean runs: false flags, by kind of run and method.
 pub fn clean(all: &[Outcome]) -> String {
     let mut text = "| runs | method | number | flagged by a fault | a fault reported | not trustworthy | wrong | wrong and not flagged |\n|---|---|---|---|---|---|---|---|\n".to_owned();
     let mut labels: Vec<&str> = all.iter().map(|o| o.label.as_str()).collect();
@@ -177,7 +177,7 @@ pub fn clean(all: &[Outcome]) -> String {
     text
 }
 
-/// The available items, in the order of the cases.
+/// Kinds and sizes, in the order of the cases.
 fn kinds_and_sizes(all: &[Outcome]) -> Vec<(Kind, f64)> {
     let mut found = Vec::new();
     for o in all {
@@ -189,7 +189,7 @@ fn kinds_and_sizes(all: &[Outcome]) -> Vec<(Kind, f64)> {
     found
 }
 
-/// One row for each result.
+/// One row per result.
 pub fn to_csv(all: &[Outcome]) -> String {
     let mut text = "case,kind,size,place,run,method,wrong,flagged,silent,level,kinds,of_faults,told,placed,worst,errors,recovery_s,lasting,seconds,refusal\n".to_owned();
     for o in all {

@@ -4,12 +4,12 @@ use std::fmt::Write as _;
 
 use hoid::model::Record;
 
-/// Columns over time: e, u, and where it was recorded the disturbance d.
+/// Columns over time: e, u, and the disturbance d if it was recorded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     /// Time between two samples, s.
     pub h: f64,
-    /// Time as the file has it, s except for a fault of its unit.
+    /// Time as in the file, s except for a fault of its unit.
     pub t: Vec<f64>,
     pub e: Vec<f64>,
     pub u: Vec<f64>,
@@ -17,7 +17,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// e and u of a record, with the disturbance where it is requested and there.
+    /// Makes the table of e and u of a record, with the disturbance if it is requested and recorded.
     pub fn of(record: &Record, with_disturbance: bool) -> Self {
         let h = record.sample_time().s();
         Self {
@@ -35,24 +35,23 @@ impl Table {
         self.t.len()
     }
 
-    /// Seconds from the first sample to after the last.
+    /// Returns the time from the first sample to the end of the last, s.
     pub fn seconds(&self) -> f64 {
         self.len() as f64 * self.h
     }
 
-    /// All columns but the time.
+    /// Returns all columns except the time.
     pub fn columns_mut(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
         [&mut self.e, &mut self.u].into_iter().chain(self.d.as_mut())
     }
 
-    /// Counts the time again, as a recorder does that has no information about rows that are
-    /// missing or duplicated.
+    /// Numbers the time again, like a recorder without information about missing or duplicated rows.
     pub fn renumber(&mut self) {
         let (n, h) = (self.e.len(), self.h);
         self.t = (0..n).map(|k| k as f64 * h).collect();
     }
 
-    /// As CSV; missing items are an empty cell.
+    /// Returns the table as CSV; missing values are empty cells.
     pub fn to_csv(&self) -> String {
         let mut text = String::from(if self.d.is_some() { "t,e,u,d\n" } else { "t,e,u\n" });
         let cell = |x: f64| if x.is_nan() { String::new() } else { x.to_string() };

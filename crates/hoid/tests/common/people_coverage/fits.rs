@@ -1,4 +1,4 @@
-//! The fits of a person, and what each found of each quantity.
+//! The fits of a person, and the result of each for each quantity.
 
 use std::time::Instant;
 
@@ -10,15 +10,15 @@ use hoid::{
 
 use super::people::{Cell, Spread, recorded};
 
-/// Where the response is compared, rad/s: the band of manual control.
+/// Frequencies at which the response is compared, rad/s: the band of manual control.
 const BAND_RAD_S: [f64; 5] = [0.7, 1.3, 2.4, 4.3, 8.0];
 
-/// How a person is fitted.
+/// Variant of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Variant {
     /// With the recorded disturbance, so that there is a fit at its lines.
     pub excitation: bool,
-    /// With the true form given, not chosen.
+    /// With the true form given instead of chosen.
     pub form_given: bool,
 }
 
@@ -45,7 +45,7 @@ impl Variant {
     }
 }
 
-/// A quantity next to its truth.
+/// A quantity and its true value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantity {
     pub name: String,
@@ -58,7 +58,7 @@ pub struct Quantity {
 }
 
 impl Quantity {
-    /// Whether the interval holds the truth; `None` if there is no interval.
+    /// True if the interval contains the true value; `None` without an interval.
     pub fn holds(&self) -> Option<bool> {
         self.interval.map(|(low, high)| low <= self.truth && self.truth <= high)
     }
@@ -122,7 +122,7 @@ fn found(fit: &FamilyFit, person: &Person, cell: Cell) -> FitOutcome {
     let truth = &person.state.operator;
     let of = fit.operator(0);
     let named = truth.named();
-    // The truth is the person's: where their runs differ, their errors are asked.
+    // The true values are those of the person: if their runs differ, so do the standard errors that are used.
     let of_person = cell.spread != Spread::None;
     let parameters = of.parameters.iter();
     let mut quantities: Vec<Quantity> = parameters

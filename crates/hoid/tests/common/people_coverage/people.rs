@@ -1,4 +1,4 @@
-//! The person drawn, and their runs.
+//! The people that are drawn, and their runs.
 
 use hoid::{
     model::{FamilyOperator, FamilyState},
@@ -12,17 +12,17 @@ use hoid::{
 /// Spread of parameters between the runs of a person: standard deviation of the logarithm.
 pub const BETWEEN_RUNS: f64 = 0.06;
 const RUNS: [usize; 4] = [1, 2, 5, 10];
-/// Draws of the gain of a run before its loop counts as unstable.
+/// Largest number of draws of the gain of a run before its loop counts as unstable.
 const MOST_DRAWS: usize = 50;
 
-/// What differs from one run of a person to the next.
+/// Parameters that differ between the runs of a person.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Spread {
-    /// Nothing but the remnant.
+    /// Only the remnant.
     None,
     /// The gain.
     Gain,
-    /// All parameters, each for itself.
+    /// All parameters, independently.
     All,
 }
 
@@ -49,8 +49,7 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// The conditions of the person with this number: all 360 in turn, since 5 and 72 have no
-    /// common divisor.
+    /// Returns the conditions of the person with this number: all 360 in turn, since 5 and 72 have no common divisor.
     pub fn of(person: u64) -> Self {
         let i = person as usize;
         Self {
@@ -63,7 +62,7 @@ impl Cell {
     }
 }
 
-/// The person with this number, and their runs.
+/// Returns the person with this number, and their runs.
 ///
 /// # Errors
 /// As [`Person::draw`] and [`Person::run`].
@@ -86,7 +85,7 @@ pub fn recorded(seed: u64, number: u64) -> Result<(Cell, Person, Vec<Record>), S
 /// A run whose gain is the person's times `exp(b z)`.
 fn run_with_gain(person: &Person, run: u64) -> Result<Record, SimError> {
     let streams = person.run_seed(run);
-    // Of another seed than all else of the run.
+    // With another seed than the rest of the run.
     let deviates = RunSeed {
         seed: !streams.seed,
         ..streams

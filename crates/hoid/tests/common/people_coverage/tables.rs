@@ -27,7 +27,7 @@ pub struct Share {
 }
 
 impl Share {
-    /// For these answers.
+    /// Counts the share of these answers.
     pub fn over(answers: impl IntoIterator<Item = bool>) -> Self {
         answers.into_iter().fold(Self::default(), |share, yes| Self {
             of: share.of + usize::from(yes),
@@ -47,7 +47,7 @@ impl Share {
         100.0 * (p * (1.0 - p) / n).sqrt()
     }
 
-    /// As a table has it: share, standard error, number.
+    /// In the form of a table: share, standard error, number.
     pub fn text(self) -> String {
         if self.all == 0 {
             return "–".to_owned();
@@ -56,14 +56,14 @@ impl Share {
     }
 }
 
-/// The middle one; `None` of none.
+/// Returns the median; `None` for no values.
 pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let mut all: Vec<f64> = values.into_iter().filter(|x| !x.is_nan()).collect();
     all.sort_by(f64::total_cmp);
     all.get(all.len() / 2).copied()
 }
 
-/// All of one quantity.
+/// Returns all values of one quantity.
 pub fn of_quantity<'a>(outcomes: &[&'a Outcome], name: &str) -> Vec<&'a Quantity> {
     outcomes
         .iter()
@@ -72,7 +72,7 @@ pub fn of_quantity<'a>(outcomes: &[&'a Outcome], name: &str) -> Vec<&'a Quantity
         .collect()
 }
 
-/// How often intervals of the report as determined hold the truth.
+/// Returns how often intervals of quantities that are reported as determined contain the true value.
 pub fn coverage(quantities: &[&Quantity]) -> Share {
     let determined = quantities.iter().filter(|q| q.determined);
     Share::over(determined.map(|q| q.holds().unwrap_or(false)))

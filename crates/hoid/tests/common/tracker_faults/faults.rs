@@ -1,23 +1,22 @@
-//! What can be wrong with e and u, put into a run.
+//! Faults of e and u, inserted into a run.
 
 use std::fmt;
 
-/// Which signal.
+/// Signal of a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Signal {
     E,
     U,
 }
 
-/// A fault; sizes of outliers in standard deviations of the signal, of `Innovations` in those of the
-/// innovations.
+/// A fault; sizes of outliers in standard deviations of the signal, of `Innovations` in those of the innovations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Fault {
     /// One sample or a few.
     Outlier { signal: Signal, size: f64, seconds: f64 },
     /// One sample of u.
     Innovations { size: f64 },
-    /// Alternating signs, as of a broken contact.
+    /// Alternating signs, as from a broken contact.
     Crackle { signal: Signal, size: f64, seconds: f64 },
     /// e and u times a factor.
     Scaled { factor: f64, seconds: f64 },
@@ -31,11 +30,11 @@ pub enum Fault {
     Silence { seconds: f64 },
     /// Noise of a thousandth of the signals; inserted.
     NoisySilence { seconds: f64 },
-    /// The last value again and again.
+    /// A constant value: the last one.
     Frozen { signal: Signal, seconds: f64 },
     /// Both.
     FrozenBoth { seconds: f64 },
-    /// Cut at a given number of standard deviations.
+    /// Limited to a number of standard deviations.
     Saturated { signal: Signal, at: f64, seconds: f64 },
     /// NaN.
     Missing { signal: Signal, seconds: f64 },
@@ -44,7 +43,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// Puts the fault into e and u at sample `at`; returns the first sample after it.
+    /// Inserts the fault into e and u at sample `at`; returns the first sample after it.
     pub fn put(&self, e: &mut Vec<f64>, u: &mut Vec<f64>, at: usize, per_second: f64, innovation: f64) -> usize {
         let deviation = |x: &[f64]| {
             let mean = x.iter().sum::<f64>() / x.len() as f64;

@@ -1,4 +1,4 @@
-//! A tracker over a run with a fault, next to the same over the run without.
+//! A tracker over a run with a fault, compared with the same over the run without.
 
 use hoid::{
     model::{remnant_gain::NoiseDefinition, scenario::RemnantStrength},
@@ -10,9 +10,9 @@ use super::faults::Fault;
 
 /// Length of the start span, s.
 const START_S: f64 = 30.72;
-/// Samples between two looks at the estimate.
+/// Number of samples between two comparisons of the estimate.
 const EVERY: usize = 20;
-/// Looks in a row that are more than a second.
+/// Number of consecutive comparisons that are more than a second.
 const LASTING: usize = 6;
 
 /// One person for some minutes.
@@ -43,7 +43,7 @@ impl Run {
         }
     }
 
-    /// Takes its samples so many times.
+    /// Takes all samples a number of times.
     #[allow(dead_code)]
     pub fn taken(&self, options: &TrackOptions, times: u64) {
         let mut tracker = Tracker::new(options, Some(&self.start), self.start.sample_time()).unwrap();
@@ -77,33 +77,33 @@ fn estimate(tracker: &Tracker) -> Option<Estimate> {
 /// The tracker over the run without a fault.
 pub struct Reference {
     options: TrackOptions,
-    /// Every [`EVERY`] samples.
+    /// The estimates, one every [`EVERY`] samples.
     estimates: Vec<Option<Estimate>>,
     innovation: f64,
     pub held: u64,
     pub restarts: u64,
-    /// The report of the guard of the run without a fault.
+    /// Events of the guard in the run without a fault.
     pub events: Vec<GuardEvent>,
 }
 
-/// Action of a fault.
+/// Effect of a fault.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effect {
-    /// Largest distance from the estimate without the fault that lasts for more than a second, from
-    /// one second after it on, in the standard errors of that.
+    /// Largest difference from the estimate without the fault that lasts for more than a second, from one second after
+    /// it on, in the standard errors of that estimate.
     pub shift: f64,
-    /// Time after the fault from which on the distance is at most twice the larger standard error;
-    /// none if that is never so.
+    /// Time after the fault from which on the difference is at most twice the larger standard error; none if that
+    /// never happens.
     pub recovery_s: Option<f64>,
     pub held: u64,
     pub skipped: u64,
     pub restarts: u64,
-    /// True if the guard told of something within the fault or the time after it.
+    /// True if the guard reported an event within the fault or the time after it.
     pub told: bool,
 }
 
 impl Reference {
-    /// `options` decide on the guard of what is compared; the reference is the method with no guard.
+    /// `options` determine the guard of the compared method; the reference has no guard.
     pub fn new(run: &Run, options: &TrackOptions) -> Self {
         let options = TrackOptions {
             start: StartAt::Span(Some((0.0, START_S))),
@@ -122,7 +122,7 @@ impl Reference {
         reference.innovation = tracker.innovation_variance().sqrt();
         let estimates = over(&mut tracker, run, &run.e, &run.u, &mut |_, _| {});
         reference.estimates = estimates;
-        // The same with the guard, to count how often it acts where nothing is wrong.
+        // The same with the guard, to count its actions in a run without faults.
         let mut guarded = Tracker::new(&reference.options, Some(&run.start), run.start.sample_time()).unwrap();
         let mut events = Vec::new();
         over(&mut guarded, run, &run.e, &run.u, &mut |_, t| events.extend(t.event()));
