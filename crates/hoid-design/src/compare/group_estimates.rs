@@ -18,7 +18,7 @@ use serde_json::Value;
 
 use super::{CompareError, Observation, Quantity};
 
-/// A value with its standard error and the related data.
+/// A value with its standard error, its share of prior, and the number of its runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct EstimatedValue {
     pub value: f64,

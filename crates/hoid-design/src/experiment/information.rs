@@ -192,7 +192,7 @@ impl<'a> Loop<'a> {
         ]
     }
 
-    /// The errors of a forcing function over a given number of seconds of whole periods.
+    /// Computes the expected errors of a forcing function over a given number of seconds of whole periods.
     pub fn expected(&self, forcing: &ForcingFunction, length_s: f64) -> Result<Expected, DesignError> {
         if !(length_s.is_finite() && length_s > 0.0) {
             return Err(DesignError::OutOfRange {

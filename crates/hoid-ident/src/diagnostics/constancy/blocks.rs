@@ -89,7 +89,7 @@ pub(crate) fn score_blocks(
     blocks.iter().all(finite).then_some(blocks)
 }
 
-/// Blocks of a record that are passed together.
+/// Groups of blocks of a record that are processed together.
 fn pieces(number: usize, residuals: usize) -> Vec<Range<usize>> {
     let together = (PIECE * number / residuals.max(1)).max(1);
     let starts = (0..number).step_by(together);
