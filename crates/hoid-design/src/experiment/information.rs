@@ -315,7 +315,8 @@ impl Expected {
 /// Computes the expected errors of an experiment; `length_s` is the duration of all runs together, in whole periods.
 ///
 /// # Errors
-/// [`DesignError`] for numbers out of range, a loop that is not stable or does not cross, and lines that do not determine the parameters.
+/// [`DesignError`] for numbers out of range, a loop that is unstable or without a crossover, and lines that do not
+/// determine the parameters.
 pub fn expected(task: &Task, forcing: &ForcingFunction, length_s: f64) -> Result<Expected, DesignError> {
     Loop::of(task)?.expected(forcing, length_s)
 }

@@ -16,8 +16,8 @@ const POLES: usize = 16;
 const FEWEST: usize = 4;
 /// Most coefficients of B.
 const MOST_GAINS: usize = 60;
-/// Their largest number if u is predicted so well that there may be no noise, and the threshold of that: at high rates
-/// a long delay has more samples than that.
+/// Largest number of coefficients of B if u is predicted so well that there may be no noise, and the threshold for
+/// this: at high rates a long delay takes more samples than the default number.
 const MOST_WITHOUT_NOISE: usize = 200;
 const PROMISING: f64 = 1e-3;
 /// Frequencies of the response, rad/s, evenly over their logarithm.
