@@ -146,7 +146,7 @@ fn data(parameter: &Parameter, prior: &OperatorPrior) -> Option<Observation> {
 
 fn pooled((name, unit): (&str, &str), own: &[(&str, Option<Observation>)]) -> Result<PooledParameter, CompareError> {
     let known: Vec<Observation> = own.iter().filter_map(|(_, o)| *o).collect();
-    // // For two people the variance between them is not known at all.
+    // For two people the variance between them is not known at all.
     if known.len() < LEAST_PEOPLE {
         return Err(CompareError::TooFew {
             found: known.len(),

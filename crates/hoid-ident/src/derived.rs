@@ -112,7 +112,7 @@ impl Fit {
         let error =
             |gradient: &[f64]| Estimate::with_variance(0.0, variance_along(gradient, covariance)).standard_error;
         let (re, im) = (error(&by_re)?, if z.im == 0.0 { 0.0 } else { error(&by_im)? });
-        // // Coefficients without a variance: fixed ones.
+        // Coefficients without a variance: fixed ones.
         (re > 0.0 || im > 0.0).then_some((re, im))
     }
 
@@ -125,7 +125,7 @@ impl Fit {
         if self.covariance().is_none() {
             return estimates;
         }
-        // // d ln L / d omega by a central difference: L is smooth, so that the relative error is about 1e-10.
+        // d ln L / d omega by a central difference: L is smooth, so that the relative error is about 1e-10.
         let slope = |omega: f64| {
             let h = 1e-5 * omega;
             let ratio = open_loop(omega + h) / open_loop(omega - h);
@@ -146,7 +146,7 @@ impl Fit {
                 .zip(&moved)
                 .map(|(g, d)| (g.im + along.im * d).to_degrees())
                 .collect();
-            // // The delay changes the phase, not the magnitude.
+            // The delay changes the phase, not the magnitude.
             estimates.crossover_rad_s = with(found.crossover_rad_s, moved, 0.0);
             estimates.phase_margin_deg = with(found.phase_margin_deg, phase, -omega.to_degrees());
         }

@@ -94,7 +94,7 @@ impl Estimator {
     pub fn check(&self) -> Result<(), IdentError> {
         self.orders.check(self.structure)?;
         let mut named = self.constraints.keys().chain(self.priors.keys()).peekable();
-        // // Most fits have no names, and the list of names is not made for them.
+        // Most fits have no names, and the list of names is not made for them.
         let names = named.peek().map_or_else(Vec::new, |_| self.orders.parameter_names());
         for name in named {
             if !names.contains(name) {
@@ -171,7 +171,7 @@ impl Estimator {
     /// As [`Estimator::fit`].
     pub fn fit_from(&self, records: &[Record], first: usize) -> Result<Fit, IdentError> {
         self.check()?;
-        // // The contribution of a sample to the filters is bounded first: the loss bounds only residuals.
+        // The contribution of a sample to the filters is bounded first: the loss bounds only residuals.
         let held = match self.loss {
             Loss::Huber { .. } => held(records),
             Loss::Quadratic => None,

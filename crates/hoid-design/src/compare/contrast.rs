@@ -320,7 +320,7 @@ mod tests {
             .iter()
             .map(|c| (c.from.as_str(), c.to.as_str(), c.people.len()))
             .collect();
-        // // Q lacks c, which is found and reported when its estimates are looked up.
+        // Q lacks c, which is found and reported when its estimates are looked up.
         assert_eq!(pairs, [("a", "b", 2), ("a", "c", 2), ("b", "c", 2)]);
         let all = of(&three[..4], &["who:one=P;two=Q"]).unwrap();
         assert_eq!((all.len(), all[0].variation), (1, Variation::Between));

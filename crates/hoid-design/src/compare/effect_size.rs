@@ -78,7 +78,7 @@ fn noncentrality(t: f64, dof: f64, share: f64) -> f64 {
     let (mut low, mut high) = (t - reach, t + reach);
     for _ in 0..80 {
         let middle = 0.5 * (low + high);
-        // // P(T > t) increases with delta.
+        // P(T > t) increases with delta.
         if noncentral_t(t, dof, middle) > share {
             low = middle;
         } else {
@@ -144,7 +144,7 @@ mod tests {
             };
             let [all, first, second] = of_case(cells[1]);
             let found = match cells[0] {
-                // // R's own algorithm is no more accurate in the tails.
+                // R's own algorithm is no more accurate in the tails.
                 "pt" => {
                     close(noncentral_t(number(2), number(3), number(4)), 5, 1e-8);
                     seen += 1;

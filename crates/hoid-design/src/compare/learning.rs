@@ -62,7 +62,7 @@ impl Practice {
             .enumerate()
             .map(|(place, (run, _))| vec![1.0, self.number(run, place) - self.middle])
             .collect();
-        // // If some runs lack a standard error, none is used.
+        // If some runs lack a standard error, none is used.
         let all_known = runs.iter().all(|(_, o)| o.variance > 0.0);
         let observations: Vec<Observation> = runs
             .iter()

@@ -264,7 +264,7 @@ impl Model {
     fn scatter(&self) -> Option<f64> {
         let (n, p) = self.x.shape();
         let information = self.x.transpose() * &self.x;
-        // // Rounding lets columns that are multiples of each other pass a factorisation.
+        // Rounding lets columns that are multiples of each other pass a factorisation.
         let scale = DVector::from_fn(p, |j, _| information[(j, j)].sqrt());
         if scale.iter().any(|s| *s == 0.0) {
             return None;
@@ -289,7 +289,7 @@ impl Model {
         let heights: Vec<f64> = grid.iter().map(|tau| height(*tau)).collect::<Option<_>>()?;
         let best = (0..grid.len()).max_by(|a, b| heights[*a].total_cmp(&heights[*b]))?;
         let rises = slope(grid[best])? > 0.0;
-        // // At the edges of the grid there is no neighbour.
+        // At the edges of the grid there is no neighbour.
         if (best == 0 && !rises) || (best + 1 == grid.len() && rises) {
             return Some(grid[best]);
         }
@@ -368,7 +368,7 @@ mod tests {
                 (_, "ci.ub") => of(k).interval.1,
                 _ => panic!("{name}"),
             };
-            // // metafor stops its search at a step of 1e-12; there the likelihood is flat within 1e-8 of tau.
+            // metafor stops its search at a step of 1e-12; there the likelihood is flat within 1e-8 of tau.
             let tolerance = 1e-7 * expected.abs().max(1e-2);
             assert!(
                 (value - expected).abs() < tolerance,
@@ -418,7 +418,7 @@ mod tests {
 
     #[test]
     fn the_weights_are_kept_away_from_those_of_one_person() {
-        // // l has its maximum at zero, where the second person has 25 times the weight of the others.
+        // l has its maximum at zero, where the second person has 25 times the weight of the others.
         let all = [(0.3, 0.25), (-0.2, 0.01), (-0.4, 0.25), (0.1, 0.2)];
         let all = all.map(|(value, variance)| Observation { value, variance });
         let [penalised, restricted] = [Weights::Penalised, Weights::Restricted].map(|w| meta_mean(&all, w).unwrap());

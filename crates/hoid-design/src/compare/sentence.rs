@@ -25,7 +25,7 @@ pub(super) fn sentence(difference: &Difference, adjusted: bool) -> String {
         unit => format!(" {unit}"),
     };
     let error = Some(estimate.standard_error);
-    // // The ends of the interval have the digits of the value.
+    // The ends of the interval have the digits of the value.
     let digits = |v: f64| with_uncertainty(v, error).0;
     let test = test(difference, adjusted);
     let (low, high) = estimate.interval;

@@ -321,7 +321,7 @@ mod tests {
         assert!(designed.crest_factor < 2.5 && designed.periods == 1);
         assert!((designed.forcing.rms_deg() - 1.0).abs() < 1e-9);
         assert_eq!(designed, Designing::default().run(&task).unwrap());
-        // // The shelf above the crossover, and no dominant line.
+        // The shelf above the crossover, and no dominant line.
         let crossover = designed.expected.crossover_rad_s.value;
         let amplitudes = |beyond: bool| -> Vec<f64> {
             let of = designed

@@ -130,7 +130,7 @@ impl<'a> Loop<'a> {
             noise: [0.0; 2],
             crossover_rad_s,
         };
-        // // Trapezoidal rule over log omega; both signs of f.
+        // Trapezoidal rule over log omega; both signs of f.
         let ratio = (RANGE.1 / RANGE.0).ln() / (POINTS - 1) as f64;
         for k in 0..POINTS {
             let omega = RANGE.0 * (ratio * k as f64).exp();
@@ -265,7 +265,7 @@ impl<'a> Loop<'a> {
         let response = operator.response_and_gradient(omega);
         let logarithm = |w: f64| (operator.response(w) * self.task.state.controlled_element.response(w)).ln();
         let step = 1e-5 * omega;
-        // // The phase may differ by a whole turn between the two.
+        // The phase may differ by a whole turn between the two.
         let slope = {
             let difference = logarithm(omega + step) - logarithm(omega - step);
             let turn = difference.im - TAU * (difference.im / TAU).round();
@@ -392,7 +392,7 @@ pub(super) mod tests {
 
     #[test]
     fn crossover_and_margin_move_with_the_parameters() {
-        // // Finite differences of the margins of an operator with another gain: d omega/d ln K.
+        // Finite differences of the margins of an operator with another gain: d omega/d ln K.
         let task = task(0.2);
         let all = Loop::of(&task).unwrap();
         let n = task.state.operator.coordinates().len();

@@ -22,7 +22,7 @@ pub(super) fn multiples(least: u32, largest: u32, count: usize) -> Vec<u32> {
     for k in 0..count {
         let part = if count > 1 { k as f64 / (count - 1) as f64 } else { 0.0 };
         let wanted = (low + part * (high - low)).exp().round() as u32;
-        // // The nearest free multiple; of two, the larger.
+        // The nearest free multiple; of two, the larger.
         let near = (0..=largest)
             .flat_map(|d| [wanted.checked_add(d), wanted.checked_sub(d)])
             .flatten();
@@ -92,7 +92,7 @@ pub(super) fn set_phases(lines: &mut [Sinusoid], period_s: f64) {
         for k in 0..trial.len() {
             let turns = match start {
                 0 => -(0..k).map(|j| (k - j) as f64 * relative[j]).sum::<f64>(),
-                // // Multiples of irrational numbers do not repeat.
+                // Multiples of irrational numbers do not repeat.
                 _ => ((start * (k + 1)) as f64 * 0.618_033_988_75) + ((k * k) as f64 * 0.414_213_562_37 * start as f64),
             };
             trial[k].phase_rad = (TAU * turns).rem_euclid(TAU);
@@ -171,7 +171,7 @@ mod tests {
         let mut again = equal(&all, 80.0);
         set_phases(&mut again, 80.0);
         assert_eq!(lines, again);
-        // // The table of one line has its amplitude.
+        // The table of one line has its amplitude.
         let one = equal(&[3], 10.0);
         assert!((crest_factor(&one, 10.0) - 2f64.sqrt()).abs() < 1e-2);
     }

@@ -125,7 +125,7 @@ impl InitialStateResponses {
         };
         for (index, column) in columns.into_iter().enumerate() {
             let mut whole = vec![0.0; prior_rows];
-            // // For a state of the noise.
+            // For a state of the noise.
             if let Some(z) = index
                 .checked_sub(free.of_inputs.len())
                 .and_then(|state| whole.get_mut(state))
@@ -183,7 +183,7 @@ impl InitialStateResponses {
                 states[l] -= self.r[k][l] * states[k];
             }
         }
-        // // States of the noise model and a level have no effect on w.
+        // States of the noise model and a level have no effect on w.
         for (&index, &x) in self.kept.iter().zip(&states) {
             if Some(index) == self.level {
                 v.iter_mut().for_each(|v| *v -= x);
@@ -209,7 +209,7 @@ impl InitialStateResponses {
                     .iter()
                     .all(|x| x.abs() < DEAD)
         };
-        // // A basis vector has unit length, and the first value of an impulse response is one.
+        // A basis vector has unit length, and the first value of an impulse response is one.
         self.h.iter().all(|h| h.len() < rows) && self.basis().all(dead)
     }
 

@@ -73,7 +73,7 @@ impl Criterion<'_> {
     pub fn residuals_of(&self, theta: &[f64], record: usize, workspace: &mut Workspace) -> Vec<f64> {
         let mut residuals = Vec::new();
         self.pass(theta, &[], record, workspace, |_, counted, ws| {
-            // // For a short record the whole memory at once; for a long one only what it needs.
+            // For a short record the whole memory at once; for a long one only what it needs.
             residuals.reserve_exact(self.data[record].u.len() - self.first - residuals.len());
             residuals.extend_from_slice(&ws.eps[counted]);
         });

@@ -127,7 +127,7 @@ impl Criterion<'_> {
 /// Adds the products of the residuals and the columns of psi, with the initial states projected out.
 fn add_products(states: &EliminatedStates, columns: &[Column<'_>], eps: &[f64], total: &mut Linearisation) {
     let p = columns.len();
-    // // Components of each column in the space of the initial states, one row per column.
+    // Components of each column in the space of the initial states, one row per column.
     let count = states.responses.basis().count();
     let mut inside = Vec::with_capacity(p * count);
     for column in columns {

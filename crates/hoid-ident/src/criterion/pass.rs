@@ -67,7 +67,7 @@ impl Criterion<'_> {
     ) -> Option<EliminatedStates> {
         let Data { e, u, .. } = self.data[record];
         let plain = self.weights.is_none() && self.initial != InitialState::Backcast && self.further.is_empty();
-        // // With long lags the head has no residuals.
+        // With long lags the head has no residuals.
         let least = 2 * (self.first + self.orders.nk) + SPAN;
         if !plain || u.len() < 2 * head || head < least {
             return None;

@@ -56,7 +56,7 @@ impl Block {
             Self::C => (1, o.nc, 1.0),
             Self::D => (1, o.nd, -1.0),
             Self::F => (1, o.nf, -1.0),
-            // // Their columns are computed for one input after the other.
+            // Their columns are computed for one input after the other.
             Self::Further => (0, 0, 1.0),
         }
     }

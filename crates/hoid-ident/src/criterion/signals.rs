@@ -99,7 +99,7 @@ impl Criterion<'_> {
         let u = &data.u[samples.clone()];
         let (w, v) = (&mut ws.w[from..to], &mut ws.v[from..to]);
         match *parts.b {
-            // // The orders of the operator: B has two coefficients, in one pass.
+            // The orders of the operator: B has two coefficients, in one pass.
             [b0, b1] => {
                 let inputs = ws.s[from..to].iter().zip(&ws.s[from - 1..to - 1]).zip(u);
                 for ((w, v), ((s0, s1), u)) in w.iter_mut().zip(&mut *v).zip(inputs) {

@@ -71,7 +71,7 @@ impl StationaryNoise {
     /// Computes `(1/2) y' dP y` for the coefficients of C and of D at the best z: the contribution of the penalty to
     /// the descent `psi' eps`.
     pub fn descent(&self, z: &[f64], nc: usize, nd: usize) -> (Vec<f64>, Vec<f64>) {
-        // // No state, or no state with a variance.
+        // No state, or no state with a variance.
         if self.states() == 0 {
             return (Vec::new(), Vec::new());
         }

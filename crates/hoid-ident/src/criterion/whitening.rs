@@ -35,7 +35,7 @@ pub(super) fn whiten(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize
 /// Computes `y = (D/C) x` from index `from` on; the values before it are the previous inputs and outputs of the filter.
 pub(super) fn whiten_on(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize) {
     match *d {
-        // // The first lag in the same pass as the copy.
+        // The first lag in the same pass as the copy.
         [d1, ref rest @ ..] if from > 0 => {
             for ((y, x0), x1) in y[from..].iter_mut().zip(&x[from..]).zip(&x[from - 1..]) {
                 *y = x0 + d1 * x1;

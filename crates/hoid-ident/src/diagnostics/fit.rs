@@ -32,7 +32,7 @@ impl Fit {
         all.extend(choice.and_then(delay_at_end));
         all.extend(self.too_few());
         all.extend(self.system_findings());
-        // // Residuals that are rounding carry no information.
+        // Residuals that are rounding carry no information.
         if let Some(share) = self.rounding() {
             all.push(Finding::note(
                 "no-noise",
@@ -88,7 +88,7 @@ impl Fit {
                 all.extend(pole_findings(&operator, self.model.sample_time()));
                 return all;
             }
-            // // Models that are not meant to be operators.
+            // Models that are not meant to be operators.
             Err(
                 NotConvertible::OtherOrders { .. }
                 | NotConvertible::PolesInBoth { .. }
@@ -145,7 +145,7 @@ impl Fit {
 
     fn residual_findings(&self, measures: &ResidualMeasures) -> Vec<Finding> {
         if self.instrumented {
-            // // Instrumental variables assume nothing about the noise, and residuals of a closed loop follow e.
+            // Instrumental variables assume nothing about the noise, and residuals of a closed loop follow e.
             let note = |finding: Finding| {
                 let words = format!("{}; the instruments do not need it white", finding.message);
                 Finding::note(finding.kind, words)
@@ -157,7 +157,7 @@ impl Fit {
                 .chain(measures.leverage())
                 .collect();
         }
-        // // A robust loss has reduced the weight of single samples.
+        // A robust loss has reduced the weight of single samples.
         let leverage = measures.leverage().filter(|_| !self.robust);
         let others = [measures.coloured(), measures.structure()];
         others.into_iter().flatten().chain(leverage).collect()

@@ -46,7 +46,7 @@ impl GreyBoxFit {
     }
 
     fn operator_findings(&self) -> Vec<Finding> {
-        // // One operator for all records, or one for each record.
+        // One operator for all records, or one for each record.
         let places = &self.layout.positions;
         let several = places.iter().any(|of_record| *of_record != places[0]);
         let records = if several { places.len() } else { 1 };

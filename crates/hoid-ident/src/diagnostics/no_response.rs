@@ -95,7 +95,7 @@ pub fn response(records: &[Record]) -> Option<Response> {
     }
     let power: f64 = all.iter().flat_map(|s| &s.u).map(Complex64::norm_sqr).sum();
     let inverse = inverse_gram(&all)?;
-    // // Products of columns and output for each frequency and delay; a surrogate changes their phases.
+    // Products of columns and output for each frequency and delay; a surrogate changes their phases.
     let products: Vec<[[Complex64; COLUMNS]; DELAYS_S.len()]> = all.iter().flat_map(Spectra::products).collect();
     let mut turns = vec![Complex64::ONE; products.len()];
     let share = |turns: &[Complex64]| -> f64 {
@@ -192,7 +192,7 @@ impl Spectra {
 
 /// Returns the decimated channel after its own autoregression, and its coefficients.
 fn whitened(channel: &[f64], thin: usize) -> Option<(Vec<f64>, Vec<f64>)> {
-    // // The mean of the discarded samples contains the faster components.
+    // The mean of the discarded samples contains the faster components.
     let mut thinned: Vec<f64> = (channel.chunks_exact(thin)).map(mean).collect();
     let mean = mean(&thinned);
     thinned.iter_mut().for_each(|v| *v -= mean);
@@ -218,7 +218,7 @@ fn filter(d: &[f64], omega_ts: f64) -> Complex64 {
 
 /// Computes `sum x_t e^{-j omega t}` in these bins.
 fn coefficients(values: &[f64], bins: std::ops::RangeInclusive<usize>) -> Vec<Complex64> {
-    // // Amplitudes of sinusoids there: a record has a weight proportional to its length.
+    // Amplitudes of sinusoids there: a record has a weight proportional to its length.
     let scale = 0.5 * values.len() as f64;
     spectrum::coefficients(values)[bins].iter().map(|x| x * scale).collect()
 }

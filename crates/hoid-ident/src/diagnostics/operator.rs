@@ -201,7 +201,7 @@ mod tests {
             "{}",
             found[0].message
         );
-        // // Both channels with reversed sign: the lead is correct.
+        // Both channels with reversed sign: the lead is correct.
         let flipped = OperatorEstimate {
             k_e: e(-0.09, 0.009),
             k_e_dot: e(-0.036, 0.004),

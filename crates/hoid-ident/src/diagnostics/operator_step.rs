@@ -116,7 +116,7 @@ pub fn operator_step(operator: &OperatorParameters, record: &Record) -> Option<[
     let whole = each
         .iter()
         .fold(DMatrix::zeros(OPERATOR, OPERATOR), |sum, (_, big)| sum + big);
-    // // The units differ by orders of magnitude.
+    // The units differ by orders of magnitude.
     let scale = DVector::from_fn(OPERATOR, |i, _| whole[(i, i)].sqrt().recip());
     let scaled = DMatrix::from_fn(OPERATOR, OPERATOR, |i, j| whole[(i, j)] * scale[i] * scale[j]);
     let inverse = scaled.cholesky()?.inverse();

@@ -39,7 +39,7 @@ pub fn of_family(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[Record
             forms: vec![Form::Gain, Form::Derivative, Form::DerivativeLead],
             ..SeenChannel::new(name, ChannelRole::Feedforward)
         };
-        // // A channel that cannot be an input, such as a constant one, is no evidence against the fit.
+        // A channel that cannot be an input, such as a constant one, is no evidence against the fit.
         let (found, apart) = again.responds_to(records, channel).ok()?;
         (found.p_value < BY_CHANCE[usize::from(!apart)]).then(|| {
             Finding::doubt(

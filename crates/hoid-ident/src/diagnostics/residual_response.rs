@@ -63,7 +63,7 @@ pub fn residual_response(
     let n = rows.len();
     let p = columns.len() + 1;
     let z = DMatrix::from_fn(n, TAPS, |i, j| {
-        // // The current error already contains the new part of u if the controlled element responds at once.
+        // The current error already contains the new part of u if the controlled element responds at once.
         let (next, newest) = (rows[i] + 1, if j == 0 { thin } else { j * tap });
         e[next - (j + 1) * tap..next - newest.min((j + 1) * tap - 1)]
             .iter()
@@ -93,7 +93,7 @@ fn of_scores(z: &DMatrix<f64>, eps: &DVector<f64>, block: usize, known: usize) -
     let sums = z.transpose() * eps;
     let freedom = (eps.len() - known) as f64;
     let variance = eps.norm_squared() / freedom;
-    // // Only the units of u and e matter: taps have equal scales.
+    // Only the units of u and e matter: taps have equal scales.
     let inverse = gram.cholesky()?.inverse();
     let explained = (sums.transpose() * &inverse * &sums)[(0, 0)];
     let of_model = ChiSquared::new(TAPS as f64).ok()?.sf(explained / variance);
@@ -173,7 +173,7 @@ mod tests {
         for columns in [vec![known.clone(), known.clone()], vec![vec![0.0; e.len()]]] {
             assert!(residual_response(&columns, &e, &u, 100, TS).is_none());
         }
-        // // An exact fit leaves nothing to test.
+        // An exact fit leaves nothing to test.
         assert!(residual_response(std::slice::from_ref(&known), &e, &known, 100, TS).is_none());
         u[2000] = f64::NAN;
         assert!(residual_response(&[known], &e, &u, 100, TS).is_none());

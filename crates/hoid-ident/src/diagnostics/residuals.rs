@@ -194,7 +194,7 @@ mod tests {
         let missed: Vec<f64> = (20..3000).map(|t| eps[t] + 0.3 * e[t - 20]).collect();
         let measures = ResidualMeasures::of(&[(&missed, &e[20..])], 0.01);
         assert_eq!(kinds(&measures), ["structure"]);
-        // // A lag of more than 0.6 s does not count.
+        // A lag of more than 0.6 s does not count.
         let measures = ResidualMeasures::of(&[(&missed, &e[20..])], 0.1);
         assert!(kinds(&measures).is_empty(), "{measures:?}");
         let mut blow = eps.clone();

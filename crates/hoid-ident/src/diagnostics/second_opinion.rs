@@ -148,7 +148,7 @@ pub fn of_family(
     records: &[Record],
     element: Option<&ContinuousTransferFunction>,
 ) -> Vec<Finding> {
-    // // The standard errors are then those of rounding, which the ends of the removed part exceed.
+    // The standard errors are then those of rounding, which the ends of the removed part exceed.
     if fit.noise_free.is_some() {
         return Vec::new();
     }
@@ -162,7 +162,7 @@ pub fn of_family(
         channels: fit.channels_in_use(),
         ..estimator.clone()
     };
-    // // Slow components would be removed from e and u only, and not from the other inputs.
+    // Slow components would be removed from e and u only, and not from the other inputs.
     let asked = match &fit.lines {
         None if again.channels.is_empty() => &Without::ALL[..],
         _ => &Without::ALL[..1],
@@ -170,7 +170,7 @@ pub fn of_family(
     let measures = |of: &FamilyFit| of.loop_measures_in_front(0, element?);
     opinions(asked, records, |others| {
         let other = again.fit_with_response(others, None).ok()?;
-        // // The best form alone: the other fit has only this one.
+        // The best form alone: the other fit has only this one.
         let (one, two) = (fit.weighed.first()?, other.weighed.first()?);
         let parameters = one.operators.iter().zip(&two.operators).flat_map(|(one, two)| {
             let both = one.parameters.iter().zip(&two.parameters);

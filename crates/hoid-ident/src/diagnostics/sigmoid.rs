@@ -71,7 +71,7 @@ impl SigmoidFit {
                         "the delay {value:.3} s lies at the end of the range in which it was searched for; widen it"
                     ),
                 )),
-                // // A pure integration, or no lag.
+                // A pure integration, or no lag.
                 Some(Remark::AtBound) if name == "T_I" => all.push(Finding::note(
                     "lag",
                     format!("T_I and K are not determined, K/T_I is: T_I rests at a bound, {value:.3} s"),
@@ -113,7 +113,7 @@ fn family_findings(operators: &[(&str, &ChangedOperator)], sample_time: SampleTi
     for (label, of) in operators {
         for p in &of.parameters {
             let varies = !matches!(p.name, "T_I" | "K" | "omega_nm" | "zeta_nm" | "tau_e");
-            // // Without a lag K is the gain itself.
+            // Without a lag K is the gain itself.
             if varies || (p.name == "K" && of.get("T_I").is_none()) {
                 known |= !is_open(&p.estimate);
                 if is_open(&p.estimate) {

@@ -99,7 +99,7 @@ fn limited(x: &DMatrix<f64>, y: &DVector<f64>, limit: f64) -> Option<DVector<f64
 
 fn clipped(eps: &DVector<f64>, limit: f64) -> DVector<f64> {
     let most = limit * (eps.norm_squared() / eps.len() as f64).sqrt();
-    // // If all residuals are zero, the limit is not a number; min and max ignore it.
+    // If all residuals are zero, the limit is not a number; min and max ignore it.
     eps.map(|v| v.max(-most).min(most))
 }
 

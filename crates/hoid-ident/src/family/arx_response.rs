@@ -85,7 +85,7 @@ fn regressed(records: &[Record], of_a_alone: bool, most_gains: usize) -> Result<
     orders.na = POLES.min(shortest / 12).max(2);
     orders.nb = gains(records).clamp(4, most_gains).min(shortest / 8).max(2);
     loop {
-        // // Without noise, the removed means have a visible effect.
+        // Without noise, the removed means have a visible effect.
         let estimator = Estimator {
             level: of_a_alone,
             ..Estimator::new(Structure::Arx, orders)
@@ -114,7 +114,7 @@ fn measured(point: &ResponsePoint) -> MeasuredResponse {
     MeasuredResponse {
         omega_rad_s: point.omega_rad_s,
         response: Complex64::from_polar(gain, point.phase_deg.value.to_radians()),
-        // // The relative error is at least a thousandth: an exact fit has no variance.
+        // The relative error is at least a thousandth: an exact fit has no variance.
         variance: gain * gain * (relative * relative + turn * turn).max(1e-6),
     }
 }

@@ -96,7 +96,7 @@ impl<'a> Chosen<'_, 'a> {
         let unseen = self.prediction.little_noise.is_none();
         let mut errors = Errors::of(fit, self.run_to_run, workspace);
         let error_ratio = errors.largest_ratio(fit);
-        // // The effect of the noise model: part of its errors, and of the admissible difference of methods.
+        // The effect of the noise model: part of its errors, and of the admissible difference of methods.
         let others = rivals(self.prediction, fit, self.highest_order, workspace);
         let (instrumental, no_instrumental) = match self.instrumental(separate, workspace) {
             None => (None, None),

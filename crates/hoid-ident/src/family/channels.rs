@@ -192,7 +192,7 @@ impl<'s> Seen<'s> {
                     ),
                 );
             }
-            // // Twice: the second time removes the rounding error of the first.
+            // Twice: the second time removes the rounding error of the first.
             let mut left = own;
             for _ in 0..2 {
                 for known in &basis {
@@ -313,7 +313,7 @@ impl<'s> Seen<'s> {
             let fits: Vec<(Form, Option<(Form, ChannelMinimum)>)> =
                 begun[k].iter().map(|c| (c.form, best_of(&with(c.form)))).collect();
             let found = fits.iter().filter_map(|(form, fit)| Some((*form, fit.as_ref()?)));
-            // // An additional parameter has to explain more than chance does in one of twenty records.
+            // An additional parameter has to explain more than chance does in one of twenty records.
             let excess =
                 (fits.iter().filter_map(|(_, fit)| Some(fit.as_ref()?.1.excess()))).fold(f64::INFINITY, f64::min);
             let cost = |fit: &ChannelMinimum| fit.chi_squared / excess + EACH_MORE * fit.coordinates.len() as f64;
@@ -397,7 +397,7 @@ impl<'s> Seen<'s> {
         for (values, lead) in self.values.iter().zip(&self.leads) {
             further.push(FurtherInput {
                 orders: InputOrders {
-                    // // The delay relative to the end of the preview is longer by the preview.
+                    // The delay relative to the end of the preview is longer by the preview.
                     nb: (nb + lead).min(2 * MOST_GAINS),
                     nf: 0,
                     nk: 0,
@@ -429,7 +429,7 @@ impl<'s> Seen<'s> {
         (0..p).for_each(|i| at.gram[i * p + i] *= 1.0 + RIDGE);
         let theta = solve_symmetric(&at.gram, &at.descent)?;
         let squares = (at.sum_of_squares - dot(&theta, &at.descent)).max(0.0);
-        // // The variance is at least that of the rounding error of such a regression.
+        // The variance is at least that of the rounding error of such a regression.
         let variance = squares.max(1e-12 * at.sum_of_squares) / (n - p) as f64;
         let mut inverse = vec![0.0; p * p];
         for i in 0..p {
@@ -638,7 +638,7 @@ pub(super) fn with_responses(
                     name: "tau_f".to_owned(),
                     value: delay(parameter.value),
                     interval: parameter.interval.map(|(low, high)| (delay(low), delay(high))),
-                    // // Zero is an ordinary value of this delay.
+                    // Zero is an ordinary value of this delay.
                     determined: parameter.standard_error.is_some(),
                     ..parameter
                 }

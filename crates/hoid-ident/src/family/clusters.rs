@@ -90,7 +90,7 @@ impl Clusters {
                         gram[j * q + i] = gram[i * q + j];
                     }
                 }
-                // // Chain rule: psi_eta = psi_theta dtheta/deta, summed into the elements of eta that the record uses.
+                // Chain rule: psi_eta = psi_theta dtheta/deta, summed into the elements of eta that the record uses.
                 let (mut g, mut big) = (vec![0.0; p], vec![0.0; p * p]);
                 for (column, &place) in mapped.columns.iter().zip(positions) {
                     g[place] += dot(column, &scores);

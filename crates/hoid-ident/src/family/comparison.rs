@@ -46,7 +46,7 @@ impl Comparison {
     pub fn of(tried: &[Tried<'_>], prediction: &Prediction<'_>) -> Self {
         let criteria = criteria(tried, prediction);
         let mut counting = criteria.clone();
-        // // A form that lacks an existing lag uses the neuromuscular poles for it.
+        // A form that lacks an existing lag uses the neuromuscular poles for it.
         retain(&mut counting, |i| !has_lost_its_muscles(&tried[i]));
         retain(&mut counting, |i| tried[i].fit.as_ref().is_ok_and(|fit| !is_open(fit)));
         if prediction.noise_free().is_some() {

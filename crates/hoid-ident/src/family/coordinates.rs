@@ -50,7 +50,7 @@ pub(super) enum Grid {
 /// Starting values of a coordinate.
 fn start_values(coordinate: Coordinate, (low, high): (f64, f64), grid: Grid) -> Vec<f64> {
     let values: &[f64] = match coordinate {
-        // // The gain is computed from the other coordinates.
+        // The gain is computed from the other coordinates.
         Coordinate::Gain => &[1.0],
         Coordinate::Lead => &[0.15, 0.5, 1.2, 3.0],
         Coordinate::LagRate => &[0.03, 0.2, 1.0],

@@ -211,19 +211,19 @@ pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
     let scale = fit.innovation_variance * fit.inflation;
     let mut clustered: Vec<f64> = match fit.clusters.kind {
         ClusterKind::Runs => {
-            // // H^-1 P H^-1: the prior has the same weight as the inflated data.
+            // H^-1 P H^-1: the prior has the same weight as the inflated data.
             let mut open = vec![0.0; p * p];
             add_open_part(&mut open, 1.0, &fit.criterion.penalty, fit.eta(), &inverse);
             match over_clusters(fit) {
                 Some(by_runs) => by_runs.iter().zip(&open).map(|(j, open)| j + scale * open).collect(),
-                // // A combination that only one run determines: its scatter is not known.
+                // A combination that only one run determines: its scatter is not known.
                 None => inverse.iter().map(|g| scale * g).collect(),
             }
         }
         // H^-1 G H^-1 + H^-1 P H^-1 = H^-1, all of it inflated.
         ClusterKind::Blocks => inverse.iter().map(|g| scale * g).collect(),
     };
-    // // H^-1 L H^-1 for lines with the weight w, L their part of H. The scatter of runs does not contain it.
+    // H^-1 L H^-1 for lines with the weight w, L their part of H. The scatter of runs does not contain it.
     let counted = if fit.clusters.kind == ClusterKind::Runs {
         0.0
     } else {

@@ -98,7 +98,7 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
     determined(judged, &mut all);
     all.extend(unsettled(judged.weighed));
     if let Some(share) = judged.noise_free {
-        // // The residuals are rounding of the data, for which no residual test and no other method is meant.
+        // The residuals are rounding of the data, for which no residual test and no other method is meant.
         all.push(Finding::note(
             "no-noise",
             format!(
@@ -199,7 +199,7 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
             true => "tau_e is determined by the prior alone".to_owned(),
             false => "tau_e is not determined".to_owned(),
         };
-        // // As with other parameters: without a standard error it has no digits.
+        // As with other parameters: without a standard error it has no digits.
         all.push(Finding::note("delay", words));
     }
     if let Some((t_i, (low, high))) = find("T_I").and_then(|t| Some((t, t.interval?)))

@@ -33,7 +33,7 @@ impl Errors {
     pub fn of(fit: &PredictionFit<'_>, run_to_run: f64, workspace: &mut Workspace) -> Self {
         let covariances = covariances::covariances(fit);
         let quantile = quantile(fit.clusters.parts.len());
-        // // The scatter between runs includes their variation; blocks of few runs cannot show it.
+        // The scatter between runs includes their variation; blocks of few runs cannot show it.
         let gain = fit.layout().elements.iter().find(|(c, _)| *c == Coordinate::Gain);
         let runs = match gain {
             Some((_, Some(_))) => 1,
@@ -150,11 +150,11 @@ fn prior_share(fit: &PredictionFit<'_>, model_based: Option<&[f64]>, places: &[u
     let Some((i, c)) = places.iter().position(|&q| q == place).zip(model_based) else {
         return 1.0;
     };
-    // // The weight is kappa sigma^2/s^2, the covariance sigma^2 H^-1: both are inflated by kappa.
+    // The weight is kappa sigma^2/s^2, the covariance sigma^2 H^-1: both are inflated by kappa.
     let precision = penalty.curvature(fit.eta()) / fit.innovation_variance;
     let variance = c[i * places.len() + i];
     let ((low, high), x) = (fit.criterion.limits[place], fit.eta()[place]);
-    // // At a bound, nothing but the bound is known about it.
+    // At a bound, nothing but the bound is known about it.
     if variance > 0.0 && low < x && x < high {
         (variance * precision).min(1.0)
     } else {
@@ -181,7 +181,7 @@ pub(super) fn operator_of(
     let layout = fit.layout();
     let p = fit.parameters();
     let mut mapped = fit.criterion.model_of(fit.eta(), record)?;
-    // // From e to u: without the coefficients of further channels.
+    // From e to u: without the coefficients of further channels.
     mapped.theta.truncate(mapped.orders.parameters());
     let of_theta =
         (errors.covariances.as_ref()).map(|c| mapped.covariance_of_theta(&c.clustered, p, layout.positions(record)));

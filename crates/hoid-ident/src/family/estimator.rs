@@ -89,7 +89,7 @@ impl FamilyEstimator {
         describing: Option<Result<DescribingFunction, IdentError>>,
     ) -> Result<FamilyFit, IdentError> {
         let (records, seen) = self.prepared(records)?;
-        // // With inputs in addition to e, the ratio of u and e at a line is a sum of responses.
+        // With inputs in addition to e, the ratio of u and e at a line is a sum of responses.
         let (describing, no_lines) = match describing.filter(|_| seen.is_empty()) {
             None => (None, None),
             Some(Ok(found)) => (Some(found), None),
@@ -219,7 +219,7 @@ impl FamilyEstimator {
         let lines = describing.map(LineData::new);
         let mut begun = Vec::new();
         let mut channel_lines = None;
-        // // It is used only for starts: the lines serve as well.
+        // It is used only for starts: the lines serve as well.
         let response = if seen.is_empty() {
             match ArxResponse::of(records) {
                 Err(error) if lines.is_none() => return Err(error),
@@ -260,7 +260,7 @@ impl FamilyEstimator {
         let mut no_lines = None;
         let noise = match little_noise {
             Some(found) => {
-                // // The lines contain more leakage of the record and of its aliases than such noise.
+                // The lines contain more leakage of the record and of its aliases than such noise.
                 starts.iter_mut().for_each(|start| start.lines = None);
                 no_lines = lines.map(|_| TOO_LITTLE_NOISE.to_owned());
                 prediction = found;

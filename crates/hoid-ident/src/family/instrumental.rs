@@ -316,7 +316,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
                 }
             };
             let Some((there, next)) = next else {
-                // // No step decreases the distance: there is no zero in this direction.
+                // No step decreases the distance: there is no zero in this direction.
                 return Ok(Zero {
                     x,
                     covariance,
@@ -360,7 +360,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         let p = x.len();
         let scale = variance * self.fit.inflation;
         let inner = |i: usize| self.limits()[i].0 < x[i] && x[i] < self.limits()[i].1;
-        // // At a bound an element does not move: its row of A is that of the identity matrix.
+        // At a bound an element does not move: its row of A is that of the identity matrix.
         let held = DMatrix::from_fn(p, p, |i, j| match (inner(i) && inner(j), i == j) {
             (true, _) => a[(i, j)],
             (false, same) => f64::from(u8::from(same)),

@@ -102,7 +102,7 @@ pub(super) fn with_lines<'a>(
         return None;
     }
     let layout = fit.layout();
-    // // If no operator of the form fits the lines, their errors exceed their variances.
+    // If no operator of the form fits the lines, their errors exceed their variances.
     let excess = lines.reduced_chi_squared().unwrap_or(1.0).max(1.0);
     let weight = weight(fit, lines, excess)?;
     let mut criterion = fit.criterion.clone();

@@ -258,7 +258,7 @@ impl Parametrisation for FamilyLayout {
         let mut theta = found.b.clone();
         theta.extend_from_slice(noise);
         theta.extend_from_slice(&found.f);
-        // // Each slot: its derivatives, and the place of the first of them in theta.
+        // Each slot: its derivatives, and the place of the first of them in theta.
         let mut slopes: Vec<Vec<(usize, f64)>> = Vec::new();
         let (nb, behind) = (found.b.len(), found.b.len() + noise.len());
         for i in 0..self.coordinates() {

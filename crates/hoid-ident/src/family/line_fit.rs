@@ -107,7 +107,7 @@ pub(super) fn line_fit(
     let runs = lines.runs();
     let (mut others, mut held_out) = (Vec::new(), Vec::new());
     if runs >= 3 {
-        // // The fits without one run are used twice: as held-out predictions, and as replications of the jackknife.
+        // The fits without one run are used twice: as held-out predictions, and as replications of the jackknife.
         for run in 0..runs {
             let points = lines.without(run);
             let Some(without) = criterion.with_points(&points).fit_from(&found.coordinates, search) else {
@@ -124,7 +124,7 @@ pub(super) fn line_fit(
         .flatten();
     let by_lines = criterion.covariance(&found);
     let covariance = by_lines.clone().map(|by_lines| match by_runs {
-        // // The prior is the same in all replications, so that their scatter lacks its contribution.
+        // The prior is the same in all replications, so that their scatter lacks its contribution.
         Some(mut covariance) => {
             add_open_part(&mut covariance, 1.0, &criterion.penalty, &found.coordinates, &by_lines);
             covariance

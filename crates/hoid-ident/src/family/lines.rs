@@ -43,7 +43,7 @@ impl<'d> LineData<'d> {
             .filter_map(|i| Some(lines[i].standard_error?.powi(2) / beside(i)))
             .filter(|r| r.is_finite())
             .collect();
-        // // A scatter of runs below their remnant is due to chance.
+        // A scatter of runs below their remnant is due to chance.
         let excess = match upper_median(&mut ratios) {
             Some(median) if runs >= FEWEST_RUNS => median.max(1.0),
             _ => 1.0,
@@ -83,7 +83,7 @@ impl<'d> LineData<'d> {
             let (a, b) = line.ratio.0[run];
             let whole: Complex64 = line.ratio.0.iter().map(|(_, b)| b).sum();
             let model = sampled(point.omega_rad_s);
-            // // An error with n times the variance of the mean.
+            // An error with n times the variance of the mean.
             2.0 * ((a - model * b) * n / whole).norm_sqr() / (n * point.variance)
         };
         self.points.iter().zip(&self.describing.lines).map(of).sum()

@@ -180,10 +180,10 @@ fn distance_from_the_limit(
         let omega = at(i);
         let known = operator(omega);
         let [[a, b], [_, c]] = known.relative?;
-        // // (1 + L)/L: the necessary relative change of Y.
+        // (1 + L)/L: the necessary relative change of Y.
         let open_loop = known.value * element.response(omega);
         let d = (Complex64::new(1.0, 0.0) + open_loop) / open_loop;
-        // // With a single parameter the covariance has rank one.
+        // With a single parameter the covariance has rank one.
         let (a, c) = (a + 1e-9 * (a + c), c + 1e-9 * (a + c));
         let distance = (c * d.re * d.re - 2.0 * b * d.re * d.im + a * d.im * d.im) / (a * c - b * b);
         distance.is_finite().then_some(distance)
@@ -230,10 +230,10 @@ mod tests {
             "{}",
             doubt.message
         );
-        // // With large errors the loop may be stable.
+        // With large errors the loop may be stable.
         let note = shape(resonant, Some(0.3)).doubt(1.0).unwrap();
         assert_eq!(note.severity, hoid_model::Severity::Note);
-        // // Without errors the values are used.
+        // Without errors the values are used.
         assert_eq!(
             shape(resonant, None).doubt(1.0).unwrap().severity,
             hoid_model::Severity::Doubt
@@ -275,7 +275,7 @@ mod tests {
             assert_eq!(found.doubt(0.0).unwrap().kind, "no-crossover");
             assert_eq!(found.gain_margin, None);
         }
-        // // Reversed sign.
+        // Reversed sign.
         let found = shape(|w| Complex64::from_polar(-1.0, -0.15 * w), Some(1e-6));
         assert_eq!(found.doubt(1.0).unwrap().kind, "unstable-loop");
     }

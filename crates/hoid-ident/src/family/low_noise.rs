@@ -96,9 +96,9 @@ impl LittleNoise {
             let Some((best, share)) = least_of(&ends).filter(|(_, share)| clean || *share < LITTLE) else {
                 break;
             };
-            // // A response without noise is that of a form: if none fits, the best form is not found either.
+            // A response without noise is that of a form: if none fits, the best form is not found either.
             let none_is_found = clean && round > 0 && share >= NONE;
-            // // If the residual is noise, there is nothing more to find.
+            // If the residual is noise, there is nothing more to find.
             let beside = (starts[best].0, ends[best].clone()?.coordinates);
             for ((form, _), end) in starts.iter().zip(&mut ends) {
                 let known = end.as_ref().map_or(f64::INFINITY, |end| end.share);
@@ -197,7 +197,7 @@ impl Search<'_, '_> {
         let criterion = prediction.criterion((form, neuromuscular), (0, 0));
         let limits = coordinates::limits(form, neuromuscular, prediction.delay_range_s, prediction.sample_time);
         let mut grid = coordinates::start_grid(form, neuromuscular, &limits, Grid::Default);
-        // // These are the last coordinates of all forms.
+        // These are the last coordinates of all forms.
         let tail = 1 + if neuromuscular { 2 } else { 0 };
         let of_other = &beside.1[beside.1.len() - tail..];
         let mut moved: Vec<Vec<f64>> = (grid.iter())

@@ -57,7 +57,7 @@ impl Mixture {
         }
         let over = |of: &dyn Fn(&Component) -> f64| components.iter().map(|c| c.weight / total * of(c)).sum::<f64>();
         let value = over(&|c| c.estimate.value);
-        // // A missing error is not an error of zero.
+        // A missing error is not an error of zero.
         let known = components.iter().all(|c| c.estimate.standard_error.is_some()) && value.is_finite();
         let variance = over(&|c| {
             let s = c.estimate.standard_error.unwrap_or(0.0);
@@ -84,7 +84,7 @@ fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f6
         .map(|c| Some((c.weight / total, c.estimate.value, c.interval?)))
         .collect();
     let parts = parts?;
-    // // Probability below x, for one form.
+    // Probability below x, for one form.
     let below = |x: f64, value: f64, (low, high): (f64, f64)| -> f64 {
         let reach = if x < value { value - low } else { high - value };
         match (x - value) / reach {
@@ -100,7 +100,7 @@ fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f6
         all.filter(|x| x.is_finite()).fold(from, pick)
     };
     let (least, most) = (finite(f64::min, f64::INFINITY), finite(f64::max, f64::NEG_INFINITY));
-    // // Far out: a form with an infinite end keeps half of its probability there.
+    // Far out: a form with an infinite end keeps half of its probability there.
     let reach = FAR * (most - least).max(most.abs().max(least.abs()) * f64::EPSILON);
     let place = |wanted: f64| {
         let (mut low, mut high) = (least - reach, most + reach);
@@ -113,7 +113,7 @@ fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f6
             }
         }
         let found = 0.5 * (low + high);
-        // // An end at zero, such as a time constant at its bound, is zero and not its rounding error.
+        // An end at zero, such as a time constant at its bound, is zero and not its rounding error.
         if found.abs() < 1e-12 * (most - least) {
             0.0
         } else {

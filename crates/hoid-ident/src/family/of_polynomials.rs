@@ -124,7 +124,7 @@ pub fn family_of_polynomials(
             let Some((mismatch, found)) = nearest(form, reading, &points, orders.nk, sample_time) else {
                 continue;
             };
-            // // A simpler exact form is not rejected because of rounding.
+            // A simpler exact form is not rejected because of rounding.
             if best.as_ref().is_none_or(|known| known.0 > EXACT && mismatch < known.0) {
                 best = Some((mismatch, found, form, reading));
             }
@@ -195,7 +195,7 @@ fn nearest(
     sample_time: SampleTime,
 ) -> Option<(f64, Minimum)> {
     let neuromuscular = reading.neuromuscular.is_some();
-    // // A form has a lag exactly if the polynomials have one, and no pure derivative.
+    // A form has a lag exactly if the polynomials have one, and no pure derivative.
     if form.has_pole() != reading.lag.is_some() || !form.is_proper(neuromuscular) {
         return None;
     }
@@ -232,7 +232,7 @@ impl<'a> Nearest<'a> {
         let ts = sample_time.s();
         let reach = (nk as f64 + 2.0 * LATER[LATER.len() - 1]) * ts;
         let mut limits = coordinates::limits(form, neuromuscular, (0.0, reach), sample_time);
-        // // The poles are known: they are free only within the information of B.
+        // The poles are known: they are free only within the information of B.
         for (limit, coordinate) in limits.iter_mut().zip(form.coordinates(neuromuscular)) {
             match coordinate {
                 Coordinate::LagRate | Coordinate::LogOmega | Coordinate::LogZeta => {
@@ -275,7 +275,7 @@ impl<'a> Nearest<'a> {
                     other => self.reading.coordinate(*other),
                 })
                 .collect();
-            // // The gain is linear: the best one.
+            // The gain is linear: the best one.
             let (mut cross, mut power) = (0.0, 0.0);
             for (point, m) in self.points.iter().zip(self.responses(&start)?) {
                 let weight = point.response.norm_sqr().recip();
@@ -315,7 +315,7 @@ impl<'a> Nearest<'a> {
             .map(|at| found.at.gram[at])
             .collect();
         let responses = self.responses(&found.theta)?;
-        // // dx/dtheta, one column for each coefficient.
+        // dx/dtheta, one column for each coefficient.
         let mut slopes = vec![0.0; p * n];
         for k in 0..n {
             let right: Vec<f64> = free

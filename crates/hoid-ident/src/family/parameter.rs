@@ -70,7 +70,7 @@ impl Parameter {
     /// Mean over forms of the parameters with this name, by their weights, the best form first.
     pub(super) fn averaged(each: &[(Form, f64, &Self)], clusters: usize) -> Option<Self> {
         let (_, _, front) = *each.first()?;
-        // // At a bound a parameter has no error, and is left out of the mean of those that have.
+        // At a bound a parameter has no error, and is left out of the mean of those that have.
         let with_error: Vec<_> = each
             .iter()
             .filter(|(_, _, p)| p.standard_error.is_some())
@@ -102,7 +102,7 @@ impl Parameter {
             })
             .collect();
         let share = |of: &dyn Fn(&Self) -> f64| each.iter().map(|(_, w, p)| w / total * of(p)).sum::<f64>();
-        // // The same sign, and within the factor for a scale: in the mean as in a form.
+        // The same sign, and within the factor for a scale: in the mean as in a form.
         let one_sign = interval.is_some_and(|(low, high)| low * high > 0.0);
         let known = match estimate.standard_error {
             Some(s) if matches!(front.name.as_str(), "omega_nm" | "zeta_nm") => s < LARGEST_LOG_ERROR * estimate.value,
@@ -114,7 +114,7 @@ impl Parameter {
             standard_error_person: Mixture::of(&of_person, clusters)?.estimate.standard_error,
             interval,
             prior_share: share(&|p| p.prior_share),
-            // // A parameter of forms that are less likely than those without it is not determined.
+            // A parameter of forms that are less likely than those without it is not determined.
             determined: total > LEAST_WEIGHT && share(&|p| f64::from(p.determined)) > 0.5 && one_sign && known,
             averaged_over: each.iter().map(|(form, ..)| *form).collect(),
             ..front.clone()
@@ -142,7 +142,7 @@ impl CoordinateEstimate<'_> {
     pub fn parameters(&self) -> Vec<Parameter> {
         let made = |named: &NamedParameter| {
             let made = self.parameter(named);
-            // // All gains, and products with a gain, are proportional to it.
+            // All gains, and products with a gain, are proportional to it.
             let scales = matches!(named.coordinate, None | Some(Coordinate::Gain));
             let share = if scales {
                 self.run_to_run * made.value.abs()
@@ -223,7 +223,7 @@ impl CoordinateEstimate<'_> {
         let interval = self.interval(i);
         match coordinate {
             Coordinate::LagRate => {
-                // // Below the bound of the search range, it is a pure integration.
+                // Below the bound of the search range, it is a pure integration.
                 let end = |rate: f64| {
                     if rate <= self.limits[i].0 {
                         f64::INFINITY

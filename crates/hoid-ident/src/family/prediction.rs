@@ -143,7 +143,7 @@ impl<'a> Prediction<'a> {
         let products = NoiseProducts::new(&series, noise.1);
         let start_of_noise = match products.fit_up_to(noise.1) {
             Some(found) => found,
-            // // Only rounding is left: there is nothing to model.
+            // Only rounding is left: there is nothing to model.
             None if self.noise_free().is_some() => Autoregression {
                 d: vec![0.0; noise.1],
                 loss: self.rounding(),
@@ -154,7 +154,7 @@ impl<'a> Prediction<'a> {
         let coefficients = [vec![0.0; noise.0], start_of_noise.d].concat();
         let mut eta = criterion.layout.spread(start, &coefficients);
         let unit = self.penalties(&criterion.layout);
-        // // The prior is weighted by kappa sigma^2, which is known only after a fit: a few rounds make both
+        // The prior is weighted by kappa sigma^2, which is known only after a fit: a few rounds make both
         // consistent.
         let mut weight = start_of_noise.loss;
         let mut found = None;
@@ -163,7 +163,7 @@ impl<'a> Prediction<'a> {
             let mut minimum = criterion
                 .search(eta, &self.search, None, workspace)
                 .ok_or(IdentError::NoFiniteLoss)?;
-            // // If nothing is left, no step decreases the loss.
+            // If nothing is left, no step decreases the loss.
             if minimum.at.sum_of_squares < self.equal() {
                 minimum.termination.reason = Reason::ExactFit;
             }

@@ -42,7 +42,7 @@ pub(super) fn profile_interval(
             held.limits[place] = (at, at);
             eta[place] = at;
             let found = held.search(eta.clone(), &search, None, workspace)?;
-            // // The next point starts from the conditional minimum of this one: few iterations, and the same valley.
+            // The next point starts from the conditional minimum of this one: few iterations, and the same valley.
             eta.copy_from_slice(&found.theta);
             Some(found.at.sum_of_squares - least > level)
         };

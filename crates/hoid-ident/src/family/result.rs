@@ -220,7 +220,7 @@ impl FamilyFit {
         let front = &self.operator(record).operator;
         let point = |&omega: &f64| {
             let middle = front.response(omega);
-            // // For each form ln of its response over that of the best form, with variances of gain and phase.
+            // For each form ln of its response over that of the best form, with variances of gain and phase.
             let of = |form: &WeighedForm| {
                 let of = form.of(record)?;
                 let found = of.operator.response_and_gradient(omega);

@@ -91,7 +91,7 @@ impl CrossResponse {
             for j in i + 1..size {
                 gram[i * size + j] = gram[j * size + i];
             }
-            // // Rounding, for a smooth channel.
+            // Rounding, for a smooth channel.
             gram[i * size + i] *= 1.0 + 1e-9;
         }
         let without = |left_out: Option<usize>| -> Option<(f64, Vec<f64>)> {

@@ -117,7 +117,7 @@ pub(super) fn idle(channels: &[&[f64]], out: &[bool], sample_time_s: f64) -> Vec
     }
     let least = ((IDLE_S / sample_time_s).ceil() as usize).max(2 * block);
     let whole = |stretch: Range<usize>| {
-        // // To the sample: as long as no channel leaves the range of the stretch.
+        // To the sample: as long as no channel leaves the range of the stretch.
         let stays = |t: usize, stretch: &Range<usize>| {
             channels.iter().zip(&scales).all(|(channel, scale)| {
                 let inside = &channel[stretch.clone()];
@@ -170,10 +170,10 @@ mod tests {
         let slow = autoregressive(1125, 2).into_iter().flat_map(|v| [zone(&v); 8]);
         let mut u: Vec<f64> = slow.collect();
         assert!(frozen(&u, Some(&e), 0.01).is_empty());
-        // // Released for five seconds, as people do.
+        // Released for five seconds, as people do.
         u[3000..3500].fill(0.0);
         assert!(frozen(&u, Some(&e), 0.01).is_empty());
-        // // Held at a value without a hand, and for most of a minute.
+        // Held at a value without a hand, and for most of a minute.
         u[1000..1400].fill(2.125);
         u[3900..8900].fill(0.0);
         let found = frozen(&u, Some(&e), 0.01);

@@ -49,7 +49,7 @@ impl Interpolation {
                 };
             }
             let pivot = factor[i * size + i];
-            // // Samples that no row contains cannot be determined.
+            // Samples that no row contains cannot be determined.
             if pivot.is_nan() || pivot < 1e-9 {
                 break;
             }

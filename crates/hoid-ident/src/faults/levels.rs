@@ -163,7 +163,7 @@ pub(super) fn scales(values: &[f64], sample_time_s: f64) -> Vec<(Range<usize>, f
     let rest: Vec<f64> = (0..n).filter(|t| !inside(*t)).map(|t| values[t]).collect();
     let limit = OUTSIDE * level_and_deviation(&rest).1;
     let outside = |t: usize| (values[t] - level).abs() > limit;
-    // // A single sample of the stretch may be small, ten in a row are not.
+    // A single sample of the stretch may be small, ten in a row are not.
     let last_outside = |mut rows: Box<dyn Iterator<Item = usize>>| {
         let (mut last, mut calm) = (None, 0);
         while calm < 10 {

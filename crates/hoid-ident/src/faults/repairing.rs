@@ -49,7 +49,7 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
     if handling == FaultHandling::Keep {
         return Ok(untouched(Vec::new()));
     }
-    // // The other statistics use times in seconds, and would find a fault in every second record.
+    // The other statistics use times in seconds, and would find a fault in every second record.
     let ts = record.sample_time().s();
     if ts > SLOWEST_S {
         return Ok(untouched(vec![all_of_it(record, FaultKind::TimeUnit, ts)]));
@@ -111,7 +111,7 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
             .map(|s| whole.span(whole.time_s(s.start), whole.time_s(s.end)))
             .collect::<Result<_, _>>()?,
     };
-    // // After the repair: faults would be mistaken for a response.
+    // After the repair: faults would be mistaken for a response.
     let longest = segments.iter().max_by_key(|segment: &&Record| segment.len());
     faults.extend(
         longest

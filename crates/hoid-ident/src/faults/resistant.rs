@@ -53,7 +53,7 @@ fn hold(values: &mut [f64], sample_time_s: f64) -> bool {
     let mut moves = 0;
     while let Some(Excess { ratio, t }) = queue.pop() {
         let (r, most_here) = (error(&eps, t), most(t));
-        // // A sample that another one has moved back into its limit or further out is inserted again.
+        // A sample that another one has moved back into its limit or further out is inserted again.
         if r.abs() <= most_here || (r.abs() / most_here - ratio).abs() > 1e-9 * ratio {
             continue;
         }

@@ -105,7 +105,7 @@ pub(crate) fn physical_blocks<P: Parametrisation>(
 ) -> Option<Vec<ScoreBlock>> {
     let ts = criterion.layout.sample_time().s();
     let mut scores = |record: usize, data: Data<'_>| -> Option<Scores> {
-        // // A piece of a long record does not contain the corresponding piece of the other inputs.
+        // A piece of a long record does not contain the corresponding piece of the other inputs.
         if !criterion.further.is_empty() && data.u.len() != criterion.data[record].u.len() {
             return None;
         }

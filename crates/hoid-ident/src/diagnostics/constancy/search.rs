@@ -117,7 +117,7 @@ pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], set
     let matrices: Vec<DMatrix<f64>> = blocks.iter().map(|b| DMatrix::from_row_slice(p, p, &b.big)).collect();
     let whole = matrices.iter().fold(DMatrix::zeros(p, p), |sum, m| sum + m);
     let inverse = pseudo_inverse(&whole)?;
-    // // With a prior or a bound the sum of scores is not zero: one step to the minimum without it.
+    // With a prior or a bound the sum of scores is not zero: one step to the minimum without it.
     let sum = blocks
         .iter()
         .fold(DVector::zeros(p), |sum, b| sum + DVector::from_column_slice(&b.g));
@@ -137,7 +137,7 @@ pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], set
         let typical = upper_median(&mut ratios).unwrap_or(1.0);
         let smallest = all.iter().map(|t| t.share.min(1.0 - t.share)).fold(0.5, f64::min);
         for t in &all {
-            // // A drift and a periodic change act on all blocks, and the typical scatter is that of them all.
+            // A drift and a periodic change act on all blocks, and the typical scatter is that of them all.
             let (scatter, freedom) = match sets[t.set].course {
                 Course::Step => (t.by_blocks, n - 2),
                 _ => (0.0, 4 * (n - 2)),

@@ -63,7 +63,7 @@ fn found(columns: &[Vec<f64>], u: &[f64], samples: Range<usize>, sample_time_s: 
             }
         })
         .collect();
-    // // The level is not a response; the derivative of the last column is not among the columns.
+    // The level is not a response; the derivative of the last column is not among the columns.
     let gain = (0..p).map(|j| if j <= last { fit.b[j] } else { 0.0 }).collect();
     let delay = (0..p)
         .map(|j| if j > 0 && j <= last { -fit.b[j - 1] } else { 0.0 })

@@ -54,7 +54,7 @@ pub(super) fn carrying(of: &Constancy<'_>) -> Option<Stretch> {
         .collect();
     let whole = parts.iter().fold(DMatrix::zeros(m, m), |sum, (_, a)| sum + a);
     let inverse = pseudo_inverse(&whole)?;
-    // // With a prior, a bound or a delay on the grid the sum of scores is not zero.
+    // With a prior, a bound or a delay on the grid the sum of scores is not zero.
     let step = &inverse * parts.iter().fold(DVector::zeros(m), |sum, (h, _)| sum + h);
     parts.iter_mut().for_each(|(h, a)| *h -= &*a * &step);
     let moved: Option<Vec<DVector<f64>>> = parts
