@@ -832,7 +832,7 @@ mod tests {
         let together =
             |fit: &crate::family::FamilyFit| fit.verdict.findings().iter().any(|f| f.kind == "inputs-together");
         assert!(!together(&fit));
-        // Where the target alone moves the loop, that is said.
+        // If the target alone excites the loop, the reason is reported.
         let alone = disturbed(&operator, Some(&target), (0, 0.0), 3);
         let alone = estimator().fit(std::slice::from_ref(&alone)).unwrap();
         assert!(
@@ -840,7 +840,7 @@ mod tests {
             "{:?}",
             alone.channels[0]
         );
-        // With one input the response to e is another one, and that is said.
+        // With one input the response to e differs, and this is reported.
         let one = FamilyEstimator {
             channels: Vec::new(),
             forms: vec![Form::Gain],
