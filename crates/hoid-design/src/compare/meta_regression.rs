@@ -141,6 +141,7 @@ pub fn meta_regression(
 
 /// Returns the variance between people at the maximum of `l + log tau`. It is never zero, and less often too large than
 /// the tau^2 of the weights.
+///
 /// # Errors
 /// As [`meta_regression`].
 pub fn variance_between(observations: &[Observation]) -> Result<f64, CompareError> {

@@ -3,7 +3,7 @@
 //!
 //! The poles determine the lag and the neuromuscular system ([`super::pole_reading`]).
 //!
-//! The exact model of an operator ([`FamilyOperator::hold`]) has fewer parameters than B has coefficients, so that
+//! The exact model of an operator ([`FamilyOperator::zoh`]) has fewer parameters than B has coefficients, so that
 //! estimated polynomials are near but not on it. The operator is the one whose exact model M(x) is nearest to the
 //! response H of the polynomials over the band of manual control,
 //!

@@ -10,17 +10,17 @@
 //! | `rest` | | the value at which a stick with a dead zone rests, which is not a fault |
 //! | `holds` | frozen channels, dropouts, idle stretches | lengths of runs of equal values, ranges |
 //! | `spikes` | spikes | two explanations of a large innovation: fault or push |
-//! | `interpolation` | | the samples that those around them make most likely, and what they explain |
-//! | `rest` | | the value at which a stick with a dead zone rests, which is not a fault |
-//! | `resistant` | | a record that no single sample can carry, for a second opinion |
-//! | `slow` | | a record without drifts and steps of a sensor, for a second opinion |
 //! | `interpolation` | | the most likely values of samples given their neighbours, and the gain in likelihood |
 //! | `direction` | input and output exchanged, wrong sign | lags at which each channel responds to the other |
 //! | `resistant` | | a record in which no single sample can dominate a fit, for a second opinion |
-//! Each channel is judged by itself, since its own neighbours know a sample better than any other channel does; only
+//! | `slow` | | a record without drifts and steps of a sensor, for a second opinion |
 //! | `search`, `repairing`, `limits` | | order of the searches, and repair of the record |
 //! | `autoregression`, `robust` | | fits and scales that faults cannot dominate |
-//! distinguish pushes from faults.
+//!
+//! Each channel is judged by itself, since its own neighbours predict a sample better than any other channel does; only
+//! *idle* stretches are determined from e and u together. No model of the person is needed. Normal control activity is
+//! not a fault: the remnant of people comes in pulses and bursts, but through their muscles, and the statistics of the
+//! spikes distinguish pushes from faults.
 //!
 //! [`repair`] inspects a record and follows [`FaultHandling`](hoid_model::FaultHandling): by default it bridges faults
 //! of up to [`BRIDGED_S`], cuts the record at longer ones, and returns segments of [`SHORTEST_S`] or more, each as a

@@ -3,6 +3,7 @@
 //! A belongs to the system and to the noise, F to the system and D to the noise only, and the loss has a minimum for
 //! many wrong assignments: ARARX with a1 = -0.65, a2 = 0.11, d1 = -0.93 ends 40 % too high from least squares, with the
 //! pole of D in A. So the poles come from fits that do not depend on the assignment, and every assignment is a start:
+//!
 //! - the poles of the system, A F, from instruments, which no coloured noise biases in an open loop
 //!   ([`crate::iv`]): any na of them are A, the rest F, and the noise model follows from what is
 //!   left;

@@ -342,7 +342,7 @@ impl<'a> IvProblem<'a> {
 }
 
 impl Equation {
-    /// `y - Phi theta`.
+    /// Returns `y - Phi theta`.
     pub fn residual(&self, theta: &[f64]) -> Vec<f64> {
         let mut r = self.y.clone();
         for (column, t) in self.phi.iter().zip(theta) {

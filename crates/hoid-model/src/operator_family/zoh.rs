@@ -104,7 +104,7 @@ impl FamilyOperator {
         self.zoh_within(whole_samples(self.tau_e_s(), sample_time)?, sample_time)
     }
 
-    /// As [`FamilyOperator::hold`], for a given sample that contains the delay: `delta = tau - sample Ts` may be 0 or
+    /// As [`FamilyOperator::zoh`], for a given sample that contains the delay: `delta = tau - sample Ts` may be 0 or
     /// Ts at the borders, where the two models are equal.
     ///
     /// # Errors
