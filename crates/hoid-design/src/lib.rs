@@ -1,11 +1,10 @@
-//! Before and after an experiment: what its data will report, and whether conditions and people
-//! differ.
+//! Design of experiments before the data, and comparison of conditions and people after them.
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`compare`] | differences between conditions and people, from the estimates of each person |
+//! | [`compare`] | differences between conditions and between people, from the estimates of each person |
 //! | [`experiment`] | standard errors of an experiment before it is done |
-//! | [`pool`](mod@pool) | each person from all of them, and the population as a prior |
+//! | [`pool`](mod@pool) | estimates of each person from all people, and the population as a prior |
 
 pub mod compare;
 pub mod experiment;

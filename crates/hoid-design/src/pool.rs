@@ -1,4 +1,4 @@
-//! Hierarchical people: each person from all of them, and the population that they are drawn from.
+//! Hierarchical estimates: each person estimated from all people, and the population from which they are drawn.
 //!
 //! In a condition `y_i = ln theta_i` is known of person i with variance `v_i = (s_i/theta_i)^2`, and people are drawn from a
 //! population, `y_i ~ N(mu, tau^2)` plus their error. mu is the mean of [`crate::compare::meta_mean`], tau^2 is at the greatest of `l + log tau`
@@ -7,12 +7,12 @@
 //!
 //! `B_i mu + (1 - B_i) y_i`, `B_i = v_i/(v_i + tau^2)`, with the variance `(1 - B_i) v_i + B_i^2 var(mu)`:
 //!
-//! **B is the shrinkage**, 1 for a person of whom nothing is known. That tau^2 is estimated is not in the variance. A person of
-//! tomorrow has `mu` with the variance `tau^2 + var(mu)`: what a prior is.
+//! **B is the shrinkage**, 1 for a person without information. The variance ignores that tau^2 is estimated. A future
+//! person has `mu` with the variance `tau^2 + var(mu)`, which is the prior.
 //!
-//! A prior that the estimates hold already is taken out first, or it would count once for each person: with its share
-//! w, centre m and an estimate y, the data show `y - w (m - y)/(1 - w)` with the variance `v/(1 - w)`
-//! ([`OperatorPrior::pull`]). A person of whom more than nine tenths are prior is one of whom nothing is known.
+//! A prior that is already part of the estimates is removed first, or it would count once for each person: with its
+//! share w, its centre m and an estimate y, the data show `y - w (m - y)/(1 - w)` with the variance `v/(1 - w)`
+//! ([`OperatorPrior::pull`]). If the share of the prior is above nine tenths, the person is without information.
 
 use hoid_ident::family::{OperatorPrior, Parameter};
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
@@ -23,25 +23,25 @@ use serde_json::{Value, json};
 
 use crate::compare::{CompareError, Observation, Weights, meta_mean, variance_between};
 
-/// Parameters that mean the same in every form.
+/// Parameters with the same meaning in every form.
 const OF_ANY_FORM: [&str; 3] = ["omega_nm", "zeta_nm", "tau_e"];
-/// People of whom the data show something.
+/// Least number of people with information.
 const LEAST_PEOPLE: usize = 3;
-/// Share of the prior beyond which the data carry no information.
+/// Share of the prior above which the data carry no information.
 const ALL_PRIOR: f64 = 0.9;
 
-/// A person, from all.
+/// Estimate of a person from all people.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PooledPerson {
-    /// Who.
+    /// Name of the person.
     pub subject: String,
-    /// Estimate from their own data, with the standard error; none without information.
+    /// Estimate from the person's own data, with its standard error; `None` without information.
     pub own: Option<(f64, f64)>,
-    /// The estimate from all.
+    /// Estimate from all people.
     pub value: f64,
     /// Its standard error.
     pub standard_error: f64,
-    /// How far it is drawn to the mean of all: 0 not at all, 1 all the way.
+    /// Shrinkage towards the mean of all people: 0 none, 1 complete.
     pub shrinkage: f64,
 }
 
@@ -52,11 +52,11 @@ pub struct PooledParameter {
     pub name: String,
     /// Its unit.
     pub unit: String,
-    /// The value that as many people exceed as not.
+    /// Median over people.
     pub centre: f64,
-    /// Standard deviation of its logarithm between people.
+    /// Standard deviation of the logarithm between people.
     pub spread: f64,
-    /// The same of a person who was not there: with the error of the centre.
+    /// The same for a new person, with the error of the centre included.
     pub spread_of_another: f64,
     /// The people.
     pub people: Vec<PooledPerson>,
@@ -67,15 +67,15 @@ pub struct PooledParameter {
 pub struct Population {
     /// The condition.
     pub condition: String,
-    /// The form of its people; none if they differ.
+    /// The form of all people; `None` if they differ.
     pub form: Option<String>,
     /// Its parameters.
     pub parameters: Vec<PooledParameter>,
-    /// Parameters that are not pooled, and why.
+    /// Parameters that are not pooled, with the reason.
     pub left_out: Vec<(String, String)>,
 }
 
-/// The populations of the conditions of a group. `prior` is what the estimates of the people hold already.
+/// Returns the populations of the conditions of a group. `prior` is the prior of the estimates of the people.
 pub fn pool(people: &[Person], prior: &OperatorPrior) -> Vec<Population> {
     let mut conditions: Vec<&str> = Vec::new();
     for person in people.iter().filter(|p| p.is_of_all_runs() && !p.parameters.is_empty()) {
@@ -128,7 +128,7 @@ fn population(condition: &str, people: &[&Person], prior: &OperatorPrior) -> Pop
     found
 }
 
-/// Report of the data of a person on the logarithm of a parameter.
+/// Logarithm of a parameter as the data of a person alone determine it.
 fn data(parameter: &Parameter, prior: &OperatorPrior) -> Option<Observation> {
     let error = parameter.standard_error_person.or(parameter.standard_error)?;
     let counts = parameter.determined && parameter.value > 0.0 && parameter.value.is_finite() && error > 0.0;
@@ -146,7 +146,7 @@ fn data(parameter: &Parameter, prior: &OperatorPrior) -> Option<Observation> {
 
 fn pooled((name, unit): (&str, &str), own: &[(&str, Option<Observation>)]) -> Result<PooledParameter, CompareError> {
     let known: Vec<Observation> = own.iter().filter_map(|(_, o)| *o).collect();
-    // For two people a variance between them is not known at all.
+    // For two people the variance between them is not known at all.
     if known.len() < LEAST_PEOPLE {
         return Err(CompareError::TooFew {
             found: known.len(),
@@ -184,7 +184,7 @@ fn pooled((name, unit): (&str, &str), own: &[(&str, Option<Observation>)]) -> Re
 }
 
 impl Population {
-    /// The object that `--prior` reads: each parameter with the standard error of a person who was not there.
+    /// Returns the object that `--prior` reads: each parameter with the standard error for a new person.
     pub fn json(&self) -> Value {
         let parameter = |p: &PooledParameter| {
             json!({
@@ -208,7 +208,7 @@ impl Population {
     }
 }
 
-/// The people of all populations, a row for each parameter.
+/// Returns the people of all populations, one row for each parameter.
 pub fn table(populations: &[Population]) -> OutputTable {
     let all = || {
         let of = |p: &'_ Population| {

@@ -1,5 +1,4 @@
-//! The fit that belongs to a minimum: loss, innovation variance and what else follows from the sum
-//! of squares.
+//! The fit at a minimum: loss, innovation variance and the other results of the sum of squares.
 //!
 //! With n residuals, p free parameters and s initial states, `V = sum eps^2 / n` and
 //! `sigma^2 = sum eps^2 / (n - p - s)`. The covariance of theta is `sigma^2 (psi' psi)^-1` over the
@@ -12,18 +11,18 @@ use crate::{
     criterion::{Criterion, output_variance},
 };
 
-/// Where a fit was found.
+/// The minimum at which a fit was found.
 pub(crate) struct Solution {
     pub theta: Vec<f64>,
     pub sum_of_squares: f64,
     pub termination: Termination,
-    /// Parameters that are not free.
+    /// True for parameters that are not free.
     pub held: Vec<bool>,
     /// Name of the start.
     pub start: String,
 }
 
-/// The fit there, without a covariance.
+/// Returns the fit at the minimum, without a covariance.
 ///
 /// # Errors
 /// The errors of [`PolynomialModel::new`].
@@ -63,7 +62,7 @@ pub(crate) fn assembled_fit(
 }
 
 impl Fit {
-    /// The same fit with the covariance `variance (psi' psi)^-1`.
+    /// Returns the same fit with the covariance `variance (psi' psi)^-1`.
     pub(crate) fn with_covariance(self, variance: f64, inverse_gram: &[f64]) -> Self {
         Self {
             covariance: Some(inverse_gram.iter().map(|g| variance * g).collect()),
@@ -72,7 +71,7 @@ impl Fit {
     }
 }
 
-/// Which of p parameters are not free.
+/// Returns for each of p parameters whether it is not free.
 pub(crate) fn held(free: &[usize], p: usize) -> Vec<bool> {
     (0..p).map(|i| !free.contains(&i)).collect()
 }

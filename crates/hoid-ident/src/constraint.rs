@@ -10,7 +10,7 @@ pub enum Constraint {
 }
 
 impl Constraint {
-    /// Lower and upper bound; equal for a fixed parameter.
+    /// Returns the lower and upper bound; equal for a fixed parameter.
     pub fn limits(self) -> (f64, f64) {
         match self {
             Self::Fixed(value) => (value, value),
@@ -18,8 +18,7 @@ impl Constraint {
         }
     }
 
-    /// True for numbers that are in order: a finite value, or a lower bound that does not exceed
-    /// the upper one.
+    /// True if the numbers are valid: a finite value, or a lower bound that does not exceed the upper bound.
     pub fn is_sound(self) -> bool {
         match self {
             Self::Fixed(value) => value.is_finite(),
@@ -36,6 +35,6 @@ impl Constraint {
 pub struct Prior {
     /// The guess theta*.
     pub value: f64,
-    /// Its weight in the loss, in units of the loss over those of the parameter squared.
+    /// Its weight in the loss, in units of the loss divided by the squared unit of the parameter.
     pub weight: f64,
 }

@@ -5,14 +5,14 @@
 //! multiple root the derivative does not exist, and near one it carries little information: the
 //! standard error grows without bound there, as the root itself is ill determined.
 //!
-//! The open loop is `L(omega, theta) = H(omega, theta) Y_c(omega)` with the controlled element Y_c
-//! given. Where `|L| = 1` stays so while theta moves,
+//! The open loop is `L(omega, theta) = H(omega, theta) Y_c(omega)` with a given controlled element Y_c. Where theta
+//! changes and `|L| = 1` still holds,
 //!
 //! `d omega_c = -(d ln|L|/d theta) / (d ln|L|/d omega)`,
 //! `d phi_m = d arg L/d theta + (d arg L/d omega) d omega_c`,
 //!
-//! and where `arg L = -180 deg` stays so, with the parts of phase and gain exchanged, for the gain
-//! margin. A searched delay turns the phase by `-omega d tau` besides (`searched_delay.rs`).
+//! and for the gain margin, where `arg L = -180 deg` still holds, with phase and gain exchanged. A searched delay also
+//! turns the phase by `-omega d tau` (`searched_delay.rs`).
 
 use hoid_model::{
     Complex64, margins::Margins, margins::margins, polynomial, polynomial_model::monic, uncertainty::Estimate,
@@ -24,18 +24,17 @@ use crate::Fit;
 /// A pole or a zero in the z plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Root {
-    /// Polynomial that has it: `'a'`, `'b'`, `'c'`, `'d'` or `'f'`.
+    /// The polynomial of the root: `'a'`, `'b'`, `'c'`, `'d'` or `'f'`.
     pub polynomial: char,
-    /// Its place.
+    /// Its value.
     pub value: Complex64,
-    /// Standard errors of the real and the imaginary part; `None` without covariance or at a
-    /// multiple root.
+    /// Standard errors of the real and the imaginary part; `None` without a covariance or at a multiple root.
     pub standard_error: Option<(f64, f64)>,
 }
 
 impl Root {
-    /// Natural frequency in rad/s and damping ratio of the continuous pole `ln(z)/Ts`; `None` on
-    /// the closed negative real axis of z, where there is none.
+    /// Natural frequency in rad/s and damping ratio of the continuous pole `ln(z)/Ts`; `None` on the closed negative
+    /// real axis of z, where this does not exist.
     pub fn frequency_and_damping(&self, sample_time_s: f64) -> Option<(f64, f64)> {
         if self.value.im == 0.0 && self.value.re <= 0.0 {
             return None;
@@ -46,7 +45,7 @@ impl Root {
     }
 }
 
-/// Crossover and margins of an open loop with their uncertainty; `None` if there is no crossover.
+/// Crossover and margins of an open loop with their standard errors; `None` if there is no crossover.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MarginEstimates {
     /// Gain crossover frequency omega_c in rad/s.
@@ -60,7 +59,7 @@ pub struct MarginEstimates {
 }
 
 impl From<Margins> for MarginEstimates {
-    /// Margins that are computed and not estimated: no standard errors.
+    /// Converts computed margins, which have no standard errors.
     fn from(m: Margins) -> Self {
         Self {
             crossover_rad_s: m.crossover_rad_s.map(Estimate::fixed),
@@ -72,9 +71,9 @@ impl From<Margins> for MarginEstimates {
 }
 
 impl Fit {
-    /// Roots of A, B, C, D and F with their uncertainty, in this order: poles of the system are
-    /// those of A and F, its zeros those of B (the delay's not counted); poles of the noise filter
-    /// are those of A and D, its zeros those of C.
+    /// Returns the roots of A, B, C, D and F with their standard errors, in this order: the poles of the system are the
+    /// roots of A and F, its zeros those of B (without the zeros of the delay); the poles of the noise filter are the
+    /// roots of A and D, its zeros those of C.
     pub fn roots(&self) -> Vec<Root> {
         let m = self.model();
         let o = self.orders();
@@ -95,8 +94,8 @@ impl Fit {
         all
     }
 
-    /// Standard errors of a root of `p`, whose coefficients lie in theta from `at` on (all of them,
-    /// or all but the leading one).
+    /// Standard errors of a root of `p`, whose coefficients are in theta from `at` on (all of them, or all except the
+    /// leading one).
     fn root_error(&self, p: &[f64], z: Complex64, at: usize, leading: bool) -> Option<(f64, f64)> {
         let covariance = self.covariance()?;
         let n = p.len() - 1;
@@ -117,8 +116,8 @@ impl Fit {
         (re > 0.0 || im > 0.0).then_some((re, im))
     }
 
-    /// Crossover frequency and margins of the open loop with a controlled element of the given
-    /// frequency response.
+    /// Returns crossover frequency and margins of the open loop with a controlled element of the given frequency
+    /// response.
     pub fn margins(&self, controlled_element: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> MarginEstimates {
         let open_loop = |omega: f64| self.model().response(omega) * controlled_element(omega);
         let found = margins(open_loop, range_rad_s);
@@ -126,8 +125,7 @@ impl Fit {
         if self.covariance().is_none() {
             return estimates;
         }
-        // d ln L / d omega by a central difference: L is smooth, so that the step costs about 1e-10
-        // of it.
+        // d ln L / d omega by a central difference: L is smooth, so that the relative error is about 1e-10.
         let slope = |omega: f64| {
             let h = 1e-5 * omega;
             let ratio = open_loop(omega + h) / open_loop(omega - h);
@@ -148,7 +146,7 @@ impl Fit {
                 .zip(&moved)
                 .map(|(g, d)| (g.im + along.im * d).to_degrees())
                 .collect();
-            // The delay turns the phase and leaves the magnitude.
+            // The delay changes the phase, not the magnitude.
             estimates.crossover_rad_s = with(found.crossover_rad_s, moved, 0.0);
             estimates.phase_margin_deg = with(found.phase_margin_deg, phase, -omega.to_degrees());
         }

@@ -1,14 +1,13 @@
-//! Why an identification cannot give a result.
+//! Errors of identification.
 
 use hoid_model::ModelError;
 use thiserror::Error;
 
-/// Everything that stops a fit. How a search *ended* is data in the fit ([`crate::Termination`]),
-/// not an error.
+/// Errors that stop a fit. How a search *ended* is data in the fit ([`crate::Termination`]), not an error.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum IdentError {
-    /// The model or a record is wrong by itself.
+    /// The model or a record is invalid by itself.
     #[error(transparent)]
     Model(#[from] ModelError),
     /// No record at all.
@@ -34,7 +33,7 @@ pub enum IdentError {
         label: String,
         /// Its sample time, s.
         found: f64,
-        /// The value for the first record, s.
+        /// The sample time of the first record, s.
         expected: f64,
     },
     /// Fewer residuals than unknowns.
@@ -44,24 +43,24 @@ pub enum IdentError {
     TooFewSamples {
         /// The record.
         label: String,
-        /// Samples that it has.
+        /// Number of its samples.
         samples: usize,
         /// The orders.
         orders: String,
-        /// Samples that are used up before the first degree of freedom is left.
+        /// Number of samples that are used up before the first degree of freedom is left.
         needed: usize,
     },
-    /// A delay that leaves nothing of the record.
+    /// A delay for which nothing of the record is left.
     #[error("the delay nk = {nk} is not shorter than record {label} with {samples} samples; check nk and the sampling")]
     DelayTooLong {
         /// The delay in samples.
         nk: usize,
         /// The record.
         label: String,
-        /// Samples that it has.
+        /// Number of its samples.
         samples: usize,
     },
-    /// A signal that does not move.
+    /// A constant signal.
     #[error(
         "{channel} of record {label} is {value} in every sample: there is nothing to identify; check the column and the span"
     )]
@@ -73,7 +72,7 @@ pub enum IdentError {
         /// Its constant value.
         value: f64,
     },
-    /// Regressors that depend on each other.
+    /// Linearly dependent regressors.
     #[error(
         "the regressors are singular: {columns}; the record does not excite so many parameters: lower the orders or use a record with more frequencies"
     )]
@@ -81,13 +80,13 @@ pub enum IdentError {
         /// The dependent columns by name.
         columns: String,
     },
-    /// Instruments that depend on each other, or do not follow the regressors.
+    /// Linearly dependent instruments, or instruments that do not follow the regressors.
     #[error(
         "the instruments are singular: {dependence}; the signal that they are made of does not excite so many parameters: lower the \
          orders or use one with more frequencies"
     )]
     SingularInstruments {
-        /// Which instrument depends on which.
+        /// The dependence between instruments.
         dependence: String,
     },
     /// A channel that a record does not have.
@@ -97,10 +96,10 @@ pub enum IdentError {
         channel: String,
         /// The record.
         label: String,
-        /// The channels there are.
+        /// The available channels.
         available: String,
     },
-    /// An information matrix that has no inverse.
+    /// A singular information matrix.
     #[error(
         "the data do not determine {parameters}: the information matrix is singular (a pole and a zero that cancel, or too little excitation); lower the orders"
     )]
@@ -108,10 +107,10 @@ pub enum IdentError {
         /// The parameters of the undetermined combination.
         parameters: String,
     },
-    /// A start that the search cannot use.
+    /// An unusable start of the search.
     #[error("the start cannot be used: {reason}")]
     BadStart {
-        /// Problems with it, and the remedy.
+        /// The reason, and the remedy.
         reason: String,
     },
     /// A name that is not a parameter of the model.
@@ -119,7 +118,7 @@ pub enum IdentError {
     UnknownParameter {
         /// The name.
         name: String,
-        /// The parameters there are.
+        /// The available parameters.
         available: String,
     },
     /// An option that is not valid, alone or with the others.
@@ -137,13 +136,13 @@ pub enum IdentError {
     Option {
         /// Its name.
         name: &'static str,
-        /// The findings, the expected value, what to do.
+        /// The reason: the value found, the expected value, the remedy.
         reason: String,
     },
-    /// Not one start led to a finite loss.
+    /// No start led to a finite loss.
     #[error("no start of the search gave a finite loss; check the scale of the data and the orders")]
     NoFiniteLoss,
-    /// A search that found no minimum, where nothing but a minimum serves.
+    /// A search that found no minimum where a minimum is necessary.
     #[error("the search did not come to rest ({reason}); lower the orders, or take a longer window")]
     NotSettled {
         /// How it ended.
@@ -168,10 +167,10 @@ pub enum IdentError {
         span_s: f64,
         /// The period of the excitation, s.
         period_s: f64,
-        /// The nearest span that would do.
+        /// The nearest suitable span.
         remedy: String,
     },
-    /// A line of the excitation at which a channel does not move.
+    /// A line of the excitation at which a channel has no power.
     #[error(
         "{channel} of record {label} has no power at the line {omega_rad_s} rad/s; leave this line out, or check the period and the span"
     )]
@@ -183,7 +182,7 @@ pub enum IdentError {
         /// The line, rad/s.
         omega_rad_s: f64,
     },
-    /// A line that the sampling cannot show.
+    /// A line above the Nyquist frequency.
     #[error(
         "the line {omega_rad_s} rad/s does not lie below half the sampling frequency of record {label}, {nyquist_rad_s} rad/s; leave it out"
     )]
@@ -197,7 +196,7 @@ pub enum IdentError {
     },
 }
 
-/// The lower of the rates of two sample times, in Hz, to which both can be brought.
+/// Lower of the rates of two sample times, in Hz, to which both can be converted.
 fn lower_rate(a_s: f64, b_s: f64) -> String {
     let hz = 1.0 / a_s.max(b_s);
     let digits = format!("{hz:.6}");

@@ -1,4 +1,4 @@
-//! The estimator by the prediction error method: what is to be estimated, and how.
+//! The estimator by the prediction error method and its options.
 //!
 //! The options, their check, and the calls that fit. The method itself is in [`crate::pem`].
 
@@ -16,32 +16,29 @@ use crate::{
 /// Purpose of the fitted model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Focus {
-    /// One-step-ahead prediction: the prediction error method, efficient where the structure is
-    /// right.
+    /// One-step-ahead prediction: the prediction error method, efficient if the structure is right.
     #[default]
     Prediction,
-    /// Simulation from the input alone: the system from e to u minimises the simulation error, and
-    /// the noise model is fitted to what is left. In a closed loop the system is then biased by the
-    /// feedback.
+    /// Simulation from the input alone: the system from e to u minimises the simulation error, and the noise model is
+    /// fitted to the remainder. In a closed loop the system is then biased by the feedback.
     Simulation,
 }
 
 hoid_model::named_choice!(Focus, "focus", 2, { Prediction => "prediction", Simulation => "simulation" });
 
-/// Quantity to be estimated, and how.
+/// Structure, orders and options of an estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimator {
     /// The structure.
     pub structure: Structure,
     /// The orders.
     pub orders: Orders,
-    /// Initial states of each record. Default (`None`): automatic, which is estimated where there
-    /// is an input and backcast for an output alone, whose past is as stationary as its present.
+    /// Initial states of each record. Default (`None`): automatic, which is `Estimate` with an input and `Backcast` for
+    /// an output alone, whose past is as stationary as its present.
     pub initial_state: Option<InitialState>,
     /// Method and limits of the search.
     pub search: SearchOptions,
-    /// Number of own starts from which the search runs to its end; the best minimum wins. Default
-    /// 2.
+    /// Number of own starts from which the search runs to its end; the best minimum is used. Default 2.
     pub starts: usize,
     /// Start of the search instead of the estimator's own; theta in the order of
     /// [`Orders::parameter_names`].
@@ -50,16 +47,15 @@ pub struct Estimator {
     pub constraints: BTreeMap<String, Constraint>,
     /// Prior guesses of coefficients, by name.
     pub priors: BTreeMap<String, Prior>,
-    /// How a residual counts. Default: by its square. With a robust loss each sample of e and u is
-    /// held to its neighbours beforehand ([`crate::faults::resistant`]).
+    /// Weight of a residual. Default: its square. With a robust loss each sample of e and u is limited by its
+    /// neighbours beforehand ([`crate::faults::resistant`]).
     pub loss: Loss,
     /// Purpose of the model. Default: prediction.
     pub focus: Focus,
-    /// True if u of each record has a constant that is not a response to e, an unknown as its initial states are
+    /// True if u of each record has a constant that is not a response to e; it is an unknown like its initial states
     /// ([`crate::level`]); not with initial states of zero. Default false.
     pub level: bool,
-    /// True when A must be stable too, so that the model from e to u is. C and F always are.
-    /// Default false.
+    /// True if A must be stable too, so that the model from e to u is stable. C and F always are. Default false.
     pub stable: bool,
 }
 
@@ -82,7 +78,7 @@ impl Estimator {
         }
     }
 
-    /// The same estimator with other orders, and without a start (which would not fit them).
+    /// Returns the same estimator with other orders, and without a start (which would not fit them).
     pub fn with_orders(&self, orders: Orders) -> Self {
         Self {
             orders,
@@ -98,7 +94,7 @@ impl Estimator {
     pub fn check(&self) -> Result<(), IdentError> {
         self.orders.check(self.structure)?;
         let mut named = self.constraints.keys().chain(self.priors.keys()).peekable();
-        // An ordinary fit names none, and the list of names is not made.
+        // Most fits have no names, and the list of names is not made for them.
         let names = named.peek().map_or_else(Vec::new, |_| self.orders.parameter_names());
         for name in named {
             if !names.contains(name) {
@@ -151,7 +147,7 @@ impl Estimator {
         Ok(())
     }
 
-    /// The rule for initial states, the automatic one decided.
+    /// Returns the rule for initial states in use, with the automatic choice resolved.
     pub fn initial_state_in_use(&self) -> InitialState {
         self.initial_state.unwrap_or(if self.structure.has_input() {
             InitialState::Estimate
@@ -160,7 +156,7 @@ impl Estimator {
         })
     }
 
-    /// Fits one model to all records: a common theta, initial states of each.
+    /// Fits one model to all records: a common theta, and initial states of each record.
     ///
     /// # Errors
     /// [`IdentError`]; how a search ended is part of the fit.
@@ -168,14 +164,14 @@ impl Estimator {
         self.fit_from(records, 0)
     }
 
-    /// As [`Estimator::fit`], with residuals that count from sample `first` of each record at the
-    /// earliest, so that models of different orders are compared on the same samples.
+    /// As [`Estimator::fit`], with residuals that count from sample `first` of each record at the earliest, so that
+    /// models of different orders are compared on the same samples.
     ///
     /// # Errors
     /// As [`Estimator::fit`].
     pub fn fit_from(&self, records: &[Record], first: usize) -> Result<Fit, IdentError> {
         self.check()?;
-        // What a sample brings into the filters is bounded first: the loss bounds residuals alone.
+        // The contribution of a sample to the filters is bounded first: the loss bounds only residuals.
         let held = match self.loss {
             Loss::Huber { .. } => held(records),
             Loss::Quadratic => None,
@@ -188,15 +184,14 @@ impl Estimator {
         }
     }
 
-    /// Fits a model to each record alone.
+    /// Fits a model to each record separately.
     ///
-    /// Box-Jenkins models of records of one length are searched side by side, in about half of the
-    /// time of one after the other. Dependencies of a fit finds does not what it is searched
-    /// alongside; it differs from that of [`Estimator::fit`] by rounding, less than 1e-7 of a
-    /// standard error.
+    /// Box-Jenkins models of records of one length are searched in parallel lanes, in about half of the time of one
+    /// after the other. The result of a fit does not depend on the records that it is searched with; it differs from
+    /// that of [`Estimator::fit`] by rounding, less than 1e-7 of a standard error.
     ///
     /// # Errors
-    /// The errors of [`Estimator::fit`], for each record by itself.
+    /// The errors of [`Estimator::fit`], for each record separately.
     pub fn fit_each(&self, records: &[&Record]) -> Vec<Result<Fit, IdentError>> {
         let batched = match self.check() {
             Ok(()) if self.focus == Focus::Prediction => {
@@ -210,12 +205,12 @@ impl Estimator {
         })
     }
 
-    /// True if the system from e to u is to minimise another error than that of the prediction.
+    /// True if the system from e to u minimises an error other than that of the prediction.
     fn simulates(&self) -> bool {
         self.focus == Focus::Simulation && self.structure != Structure::OutputError
     }
 
-    /// Requirements of the method on the options.
+    /// Returns the options that the method needs.
     pub(crate) fn settings(&self) -> FitSettings {
         FitSettings {
             structure: self.structure,

@@ -1,4 +1,4 @@
-//! The result of an estimation: the model, its uncertainty, and how it was found.
+//! The result of an estimation: the model, its uncertainty, and the data of the search.
 
 use hoid_model::{
     NotConvertible, Orders, PolynomialModel, Record,
@@ -27,7 +27,7 @@ pub struct Fit {
     pub(crate) initial_state: InitialState,
     pub(crate) termination: Termination,
     pub(crate) start: String,
-    /// Parameters that were fixed, or rest at a bound.
+    /// Parameters that were fixed, or are at a bound.
     pub(crate) held: Vec<bool>,
     /// Variance of the output over the residuals that count.
     pub(crate) output_variance: f64,
@@ -35,26 +35,26 @@ pub struct Fit {
     pub(crate) robust: bool,
     /// True if instruments replaced the regressors.
     pub(crate) instrumented: bool,
-    /// The physical parameters that theta was computed from, for a grey box.
+    /// The physical parameters from which theta was computed, for a grey box.
     pub(crate) physical: Option<Box<Physical>>,
-    /// Where nk was searched, and its error counts.
+    /// The error of nk, if it was searched.
     pub(crate) searched_delay: Option<SearchedDelay>,
 }
 
-/// Physical parameters of a grey-box fit: theta is a function of these.
+/// Physical parameters of a grey-box fit, of which theta is a function.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Physical {
-    /// The fitted model, in a line.
+    /// Title of the fitted model in one line.
     pub title: String,
     /// Name and estimate of each parameter.
     pub parameters: Vec<(String, Estimate)>,
-    /// Number of parameters that were free.
+    /// Number of free parameters.
     pub free: usize,
     pub operator: Result<OperatorEstimate, NotConvertible>,
     pub remnant: Option<RemnantEstimate>,
 }
 
-/// How a searched delay is known, and how theta moves with it.
+/// Variance of a searched delay, and the dependence of theta on it.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct SearchedDelay {
     /// Variance of the delay, s^2.
@@ -68,11 +68,11 @@ pub(crate) struct SearchedDelay {
 pub struct Series {
     /// Index of the first sample that has a value.
     pub first: usize,
-    /// One value a sample from there to the end of the record.
+    /// One value per sample from there to the end of the record.
     pub values: Vec<f64>,
 }
 
-/// Frequency response from e to u with its uncertainty.
+/// Frequency response from e to u with its standard errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResponsePoint {
     /// Frequency, rad/s.
@@ -84,7 +84,7 @@ pub struct ResponsePoint {
 }
 
 impl Fit {
-    /// The model with its coefficients.
+    /// Returns the model with its coefficients.
     pub fn model(&self) -> &PolynomialModel {
         &self.model
     }
@@ -94,15 +94,15 @@ impl Fit {
         self.model.orders()
     }
 
-    /// Covariance of theta by rows, `sigma^2 (psi' psi)^-1` with the initial states eliminated, and
-    /// with what a searched delay adds for an operator (`searched_delay.rs`); `None` for an exact fit,
-    /// whose residuals carry no information about the noise.
+    /// Returns the covariance of theta by rows, `sigma^2 (psi' psi)^-1` with the initial states eliminated, plus the
+    /// contribution of a searched delay for an operator (`searched_delay.rs`); `None` for an exact fit, whose residuals
+    /// carry no information about the noise.
     pub fn covariance(&self) -> Option<&[f64]> {
         self.covariance.as_deref()
     }
 
-    /// Name, value and standard error of each parameter: the coefficients of theta, or the physical
-    /// parameters that a grey box fitted.
+    /// Returns name, value and standard error of each parameter: the coefficients of theta, or the physical parameters
+    /// of a grey box.
     pub fn parameters(&self) -> Vec<(String, Estimate)> {
         if let Some(physical) = &self.physical {
             return physical.parameters.clone();
@@ -123,34 +123,33 @@ impl Fit {
             .collect()
     }
 
-    /// Loss `V = sum eps^2 / n` over the n residuals that count.
+    /// Returns the loss `V = sum eps^2 / n` over the n residuals that count.
     pub fn loss(&self) -> f64 {
         self.loss
     }
 
-    /// Unbiased innovation variance `sum eps^2 / (n - p - s)` with p parameters and s estimated
-    /// initial states; with a robust loss the square of the robust scale ([`Fit::is_robust`]).
+    /// Returns the unbiased innovation variance `sum eps^2 / (n - p - s)` with p parameters and s estimated initial
+    /// states; with a robust loss the square of the robust scale ([`Fit::is_robust`]).
     pub fn innovation_variance(&self) -> f64 {
         self.innovation_variance
     }
 
-    /// Number n of residuals.
+    /// Returns the number n of residuals.
     pub fn residual_count(&self) -> usize {
         self.residuals
     }
 
-    /// Number s of initial states that were estimated, over all records.
+    /// Returns the number s of estimated initial states, over all records.
     pub fn state_count(&self) -> usize {
         self.states
     }
 
-    /// Assumptions about the time before the records.
+    /// Returns the assumption about the time before the records.
     pub fn initial_state(&self) -> InitialState {
         self.initial_state
     }
 
-    /// For each coefficient, whether it was fixed or rests at a bound; it then has no standard
-    /// error.
+    /// Returns for each coefficient whether it was fixed or is at a bound; it then has no standard error.
     pub fn held(&self) -> &[bool] {
         &self.held
     }
@@ -160,7 +159,7 @@ impl Fit {
         self.termination
     }
 
-    /// The best start.
+    /// Returns the name of the best start.
     pub fn start(&self) -> &str {
         &self.start
     }
@@ -182,9 +181,8 @@ impl Fit {
         self.loss * (1.0 + ratio) / (1.0 - ratio)
     }
 
-    /// Akaike's criterion with the correction for short records, `AIC + 2 p (p + 1)/(n - p - 1)`
-    /// (C. M. Hurvich and C.-L. Tsai, *Biometrika* 76 (1989) 297-307); infinite where n does not
-    /// exceed p + 1.
+    /// Akaike's criterion with the correction for short records, `AIC + 2 p (p + 1)/(n - p - 1)` (C. M. Hurvich and
+    /// C.-L. Tsai, *Biometrika* 76 (1989) 297-307); infinite if n does not exceed p + 1.
     pub fn aicc(&self) -> f64 {
         let (n, p) = (self.residuals as f64, self.parameter_count());
         if n > p + 1.0 {
@@ -200,10 +198,9 @@ impl Fit {
         self.loss * (1.0 + p * n.ln() / n)
     }
 
-    /// Young's criterion `ln(V / var u) + ln( (1/p) sum_i var theta_i / theta_i^2 )` over the free
-    /// coefficients of A, B and F (P. C. Young, *Recursive Estimation and Time-Series Analysis*,
-    /// 2011, section 6.7): the more negative, the better the fit for well determined coefficients.
-    /// `None` without standard errors or where a coefficient is zero.
+    /// Young's criterion `ln(V / var u) + ln( (1/p) sum_i var theta_i / theta_i^2 )` over the free coefficients of A, B
+    /// and F (P. C. Young, *Recursive Estimation and Time-Series Analysis*, 2011, section 6.7): the more negative, the
+    /// better the fit for well determined coefficients. `None` without standard errors or if a coefficient is zero.
     pub fn yic(&self) -> Option<f64> {
         let relative: Option<Vec<f64>> = self
             .parameters()
@@ -217,7 +214,7 @@ impl Fit {
         yic.is_finite().then_some(yic)
     }
 
-    /// Number p of parameters that were free.
+    /// Returns the number p of free parameters.
     pub fn free_count(&self) -> usize {
         if let Some(physical) = &self.physical {
             return physical.free;
@@ -229,7 +226,7 @@ impl Fit {
         self.free_count() as f64
     }
 
-    /// The operator's parameters with standard errors.
+    /// Returns the operator's parameters with standard errors.
     ///
     /// # Errors
     /// [`NotConvertible`] with the reason.
@@ -258,8 +255,7 @@ impl Fit {
         self.physical.is_some()
     }
 
-    /// Structure and orders as in print; of a grey box or an operator of the family, what its
-    /// parameters are.
+    /// Returns structure and orders as in print; for a grey box or an operator of the family, its parameters.
     pub fn title(&self) -> String {
         match &self.physical {
             Some(physical) => physical.title.clone(),
@@ -267,8 +263,8 @@ impl Fit {
         }
     }
 
-    /// T_n and K_n of the remnant filter that the noise model represents. A grey box has fitted
-    /// them as they are held over each sample, whatever `how`.
+    /// Returns T_n and K_n of the remnant filter that the noise model represents. A grey box has fitted them for a hold
+    /// over each sample, whatever `how` is.
     ///
     /// # Errors
     /// [`NotConvertible`] with the reason.
@@ -289,7 +285,7 @@ impl Fit {
         )
     }
 
-    /// One-step-ahead residuals on a record, initial states treated as in the fit.
+    /// Returns the one-step-ahead residuals on a record, with initial states treated as in the fit.
     ///
     /// # Errors
     /// [`IdentError::MixedSampling`], [`IdentError::TooFewSamples`].
@@ -297,7 +293,7 @@ impl Fit {
         self.errors_of(self.orders(), self.model.theta(), record)
     }
 
-    /// One-step-ahead prediction of the output.
+    /// Returns the one-step-ahead prediction of the output.
     ///
     /// # Errors
     /// As [`Fit::residuals`].
@@ -305,9 +301,9 @@ impl Fit {
         Ok(output_less(record, self.residuals(record)?))
     }
 
-    /// Simulated output: the response of `B/(A F)` to the input alone, without noise model. Where
-    /// the fit estimated initial states, those of the simulation are estimated too (least squares
-    /// of the simulation error). A model without an input has nothing to simulate: zero.
+    /// Returns the simulated output: the response of `B/(A F)` to the input alone, without noise model. If the fit
+    /// estimated initial states, those of the simulation are estimated too (least squares of the simulation error). A
+    /// model without an input gives zero.
     ///
     /// # Errors
     /// As [`Fit::residuals`].
@@ -322,11 +318,11 @@ impl Fit {
         Ok(output_less(record, self.errors_of(orders, &theta, record)?))
     }
 
-    /// Variance of a quantity with the gradient `by_theta` and changes with the delay by `by_delay`
-    /// (1/s); `None` without a covariance.
+    /// Variance of a quantity with the gradient `by_theta` and the derivative `by_delay` (1/s) with respect to the
+    /// delay; `None` without a covariance.
     pub(crate) fn variance_of(&self, by_theta: &[f64], by_delay: f64) -> Option<f64> {
         let covariance = self.covariance.as_ref()?;
-        // The covariance holds (g's)^2 var tau already.
+        // The covariance contains (g's)^2 var tau already.
         let with_delay = self.searched_delay.as_ref().map_or(0.0, |delay| {
             let moved = dot(by_theta, &delay.slope);
             delay.variance_s2 * by_delay * (2.0 * moved + by_delay)
@@ -361,7 +357,7 @@ impl Fit {
         })
     }
 
-    /// Frequency response with standard errors by the delta method: with `dH` the gradient,
+    /// Returns the frequency response with standard errors by the delta method: with `dH` the gradient,
     /// `d ln|H| = Re(dH/H)` and `d arg H = Im(dH/H) - omega d tau`.
     pub fn frequency_response(&self, omega_rad_s: &[f64]) -> Vec<ResponsePoint> {
         let to_db = 20.0 / std::f64::consts::LN_10;
@@ -398,8 +394,8 @@ fn output_less(record: &Record, mut errors: Series) -> Series {
     errors
 }
 
-/// Orders and theta of the output-error model `u = B/(A F) q^-nk e + eps` with the same system: its
-/// residual is the simulation error of the model.
+/// Returns orders and theta of the output-error model `u = B/(A F) q^-nk e + eps` with the same system: its residual is
+/// the simulation error of the model.
 fn output_error_form(model: &PolynomialModel) -> (Orders, Vec<f64>) {
     let orders = model.orders();
     let den = product(&monic(model.a()), &monic(model.f()));

@@ -1,15 +1,14 @@
-//! Whether records are informative enough for a model: one sample time, an input that moves, more
+//! Test of whether records are informative enough for a model: one sample time, an input that is not constant, more
 //! residuals than unknowns.
 //!
-//! This is what can be reported before the fit; whether the regressors are independent, the fit
-//! itself finds out. Source: L. Ljung, *System Identification*, 1999, section 8.2 (informative
-//! data).
+//! These are the conditions that can be checked before the fit; dependent regressors are found by the fit itself.
+//! Source: L. Ljung, *System Identification*, 1999, section 8.2 (informative data).
 
 use hoid_model::{Orders, Record, SampleTime, Structure};
 
 use crate::{IdentError, criterion::Criterion};
 
-/// The sample time that all records have.
+/// Returns the common sample time of all records.
 ///
 /// # Errors
 /// [`IdentError::NoRecords`], [`IdentError::MixedSampling`].

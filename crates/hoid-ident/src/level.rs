@@ -1,14 +1,14 @@
 //! The level of a record: the constant of u that is not a response to e.
 //!
-//! `u(t) = c + G e(t) + v(t)`: a stick that rests off its zero, an amplifier with an offset, an e with one.
-//! For given dynamics c is linear, and of long records least squares is that of the means,
+//! `u(t) = c + G e(t) + v(t)`: caused by a stick whose rest is not zero, an amplifier with an offset, or an e with an
+//! offset. For given dynamics c is linear, and for long records its least squares estimate is that from the means,
 //!
 //! `c = mean(u) - G(1) mean(e)`,
 //!
 //! so that a fit to e and u without their means ([`hoid_model::Detrend::Mean`]) is the fit with c for each record (L.
-//! Ljung, *System Identification*, 1999, section 14.1), except for the ends of the record and what happens in them:
-//! over a step the mean of u is not a level. There c is an unknown of the fit, as the initial states are
-//! ([`crate::Estimator::level`]), and the remainder of it in a record is
+//! Ljung, *System Identification*, 1999, section 14.1), except for effects of the ends of the record: for a step the
+//! mean of u is not a level. In this case c is an unknown of the fit, like the initial states
+//! ([`crate::Estimator::level`]), and its remainder in a record is
 //!
 //! `c = eps'z / z'z`, z the residuals of u = 1 at e = 0.
 //!
@@ -24,13 +24,13 @@ use hoid_numerics::statistics::mean;
 
 use crate::{Fit, IdentError, linalg::least_squares::dot};
 
-/// Mean square of the residuals of u = 1 below which a constant is nothing to the model.
+/// Mean square of the residuals of u = 1 below which a constant has no effect on the model.
 const LEAST: f64 = 1e-16;
-/// The channel of true gains that simulated runs carry: they have no level.
+/// The channel of true gains in simulated runs, which have no level.
 const TRUTH: &str = "K_e";
 
-/// True for records that a level is estimated of: not of simulated runs, which carry their true
-/// gains, and not where e or u never moves, which the fit refuses with the value as it was read.
+/// True for records with a possible level: not for simulated runs, which contain their true gains, and not if e or u is
+/// constant, which the fit refuses with its original value.
 pub fn may_have_level(records: &[Record]) -> bool {
     let simulated = records.iter().any(|record| record.channel(TRUTH).is_some());
     let moves = |x: &[f64]| x.iter().any(|v| *v != x[0]);
@@ -38,14 +38,14 @@ pub fn may_have_level(records: &[Record]) -> bool {
     !simulated && records.iter().all(alive)
 }
 
-/// The records without the means of e and u, which takes the level out of a constant model.
+/// Returns the records without the means of e and u, which removes the level for a constant model.
 pub fn without_level(records: &[Record]) -> Vec<Record> {
     records.iter().map(|r| r.clone().detrended(Detrend::Mean)).collect()
 }
 
 impl Fit {
-    /// The constant of u that is not a response to e, by least squares over the residuals; `None` if the model makes
-    /// nothing of one, as with an integration.
+    /// Returns the constant of u that is not a response to e, by least squares over the residuals; `None` if a constant
+    /// has no effect in the model, as with an integration.
     ///
     /// # Errors
     /// The errors of residuals.
@@ -58,7 +58,7 @@ impl Fit {
         Ok((squares > LEAST * of_unit.len() as f64 && found.is_finite()).then_some(found))
     }
 
-    /// The level c of u in a record, in the unit of u, with its standard error; the fit is one to the record without
+    /// Returns the level c of u in a record, in the unit of u, with its standard error, for a fit to the record without
     /// its means. `None` if the model has no static gain (an integration), no input or no noise.
     pub fn level(&self, record: &Record) -> Option<Estimate> {
         let model = self.model();

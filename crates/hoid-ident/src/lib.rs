@@ -1,8 +1,8 @@
 //! Identification of the human operator from records: batch estimators.
 //!
-//! **The problem.** A person tracks a target: they see the error e and move the control, u. Both
-//! are sampled with the period Ts. What dynamics lead from e to u, how well are they determined,
-//! and what of u do they leave unexplained, the remnant?
+//! **The problem.** A person tracks a target: they see the error e and move the control, u. Both are sampled with the
+//! period Ts. Which dynamics lead from e to u, how well are they determined, and which part of u, the remnant, do they
+//! leave unexplained?
 //!
 //! **The model.** Everything here is a case of
 //!
@@ -13,16 +13,16 @@
 //! C/D shapes the remnant; structures set some of the polynomials to one (ARX: A and B;
 //! Box-Jenkins: B, C, D and F).
 //!
-//! **The method.** For given coefficients theta the best prediction of u(t) from all that was
-//! before leaves
+//! **The method.** For given coefficients theta the best prediction of u(t) from all earlier data leaves
 //!
 //! `eps(t, theta) = (D/C) (A u(t) - (B/F) q^-nk e(t))`
 //!
 //! and theta minimises `V = (1/N) sum eps(t, theta)^2`: the prediction error method (L. Ljung, *System Identification*,
-//! 1999, ch. 7). It is consistent where the structure holds the true dynamics, in a closed loop too if there is a delay
+//! 1999, ch. 7). It is consistent if the structure contains the true dynamics, in a closed loop too if there is a delay
 //! in the loop, and it attains the Cramér-Rao bound for normal innovations. Its covariance is `sigma^2 (psi' psi)^-1`
-//! with `psi = -d eps/d theta`. The unknown initial states of a record enter eps linearly and is eliminated exactly for
-//! each theta. ARX is linear in theta and solved in one step; the others by damped Gauss-Newton from several starts.
+//! with `psi = -d eps/d theta`. The unknown initial states of a record enter eps linearly and are eliminated exactly
+//! for each theta. ARX is linear in theta and solved in one step; the others by damped Gauss-Newton from several
+//! starts.
 //!
 //! ```
 //! use hoid_ident::Estimator;
@@ -48,7 +48,7 @@
 //! # }
 //! ```
 //!
-//! **Where to find what**
+//! **Contents**
 //!
 //! | module | contents |
 //! |---|---|
@@ -58,25 +58,25 @@
 //! | [`order_selection`] | ranges of orders and delay, criteria, the chosen model |
 //! | [`several_inputs`] | polynomial models with several inputs |
 //! | [`iv`] | instrumental variables, in open and closed loop |
-//! | [`family`] | operators of recorded people: form, parameters, errors that hold, a verdict |
+//! | [`family`] | operators of recorded people: form, parameters, reliable errors, a verdict |
 //! | [`grey_box`] | the fit in physical parameters: operator with a real delay, remnant filter |
 //! | [`SigmoidChange`] | gains that follow a sigmoid, with the time and the rate of the change |
 //! | [`faults`] | faults of recorded data, found and repaired before a fit |
 //! | [`frequency`] | describing function, coherence, remnant spectrum and margins by Fourier coefficients |
-//! | [`diagnostics`] | what speaks for and against a fit: [`Fit::verdict`] |
-//! | [`progress`] | how far a fit is, for the caller that waits |
+//! | [`diagnostics`] | evidence for and against a fit: [`Fit::verdict`] |
+//! | [`progress`] | progress of a fit, for the caller that waits |
 //! | [`linalg`] | sums of products, least squares by QR, the inverse of an information matrix |
 //!
-//! and inside, each using those before it:
+//! and internally, each using those before it:
 //!
 //! | module | contents |
 //! |---|---|
 //! | `optimize` | minimisation of a sum of squares, also along the border of stability |
 //! | `criterion` | the prediction-error criterion of the general model and its gradients; initial states |
 //! | `multistart` | searches from several starts |
-//! | `initial_guess` | where a search starts |
-//! | `pem` | bounds, priors, robust loss, focus; fits of one record or of many side by side |
-//! | `searched_delay` | what the search of nk adds to the error bars |
+//! | `initial_guess` | starts of a search |
+//! | `pem` | bounds, priors, robust loss, focus; fits of one record or of many in parallel lanes |
+//! | `searched_delay` | contribution of the search of nk to the error bars |
 
 mod assembled_fit;
 mod constraint;

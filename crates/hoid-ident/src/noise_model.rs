@@ -4,9 +4,9 @@ use hoid_model::polynomial::reflected_inside;
 
 use crate::linalg::least_squares::{dot, solve_symmetric};
 
-/// C and D of `v = (C/D) eps` by Hannan and Rissanen (*Biometrika* 69 (1982) 81-94): with nc = 0
-/// one autoregression, else a long autoregression for eps first and then a regression on past v and
-/// past eps. Zeros where that is singular.
+/// Returns C and D of `v = (C/D) eps` by Hannan and Rissanen (*Biometrika* 69 (1982) 81-94): with nc = 0 one
+/// autoregression, otherwise a long autoregression for eps and then a regression on past v and past eps. Zeros if that
+/// is singular.
 pub(crate) fn noise_model(v: &[Vec<f64>], nc: usize, nd: usize) -> (Vec<f64>, Vec<f64>) {
     let nothing = (vec![0.0; nc], vec![0.0; nd]);
     if nc == 0 {
@@ -38,8 +38,7 @@ pub(crate) fn noise_model(v: &[Vec<f64>], nc: usize, nd: usize) -> (Vec<f64>, Ve
     }
 }
 
-/// Coefficients of the regression of the first signal on lagged signals (index of signal, lag),
-/// rows from `first` on.
+/// Coefficients of the regression of the first signal on lagged signals (index of signal, lag), rows from `first` on.
 fn lagged_regression<const K: usize>(
     records: &[[&[f64]; K]],
     lags: &[(usize, usize)],

@@ -1,10 +1,9 @@
 //! Choice of orders and delay.
 //!
-//! Every combination of the given ranges is fitted on the same samples (the residuals of all
-//! candidates start where the most demanding one can), and the criterion decides: the loss for the
-//! delay alone, BIC where the number of parameters differs. The chosen model is then fitted once
-//! more on all the samples that its own orders leave, and its error bars count the search of the
-//! delay (`searched_delay.rs`).
+//! Every combination of the given ranges is fitted on the same samples (the residuals of all candidates start where the
+//! most demanding one can), and the criterion is decisive: the loss for the delay alone, BIC if the number of
+//! parameters differs. The chosen model is then fitted once more on all samples available for its own orders, and its
+//! error bars include the search of the delay (`searched_delay.rs`).
 
 use std::{collections::BTreeMap, fmt, ops::RangeInclusive};
 
@@ -13,7 +12,7 @@ use rayon::prelude::*;
 
 use crate::{Estimator, Fit, IdentError, SearchOptions, criterion::first_residual};
 
-/// Most candidates of a search: each is a fit of some milliseconds.
+/// Largest number of candidates of a search: each is a fit of some milliseconds.
 pub const MOST_CANDIDATES: usize = 100_000;
 
 /// A range for each order and for the delay.
@@ -60,7 +59,7 @@ pub fn check_order(name: &str, range: &RangeInclusive<usize>) -> Result<(), Iden
     }
 }
 
-/// A range as users write it.
+/// Formats a range as typed by users.
 pub(crate) fn written(range: &RangeInclusive<usize>) -> String {
     match (*range.start(), *range.end()) {
         (low, high) if low == high => low.to_string(),
@@ -108,7 +107,7 @@ impl OrderRanges {
         ]
     }
 
-    /// With the orders that are named in the place of these.
+    /// Returns the ranges with the named orders replaced.
     ///
     /// # Errors
     /// [`IdentError::BadOption`] for a name that is not an order.
@@ -134,7 +133,7 @@ impl OrderRanges {
         Ok(self)
     }
 
-    /// Number of all combinations.
+    /// Returns the number of all combinations.
     ///
     /// # Errors
     /// [`IdentError::EmptyRange`]; [`IdentError::BadOption`] for more than [`MOST_CANDIDATES`].
@@ -158,7 +157,7 @@ impl OrderRanges {
         Ok(all as usize)
     }
 
-    /// All combinations, the delay running fastest.
+    /// Returns all combinations, with the delay varying fastest.
     ///
     /// # Errors
     /// As [`OrderRanges::candidates`].
@@ -187,10 +186,10 @@ impl OrderRanges {
     }
 }
 
-/// Criterion that decides between candidates; the smallest value wins.
+/// Criterion for the choice between candidates; the smallest value is best.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Criterion {
-    /// The loss itself: right only for candidates with the same number of parameters.
+    /// The loss itself: valid only for candidates with the same number of parameters.
     Loss,
     /// Akaike.
     Aic,
@@ -212,7 +211,7 @@ hoid_model::named_choice!(Criterion, "criterion", 7, {
 });
 
 impl Criterion {
-    /// Name as in print.
+    /// Returns the name as in print.
     pub fn label(self) -> &'static str {
         match self {
             Self::Loss => "loss",
@@ -231,11 +230,11 @@ impl Criterion {
 pub struct Candidate {
     /// Its orders.
     pub orders: Orders,
-    /// Its figures, or why it could not be fitted.
+    /// Its criteria, or the reason why it could not be fitted.
     pub outcome: Result<CandidateFigures, String>,
 }
 
-/// Criterion for candidates, all on the same samples.
+/// Criteria of a candidate, all on the same samples.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CandidateFigures {
     /// Loss V.
@@ -254,7 +253,7 @@ pub struct CandidateFigures {
     pub yic: Option<f64>,
     /// Number of residuals, the same for all candidates.
     pub residuals: usize,
-    /// True when the search reached a minimum.
+    /// True if the search reached a minimum.
     pub converged: bool,
 }
 
@@ -273,7 +272,7 @@ impl CandidateFigures {
         }
     }
 
-    /// The figure that the criterion compares.
+    /// Returns the value of a criterion.
     pub fn value(&self, criterion: Criterion) -> f64 {
         match criterion {
             Criterion::Loss => self.loss,
@@ -287,7 +286,7 @@ impl CandidateFigures {
     }
 }
 
-/// The chosen fit and the table it was chosen from.
+/// The chosen fit with the table of candidates.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Choice {
     /// The chosen model, fitted on all its samples.
@@ -298,8 +297,8 @@ pub struct Choice {
     pub criterion: Criterion,
 }
 
-/// Identifies a person by a Box-Jenkins model, as `hoid identify --structure bj`: the delay searched over 0.05 to 0.6 s and the order of the noise model over 1 to 4,
-/// chosen by BIC.
+/// Identifies a person by a Box-Jenkins model, as `hoid identify --structure bj`: the delay is searched over 0.05 to
+/// 0.6 s and the order of the noise model over 1 to 4, chosen by BIC.
 ///
 /// # Errors
 /// As [`choose_orders`]; [`IdentError::NoRecords`] without a record.
@@ -311,11 +310,11 @@ pub fn identify_box_jenkins(records: &[Record]) -> Result<Choice, IdentError> {
     choose_orders(&template, &ranges, Criterion::Bic, records)
 }
 
-/// Fits every combination of orders and returns the best. `template` gives the options; its orders
-/// and start are not used.
+/// Fits every combination of orders and returns the best. `template` contains the options; its orders and start are not
+/// used.
 ///
 /// # Errors
-/// [`IdentError::EmptyRange`]; the error of the first candidate when none could be fitted.
+/// [`IdentError::EmptyRange`]; the error of the first candidate if none could be fitted.
 pub fn choose_orders(
     template: &Estimator,
     ranges: &OrderRanges,
@@ -325,8 +324,8 @@ pub fn choose_orders(
     choose_orders_with(template, ranges, criterion, records, &|| {})
 }
 
-/// As [`choose_orders`], calling `each` after every candidate, from any thread, so that a long
-/// search can show how far it is.
+/// As [`choose_orders`], calling `each` after every candidate, from any thread, to report the progress of a long
+/// search.
 ///
 /// # Errors
 /// As [`choose_orders`].
@@ -346,8 +345,8 @@ pub fn choose_orders_with(
         .map(|o| first_residual(o, template.initial_state_in_use()))
         .max()
         .unwrap_or(0);
-    // To rank candidates the loss need not be known to the last digit; the chosen one is fitted
-    // again with all care.
+    // To rank candidates the loss need not be known to the last digit; the chosen one is fitted again with full
+    // accuracy.
     let quick = Estimator {
         search: SearchOptions {
             tolerance: template.search.tolerance.max(1e-8),
@@ -390,10 +389,10 @@ pub fn choose_orders_with(
     })
 }
 
-/// Delays that are fitted one from the other.
+/// Number of delays that are fitted one from the other.
 const NEIGHBOURS: usize = 12;
 
-/// Fits orders that differ by their delay alone, each from the coefficients of the one before.
+/// Fits orders that differ only by their delay, each from the coefficients of the previous one.
 fn fit_neighbours(
     quick: &Estimator,
     block: &[Orders],
@@ -423,13 +422,12 @@ fn fit_neighbours(
         .collect()
 }
 
-/// The fit of one model where the ranges leave nothing open, else that of the best of them with the
-/// table it was chosen from. `template` gives the options; its start belongs to the first case
-/// alone.
+/// Returns the fit of one model if the ranges contain only one, otherwise the best of them with the table of
+/// candidates. `template` contains the options; its start is used only for a single model.
 ///
 /// # Errors
-/// The errors of [`Estimator::fit`] and [`choose_orders`]; [`IdentError::BadStart`] for a start where
-/// several models are tried.
+/// The errors of [`Estimator::fit`] and [`choose_orders`]; [`IdentError::BadStart`] for a start if several models are
+/// tried.
 pub fn fit_or_choose(
     template: &Estimator,
     ranges: &OrderRanges,
@@ -456,11 +454,10 @@ pub fn fit_or_choose(
 }
 
 impl Choice {
-    /// Delays nk that the data do not determine from the best one, the other orders being those of
-    /// the chosen model: the smallest and the largest with `n ln(V/V_min) <= 3.84`, the 95 % point
-    /// of chi-square with one degree of freedom (a profile likelihood interval; nk moves in whole
-    /// samples, so that it is coarse where one sample changes the loss much). `None` when fewer
-    /// than two delays were fitted.
+    /// Returns the interval of delays nk that the data do not distinguish from the best one, with the other orders of
+    /// the chosen model: the smallest and the largest with `n ln(V/V_min) <= 3.84`, the 95 % point of chi-square with
+    /// one degree of freedom (a profile likelihood interval; nk is an integer, so that it is coarse if one sample
+    /// changes the loss much). `None` if fewer than two delays were fitted.
     pub fn delay_interval(&self) -> Option<(usize, usize)> {
         let chosen = self.fit.orders();
         let profile: Vec<(usize, f64, usize)> = self
@@ -494,7 +491,7 @@ pub fn default_delay_range(sample_time: hoid_model::SampleTime) -> RangeInclusiv
     sample_time.nk(0.05)..=sample_time.nk(0.6)
 }
 
-/// The operator's orders with the defaults of the command line: nk searched, and nd over 1 to 4 for
+/// Returns the operator's orders with the defaults of the command line: nk searched, and nd over 1 to 4 for
 /// Box-Jenkins.
 pub fn default_operator_ranges(structure: Structure, sample_time: hoid_model::SampleTime) -> OrderRanges {
     let mut ranges = OrderRanges::from(structure.operator_orders(1));

@@ -1,7 +1,7 @@
-//! How far a fit is, reported to the caller that waits on the thread that fits.
+//! Progress of a fit, reported to the caller that waits on the thread of the fit.
 //!
-//! A fit of forms or orders, one after the other, lasts seconds on many or long records. It reports
-//! before each which one of how many it is; without anyone who watches that costs nothing.
+//! A fit of forms or orders, one after the other, takes seconds for many or long records. It reports its progress
+//! before each of them; without a watcher this costs nothing.
 
 use std::{
     cell::RefCell,
@@ -11,14 +11,14 @@ use std::{
     },
 };
 
-/// Current activity.
+/// One step of the progress.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Step {
-    /// The counted items, in the plural.
+    /// Name of the counted items, in the plural.
     pub what: &'static str,
-    /// How many are done.
+    /// Number of finished items.
     pub done: usize,
-    /// Of how many.
+    /// Total number.
     pub total: usize,
 }
 
@@ -28,9 +28,9 @@ thread_local! {
     static WATCHER: RefCell<Option<Watcher>> = const { RefCell::new(None) };
 }
 
-/// Does the work and informs the watcher each of its steps on this thread.
+/// Does the work and reports each of its steps on this thread to the watcher.
 pub fn watched<T>(watcher: impl Fn(Step) + Send + Sync + 'static, work: impl FnOnce() -> T) -> T {
-    /// Puts back who watched before, whatever happens.
+    /// Restores the previous watcher in any case.
     struct Before(Option<Watcher>);
     impl Drop for Before {
         fn drop(&mut self) {
@@ -41,16 +41,16 @@ pub fn watched<T>(watcher: impl Fn(Step) + Send + Sync + 'static, work: impl FnO
     work()
 }
 
-/// Reports that so many are done.
+/// Reports the number of finished items.
 pub(crate) fn step(what: &'static str, done: usize, total: usize) {
-    // Taken out of the cell first: the watcher may fit something itself.
+    // Taken out of the cell first: the watcher may itself run a fit.
     let watcher = WATCHER.with_borrow(Clone::clone);
     if let Some(watcher) = watcher {
         watcher(Step { what, done, total });
     }
 }
 
-/// Counts what is done on many threads for callers that watches this one: each call is one more of
+/// Counts items that are finished on many threads, for a caller that watches this one: each call reports one more of
 /// `total`.
 pub fn counter(what: &'static str, total: usize) -> impl Fn() + Send + Sync {
     let watcher = WATCHER.with_borrow(Clone::clone);

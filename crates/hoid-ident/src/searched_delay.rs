@@ -1,22 +1,22 @@
 //! Contribution of a searched delay to the error bars of a fit.
 //!
-//! Where nk is searched it is estimated from the data as theta is, and theta moves with it. The
-//! residual has a slope along the delay too: with `x = (D/C) w = sum_j b_j psi_bj` the response of the
-//! model, `d(t) = -d eps/d tau = (x(t-1) - x(t+1))/(2 Ts)`, the central difference of a signal that is
-//! known one sample ahead. With `G = psi' psi` the estimate of theta for another delay moves along
+//! A searched nk is estimated from the data like theta, and theta depends on it. The residual also has a derivative
+//! with respect to the delay: with `x = (D/C) w = sum_j b_j psi_bj` the response of the model,
+//! `d(t) = -d eps/d tau = (x(t-1) - x(t+1))/(2 Ts)`, the central difference of a signal that is known one sample ahead.
+//! With `G = psi' psi` the estimate of theta for another delay changes along
 //!
 //! `s = d theta/d tau = -G^-1 psi' d`
 //!
-//! and what `d` has next to psi reports the delay: `var tau = sigma^2/(d'd - d' psi G^-1 psi' d) + Ts^2/12` (the corner
-//! of the inverse of the information of theta and tau together: L. Ljung, *System Identification*, 1999, section 9.4;
-//! the second part is that nk is a whole number: W. F. Sheppard, *Proc. London Math. Soc.* 29 (1898) 353-380). It is no
-//! more than that of all delays that were searched being equally likely. The covariance of theta becomes
-//! `P + s s' var tau`, and what depends on theta by the gradient g and on the delay by h has the variance
+//! and the component of `d` orthogonal to psi determines the delay:
+//! `var tau = sigma^2/(d'd - d' psi G^-1 psi' d) + Ts^2/12` (the corner of the inverse of the information of theta and
+//! tau together: L. Ljung, *System Identification*, 1999, section 9.4; the second term because nk is an integer: W. F.
+//! Sheppard, *Proc. London Math. Soc.* 29 (1898) 353-380). It is at most the variance for equally likely delays over
+//! the searched range. The covariance of theta becomes `P + s s' var tau`, and a quantity with the gradient g with
+//! respect to theta and h with respect to the delay has the variance
 //!
 //! `g' P g + (g' s + h)^2 var tau`.
 //!
-//! The two parts of `g' s + h` work against each other in the frequency response: a longer delay goes
-//! with faster muscles.
+//! The two terms of `g' s + h` partly cancel in the frequency response: a longer delay is combined with faster muscles.
 
 use hoid_model::Record;
 use nalgebra::{DMatrix, DVector};
@@ -29,8 +29,9 @@ use crate::{
 };
 
 impl Fit {
-    /// The same fit with the delay counted as estimated over a range of `delays` values of nk. Models that do not
-    /// correspond to any operator are left as they are: with many coefficients of B a shift of one sample renames them.
+    /// Returns the same fit with the delay treated as estimated over a range of `delays` values of nk. Models that do
+    /// not correspond to any operator are unchanged: with many coefficients of B a shift of one sample only renames
+    /// them.
     pub(crate) fn with_searched_delay(self, records: &[Record], delays: usize) -> Self {
         match self.delay_from(records, delays) {
             None => self,
@@ -74,7 +75,7 @@ impl Fit {
             }
         }
         let a = gram.cholesky()?.solve(&along);
-        // What the range of delays reports without the data.
+        // The variance over the range of delays without data.
         let most = (delays as f64 * ts).powi(2) / 12.0;
         let known = own - along.dot(&a);
         let from_data = if known > 0.0 {
@@ -91,8 +92,8 @@ impl Fit {
         finite.then_some(SearchedDelay { variance_s2, slope })
     }
 
-    /// Columns of psi in the record of a criterion, and d after them: the residual's slope along the delay, as if that
-    /// were the last element of theta.
+    /// Returns the columns of psi in the record of a criterion, followed by d: the derivative of the residual with
+    /// respect to the delay, as if that were the last element of theta.
     pub(crate) fn jacobian_with_delay(&self, criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Vec<f64>> {
         let mut psi = criterion.jacobian(self.model.theta(), 0, workspace);
         let of_b = &psi[criterion.orders.na..];
@@ -101,7 +102,7 @@ impl Fit {
     }
 }
 
-/// `-d eps/d tau` from the columns of psi for the coefficients of B.
+/// Computes `-d eps/d tau` from the columns of psi for the coefficients of B.
 fn along_the_delay(b: &[f64], of_b: &[Vec<f64>], sample_time_s: f64) -> Vec<f64> {
     let n = of_b.first().map_or(0, Vec::len);
     let x = |t: usize| -> f64 { b.iter().zip(of_b).map(|(b, column)| b * column[t]).sum() };

@@ -51,29 +51,29 @@ use crate::{
     optimize::{Minimum, Objective, minimise},
 };
 
-/// Coefficients of A and of each B in the model of high order.
+/// Number of coefficients of A and of each B in the model of high order.
 const HIGH_ORDER: usize = 12;
 /// Relative part of its diagonal that is added to the normal matrix of the model of high order.
 const RIDGE: f64 = 1e-8;
 /// Order of the autoregression that gives the innovations for the start of C.
 const LONG: usize = 24;
 
-/// A model with several inputs, and how it is estimated.
+/// A model with several inputs, with the options of its estimation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeveralInputs {
-    /// The structure; one with an input.
+    /// The structure, which must have an input.
     pub structure: Structure,
-    /// Coefficients of A.
+    /// Number of coefficients of A.
     pub na: usize,
-    /// Coefficients of C.
+    /// Number of coefficients of C.
     pub nc: usize,
-    /// Coefficients of D.
+    /// Number of coefficients of D.
     pub nd: usize,
-    /// Name and orders of each input. The first is the input of the records, the others are channels of them.
+    /// Name and orders of each input. The first is the input of the records, the others are channels.
     pub inputs: Vec<(String, InputOrders)>,
     /// Initial states: estimated (the default) or zero.
     pub initial_state: InitialState,
-    /// Whether each record has a constant of u that is estimated as its initial states are. Default true.
+    /// True if each record has a constant of u, estimated like its initial states. Default true.
     pub level: bool,
     /// Limits of the search.
     pub search: SearchOptions,
@@ -82,7 +82,7 @@ pub struct SeveralInputs {
 /// The result of [`SeveralInputs::fit`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeveralInputsFit {
-    /// What was fitted.
+    /// The fitted model.
     pub model: SeveralInputs,
     theta: Vec<f64>,
     covariance: Option<Vec<f64>>,
@@ -101,7 +101,7 @@ pub struct SeveralInputsFit {
 }
 
 impl SeveralInputs {
-    /// A structure without orders and inputs.
+    /// Creates a structure without orders and inputs.
     pub fn new(structure: Structure) -> Self {
         Self {
             structure,
@@ -123,7 +123,7 @@ impl SeveralInputs {
         })
     }
 
-    /// The orders of A, C, D, and of the first input.
+    /// Returns the orders of A, C, D, and of the first input.
     fn orders(&self) -> Orders {
         let first = self
             .inputs
@@ -142,7 +142,7 @@ impl SeveralInputs {
     /// Checks structure, orders and inputs against each other.
     ///
     /// # Errors
-    /// [`IdentError`] that names what is wrong.
+    /// [`IdentError`] with the problem.
     pub fn check(&self) -> Result<(), IdentError> {
         if !self.structure.has_input() {
             return Self::refuse("the structure", self.structure, "one with inputs");
@@ -171,7 +171,7 @@ impl SeveralInputs {
     /// Fits one model to all records.
     ///
     /// # Errors
-    /// [`IdentError`] for orders, inputs or records without meaning, and where there is no minimum.
+    /// [`IdentError`] for invalid orders, inputs or records, and if there is no minimum.
     pub fn fit(&self, records: &[Record]) -> Result<SeveralInputsFit, IdentError> {
         self.check()?;
         let sample_time = common_sample_time(records)?;
@@ -231,7 +231,7 @@ impl SeveralInputs {
         })
     }
 
-    /// The normal equations with one step of refinement by the residuals themselves.
+    /// Returns the normal equations with one step of refinement from the residuals themselves.
     fn refined(
         &self,
         criterion: &Criterion<'_>,
@@ -256,8 +256,8 @@ impl SeveralInputs {
         self.na + self.nc + self.nd + of_inputs
     }
 
-    /// Names of the coefficients in the order of theta: those of A, B, C, D, F with the first input, then B and F of each
-    /// further one.
+    /// Returns the names of the coefficients in the order of theta: those of A, B, C, D, F with the first input, then B
+    /// and F of each further one.
     fn names(&self) -> Vec<String> {
         let own = self.orders().parameter_names();
         let first = self.inputs.first().map_or("", |(name, _)| name.as_str());
@@ -274,7 +274,7 @@ impl SeveralInputs {
         all
     }
 
-    /// The criterion of these orders, with those of each input by `of`.
+    /// Returns the criterion of these orders, with those of each input by `of`.
     fn criterion<'a>(
         &self,
         records: &'a [Record],
@@ -320,8 +320,9 @@ impl SeveralInputs {
         }
     }
 
-    /// Values of theta to start from: B and F of each input by its response in an ARX model of high order, which is nearly
-    /// without noise, and by what the responses to the other inputs leave of u; then the noise.
+    /// Returns starting values of theta: B and F of each input from its response in an ARX model of high order, which
+    /// is nearly without noise, and from the part of u that the responses to the other inputs do not explain; then the
+    /// noise.
     fn starts(&self, records: &[Record], workspace: &mut Workspace) -> Result<Vec<Vec<f64>>, IdentError> {
         if self.na > 0 && self.inputs.iter().all(|(_, o)| o.nf == 0) {
             return Ok(vec![self.start_with_a(records, workspace)?]);
@@ -384,7 +385,7 @@ impl SeveralInputs {
         Ok(starts)
     }
 
-    /// The response to each input in each record, by an ARX model of high order.
+    /// Returns the response to each input in each record, from an ARX model of high order.
     fn responses(&self, records: &[Record], workspace: &mut Workspace) -> Result<Vec<Vec<Vec<f64>>>, IdentError> {
         let shortest = records.iter().map(Record::len).min().unwrap_or(0);
         let high = HIGH_ORDER.min(shortest / (4 * (self.inputs.len() + 1))).max(2);
@@ -426,7 +427,7 @@ impl SeveralInputs {
         Ok(all)
     }
 
-    /// The same where A takes the place of the F: an ARX model, and no noise model yet.
+    /// The same if A takes the place of the F: an ARX model, without a noise model yet.
     fn start_with_a(&self, records: &[Record], workspace: &mut Workspace) -> Result<Vec<f64>, IdentError> {
         let arx = Orders {
             nc: 0,
@@ -447,7 +448,7 @@ impl SeveralInputs {
         Ok(self.theta_of(a, &systems, &vec![0.0; self.nc + self.nd]))
     }
 
-    /// C and D for what the inputs leave of u.
+    /// Estimates C and D for the part of u that the inputs do not explain.
     fn noise(&self, left: &[Vec<f64>]) -> Vec<f64> {
         let none = || vec![0.0; self.nc + self.nd];
         if self.nc == 0 {
@@ -487,7 +488,7 @@ fn channel<'r>(record: &'r Record, name: &str) -> Result<&'r [f64], IdentError> 
     })
 }
 
-/// The first input is that of the record, whatever it is called.
+/// Returns the input of the record for the first name, otherwise the channel.
 fn channel_or_input<'r>(record: &'r Record, name: &str, first: &str) -> Result<&'r [f64], IdentError> {
     if name == first {
         Ok(record.input())
@@ -497,7 +498,7 @@ fn channel_or_input<'r>(record: &'r Record, name: &str, first: &str) -> Result<&
 }
 
 impl SeveralInputsFit {
-    /// Names and estimates of all coefficients: `a1`, `b0[e]`, `f1[r]`, `c1`, `d1`.
+    /// Returns names and estimates of all coefficients: `a1`, `b0[e]`, `f1[r]`, `c1`, `d1`.
     pub fn parameters(&self) -> Vec<(String, Estimate)> {
         let p = self.theta.len();
         let estimate = |i: usize| match &self.covariance {
@@ -518,7 +519,7 @@ impl SeveralInputsFit {
         self.residuals as f64 * self.loss.ln() + 2.0 * self.theta.len() as f64
     }
 
-    /// Places of A, and of B and F of an input, in theta.
+    /// Returns the places of A, and of B and F of an input, in theta.
     fn places(&self, input: usize) -> [std::ops::Range<usize>; 3] {
         let o = self.model.orders();
         let a = 0..o.na;
@@ -534,7 +535,7 @@ impl SeveralInputsFit {
         [a, from..from + own.nb, from + own.nb..from + own.nb + own.nf]
     }
 
-    /// Gain and phase from an input, by its number, to u at frequencies in rad/s: `B_i/(A F_i) q^-nk_i`.
+    /// Returns gain and phase from an input, given by its number, to u at frequencies in rad/s: `B_i/(A F_i) q^-nk_i`.
     pub fn frequency_response(&self, input: usize, omega_rad_s: &[f64]) -> Vec<ResponsePoint> {
         let [a, b, f] = self.places(input);
         let nk = self.model.inputs[input].1.nk;
@@ -548,7 +549,7 @@ impl SeveralInputsFit {
             let (of_a, of_f) = (one + sum(&a), one + sum(&f));
             let of_b: Complex64 = b.clone().map(|i| self.theta[i] * back(nk + i - b.start)).sum();
             let response = of_b / (of_a * of_f);
-            // Of ln H.
+            // Derivatives of ln H.
             let mut slopes = vec![Complex64::new(0.0, 0.0); p];
             a.clone().for_each(|i| slopes[i] = -back(i - a.start + 1) / of_a);
             f.clone().for_each(|i| slopes[i] = -back(i - f.start + 1) / of_f);

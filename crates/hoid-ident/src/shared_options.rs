@@ -1,4 +1,4 @@
-//! Options that several batch estimators have: each is declared here once, over the field of the estimator.
+//! Options that several batch estimators share: each is declared here once, over the field of the estimator.
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
@@ -14,10 +14,10 @@ use crate::{
 
 /// Words for a form.
 static FORMS: [&str; Form::NAMES.len() + 1] = or_auto(Form::NAMES);
-/// Words for a rule of initial states.
+/// Words for a rule for initial states.
 static INITIAL_STATES: [&str; InitialState::NAMES.len() + 1] = or_auto(InitialState::NAMES);
 
-/// `auto`, and these names.
+/// Returns `auto` followed by these names.
 const fn or_auto<const N: usize, const M: usize>(names: [&'static str; N]) -> [&'static str; M] {
     let (mut all, mut i) = (["auto"; M], 0);
     while i < N {
@@ -30,7 +30,7 @@ const fn or_auto<const N: usize, const M: usize>(names: [&'static str; N]) -> [&
 /// A field of an estimator.
 pub type Field<E, T> = fn(&mut E) -> &mut T;
 
-/// Noise model of an operator, which determines the estimator.
+/// Returns the option for the noise model of an operator, which determines the estimator.
 pub fn noise<E: 'static>(set: impl Fn(&mut E, &Setting, &str) -> Result<(), IdentError> + 'static) -> BatchOption<E> {
     let help =
         "Noise of the operator: ar an autoregression, arma with a moving average (nc), remnant the remnant of order m";
@@ -38,14 +38,14 @@ pub fn noise<E: 'static>(set: impl Fn(&mut E, &Setting, &str) -> Result<(), Iden
     BatchOption::new(setting, set)
 }
 
-/// Whether an operator changes: which of the operators is fitted follows from it.
+/// Returns the option for a change of the operator, which determines the estimator.
 pub fn change<E: 'static>() -> BatchOption<E> {
     let help = "Whether the operator changes: not at all, or its gains once, by a sigmoid";
     let setting = Setting::new("change", Kind::Choice(&["none", "sigmoid"]), help).default("none");
     BatchOption::new(setting, |_, _, _| Ok(()))
 }
 
-/// The form of an operator; of the text `auto` none.
+/// Returns the option for the form of an operator; the text `auto` means `None`.
 pub fn form<E: 'static>(set: fn(&mut E, Option<Form>)) -> BatchOption<E> {
     let help = "Form of the operator; auto: estimates are averaged over the forms that the data leave, of one that changes lead";
     let setting = Setting::new("form", Kind::Choice(&FORMS), help).default("auto");
@@ -59,7 +59,7 @@ pub fn form<E: 'static>(set: fn(&mut E, Option<Form>)) -> BatchOption<E> {
     })
 }
 
-/// Whether an operator has its neuromuscular part.
+/// Returns the option for the neuromuscular part of an operator.
 pub fn neuromuscular<E: 'static>(field: Field<E, bool>) -> BatchOption<E> {
     let help = "With neuromuscular dynamics omega_nm, zeta_nm";
     let setting = Setting::new("neuromuscular", Kind::Choice(&["yes", "no"]), help).default("yes");
@@ -78,7 +78,7 @@ pub fn yes_words(yes: bool) -> String {
     if yes { "yes" } else { "no" }.to_owned()
 }
 
-/// Prior knowledge of the person before the data.
+/// Returns the option for prior knowledge of the person.
 pub fn prior<E: 'static>(default: &str, field: Field<E, OperatorPrior>) -> BatchOption<E> {
     let help = "What is known of the person before the data: population (published people), none, a JSON result of another fit, or \
                 NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_L, T_I, as omega_nm=10.5:0.3 (the spread is relative)";
@@ -89,13 +89,13 @@ pub fn prior<E: 'static>(default: &str, field: Field<E, OperatorPrior>) -> Batch
     })
 }
 
-/// Orders, each given or searched.
+/// Returns the setting for an order, given or searched.
 pub fn orders(default: &str) -> Setting {
     let help = "Orders, each a number or a range to search, as nb=2,nc=0,nd=1..4,nf=2; nb counts b0, b1, ...";
     Setting::new("orders", Kind::Named(&Kind::Counts), help).default(default)
 }
 
-/// The delay in s.
+/// Returns the setting for the delay in s.
 pub fn delay(default: &str) -> Setting {
     let help = "Delay tau_e, or the shortest and the longest; of polynomials in place of nk = tau_e/Ts + 1";
     Setting::new("delay", Kind::NumberOrSpan, help)
@@ -104,7 +104,7 @@ pub fn delay(default: &str) -> Setting {
         .bounds(Bounds::NonNegative)
 }
 
-/// The shortest and the longest delay of an operator, and how they are printed.
+/// Returns the option for the shortest and the longest delay of an operator, with its printed form.
 pub fn delay_range<E: 'static>(
     default: (f64, f64),
     field: Field<E, (f64, f64)>,
@@ -124,7 +124,7 @@ pub fn range_words(range: &RangeInclusive<usize>) -> String {
     range.text().unwrap_or_default()
 }
 
-/// Parameters that each record has for itself.
+/// Returns the option for parameters that are individual to each record.
 pub fn individual<E: 'static>(
     set: impl Fn(&mut E, &Setting, Vec<String>) -> Result<(), IdentError> + 'static,
 ) -> BatchOption<E> {
@@ -133,7 +133,7 @@ pub fn individual<E: 'static>(
     BatchOption::new(setting, move |how, option, text| set(how, option, option.read(text)?))
 }
 
-/// The rule for initial states; of the text `auto` none.
+/// Returns the option for the initial states; the text `auto` means `None`.
 pub fn initial_state<E: 'static>(
     set: impl Fn(&mut E, &Setting, Option<InitialState>) -> Result<(), IdentError> + 'static,
 ) -> BatchOption<E> {
@@ -148,7 +148,7 @@ pub fn initial_state<E: 'static>(
     })
 }
 
-/// Parameters fixed at a value or constrained to bounds; each parameter once.
+/// Returns the options for parameters fixed at a value or constrained to bounds; each parameter once.
 pub fn constraints<E: 'static>(
     field: Field<E, BTreeMap<String, Constraint>>,
     of: Constraints<E>,
@@ -175,7 +175,7 @@ pub fn constraints<E: 'static>(
     ]
 }
 
-/// The constraints of an estimator.
+/// Access to the constraints of an estimator.
 pub type Constraints<E> = fn(&E) -> &BTreeMap<String, Constraint>;
 
 fn constrain(
@@ -208,7 +208,7 @@ fn bound_words(all: &BTreeMap<String, Constraint>) -> Option<String> {
     (!words.is_empty()).then(|| words.join(", "))
 }
 
-/// `name=value, name=value`; of nothing none.
+/// Returns `name=value, name=value`; `None` if there are none.
 pub fn named_words<'a>(values: impl IntoIterator<Item = (&'a String, f64)>) -> Option<String> {
     let all: Vec<String> = values
         .into_iter()
@@ -217,14 +217,14 @@ pub fn named_words<'a>(values: impl IntoIterator<Item = (&'a String, f64)>) -> O
     (!all.is_empty()).then(|| all.join(", "))
 }
 
-/// How the search of an estimator steps and ends, by its own defaults.
+/// Returns the options for the method and the termination of the search, with the defaults of the estimator.
 pub fn search<E: 'static>(default: SearchOptions, field: Field<E, SearchOptions>) -> Vec<BatchOption<E>> {
     let mut all = vec![search_method(field)];
     all.extend(search_ends(default, field));
     all
 }
 
-/// How a search steps.
+/// Returns the option for the method of the search.
 pub fn search_method<E: 'static>(field: Field<E, SearchOptions>) -> BatchOption<E> {
     let help = "How the search steps: gn Gauss-Newton, lm Levenberg-Marquardt, grad steepest descent";
     let setting =
@@ -235,7 +235,7 @@ pub fn search_method<E: 'static>(field: Field<E, SearchOptions>) -> BatchOption<
     })
 }
 
-/// How a search ends.
+/// Returns the options for the termination of the search.
 pub fn search_ends<E: 'static>(default: SearchOptions, field: Field<E, SearchOptions>) -> [BatchOption<E>; 2] {
     let steps = Setting::new(
         "max_iterations",

@@ -1,4 +1,4 @@
-//! A fit in print.
+//! Printed summary of a fit.
 
 use std::fmt;
 
@@ -10,8 +10,8 @@ use crate::{Fit, Reason};
 const DIGITS: i32 = 5;
 
 impl fmt::Display for Fit {
-    /// Structure and orders, a row for each parameter with its standard error, loss and criteria,
-    /// how the search ended.
+    /// Formats structure and orders, a row for each parameter with its standard error, loss and criteria, and the
+    /// termination of the search.
     ///
     /// ```
     /// # use hoid_ident::Estimator;

@@ -1,7 +1,7 @@
-//! The controlled element: what the person steers.
+//! The controlled element.
 //!
-//! `H_CE(s) = K_c / (s (s + omega_b))` (eq. 4), an integrator below the break frequency omega_b
-//! turns into a double one above.
+//! `H_CE(s) = K_c / (s (s + omega_b))` (eq. 4): an integrator below the break frequency omega_b, and a double
+//! integrator above.
 
 use crate::{ModelError, transfer_function::ContinuousTransferFunction};
 
@@ -10,16 +10,15 @@ use crate::{ModelError, transfer_function::ContinuousTransferFunction};
 pub struct ControlledElement {
     /// Control gain K_c, deg/deg.
     pub k_c: f64,
-    /// Break frequency omega_b, rad/s; 0 is the double integrator, a negative one is an unstable
-    /// element.
+    /// Break frequency omega_b, rad/s; 0 is the double integrator, a negative value is an unstable element.
     pub omega_b_rad_s: f64,
 }
 
 impl ControlledElement {
-    /// H_CE(s).
+    /// Returns H_CE(s).
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] when a parameter is not finite.
+    /// [`ModelError::OutOfRange`] if a parameter is not finite.
     pub fn transfer_function(&self) -> Result<ContinuousTransferFunction, ModelError> {
         self.check()?;
         ContinuousTransferFunction::new(&[self.k_c], &[1.0, self.omega_b_rad_s, 0.0])

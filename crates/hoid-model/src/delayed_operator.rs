@@ -6,9 +6,9 @@
 //! hold, by the formulas of [`hoid_core::held_operator`]. delta = 0 gives b2 = 0 and the hold of
 //! [`crate::operator`].
 //!
-//! The model is linear in K_e and K_e_dot. Its response is continuous in tau and has a kink where
-//! tau is a whole number of samples: the step response starts with the slope `omega^2 K_e_dot`.
-//! Derivatives there are those for growing tau.
+//! The model is linear in K_e and K_e_dot. Its response is continuous in tau and has a kink where tau is an integer
+//! number of samples: the step response starts with the slope `omega^2 K_e_dot`. Derivatives there are those for
+//! increasing tau.
 
 use hoid_core::held_operator::held_operator_delayed;
 
@@ -18,22 +18,22 @@ use crate::{ModelError, OperatorParameters, SampleTime};
 /// zero-order hold.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DelayedOperator {
-    /// Delay of b0 in samples: the whole samples of tau_e and the one of the hold.
+    /// Delay of b0 in samples: the whole samples of tau_e plus the one of the hold.
     pub nk: usize,
-    /// `[b0, b1, b2]`; b2 = 0 for a whole number of samples.
+    /// `[b0, b1, b2]`; b2 = 0 for an integer number of samples.
     pub b: [f64; 3],
     /// `[f1, f2]`.
     pub f: [f64; 2],
 }
 
-/// Names of the parameters, in the order of every array here; units deg/deg, s, rad/s, 1, s.
+/// Names of the parameters, in the order of every array in this module; units deg/deg, s, rad/s, 1, s.
 pub const DELAYED_NAMES: [&str; 5] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 
-/// Distance from a whole number of samples, in samples, that counts as rounding: `0.29 / 0.01` is
+/// Distance from an integer number of samples, in samples, that counts as rounding: `0.29 / 0.01` is
 /// `28.999999999999996`.
 const ROUNDING: f64 = 1e-12;
 
-/// `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]` of operator parameters.
+/// Returns `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]` of operator parameters.
 pub fn delayed_parameters(operator: &OperatorParameters) -> [f64; 5] {
     [
         operator.k_e,
@@ -44,23 +44,21 @@ pub fn delayed_parameters(operator: &OperatorParameters) -> [f64; 5] {
     ]
 }
 
-/// The exact discrete model of `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]` for an error held over
-/// each sample.
+/// Returns the exact discrete model of `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]` for an error held over each sample.
 ///
 /// # Errors
-/// [`ModelError::OutOfRange`] when a parameter is not finite, omega_nm is not positive, the delay
-/// is negative, or a coefficient is not finite (a pole so fast that its exponential overflows).
+/// [`ModelError::OutOfRange`] if a parameter is not finite, omega_nm is not positive, the delay is negative, or a
+/// coefficient is not finite (a pole so fast that its exponential overflows).
 pub fn delayed_operator(parameters: [f64; 5], sample_time: SampleTime) -> Result<DelayedOperator, ModelError> {
     let whole_samples = whole_samples(parameters[4], sample_time)?;
     delayed_operator_within(whole_samples, parameters, sample_time)
 }
 
-/// As [`delayed_operator`], written with a given whole number l of samples in the delay: for
-/// `l Ts <= tau <= (l + 1) Ts`, both ends included, so that inside each sample the model and its
-/// derivatives are smooth functions up to the borders.
+/// As [`delayed_operator`], for a given number l of whole samples in the delay: for `l Ts <= tau <= (l + 1) Ts`, both
+/// ends included, so that within each sample the model and its derivatives are smooth functions up to the borders.
 ///
 /// # Errors
-/// As [`delayed_operator`]; also when tau_e does not lie within that sample.
+/// As [`delayed_operator`]; also if tau_e is not within that sample.
 pub fn delayed_operator_within(
     whole_samples: usize,
     parameters: [f64; 5],
@@ -69,8 +67,8 @@ pub fn delayed_operator_within(
     Ok(delayed_operator_and_jacobian_within(whole_samples, parameters, sample_time)?.0)
 }
 
-/// Jacobian of `[b0, b1, b2, f1, f2]` (rows) with respect to
-/// `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]` (columns), nk held.
+/// Returns the Jacobian of `[b0, b1, b2, f1, f2]` (rows) with respect to `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]`
+/// (columns) for a fixed nk.
 ///
 /// # Errors
 /// As [`delayed_operator`].
@@ -79,7 +77,7 @@ pub fn delayed_operator_jacobian(parameters: [f64; 5], sample_time: SampleTime) 
     delayed_operator_jacobian_within(whole_samples, parameters, sample_time)
 }
 
-/// The Jacobian of [`delayed_operator_within`].
+/// Returns the Jacobian of [`delayed_operator_within`].
 ///
 /// # Errors
 /// As [`delayed_operator_within`].
@@ -91,7 +89,7 @@ pub fn delayed_operator_jacobian_within(
     Ok(delayed_operator_and_jacobian_within(whole_samples, parameters, sample_time)?.1)
 }
 
-/// [`delayed_operator_within`] and [`delayed_operator_jacobian_within`] in one evaluation.
+/// Evaluates [`delayed_operator_within`] and [`delayed_operator_jacobian_within`] together.
 ///
 /// # Errors
 /// As [`delayed_operator_within`].
@@ -122,10 +120,10 @@ pub fn delayed_operator_and_jacobian_within(
     Ok((operator, jacobian))
 }
 
-/// Whole samples l of a delay: the largest number with `l Ts <= tau`, up to rounding.
+/// Returns the whole samples l of a delay: the largest integer with `l Ts <= tau`, up to rounding.
 ///
 /// # Errors
-/// [`ModelError::OutOfRange`] when the delay is negative, not finite or longer than 1e9 samples.
+/// [`ModelError::OutOfRange`] if the delay is negative, not finite or longer than 1e9 samples.
 pub fn whole_samples(tau_e_s: f64, sample_time: SampleTime) -> Result<usize, ModelError> {
     let samples = tau_e_s / sample_time.s();
     if !(0.0..=1e9).contains(&samples) {
@@ -140,7 +138,7 @@ pub fn whole_samples(tau_e_s: f64, sample_time: SampleTime) -> Result<usize, Mod
     Ok(if near { nearest } else { samples.floor() } as usize)
 }
 
-/// The fraction delta in s after the whole samples, of parameters that have a meaning.
+/// Returns the fraction delta in s after the whole samples, for valid parameters.
 fn fraction(whole_samples: usize, parameters: [f64; 5], sample_time: SampleTime) -> Result<f64, ModelError> {
     let quantities = [
         "error gain K_e",

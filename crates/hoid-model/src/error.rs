@@ -1,25 +1,25 @@
-//! Everything that can be wrong with what a model is made of.
+//! Errors of models, records and conversions.
 
 use thiserror::Error;
 
 use crate::UnknownName;
 
-/// Why a model, a record or a conversion could not be made. Each message names the quantity, what
-/// was found, the expected value, and where it helps, the remedy.
+/// The reason why a model, a record or a conversion is not possible. Each message contains the quantity, the value
+/// found, the expected value and, if useful, the remedy.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ModelError {
-    /// A number outside the range that has a meaning.
+    /// A number outside its admissible range.
     #[error("{quantity} is {found}, expected {expected}")]
     OutOfRange {
-        /// Definition of the number, with its symbol and unit.
+        /// Name of the quantity, with its symbol and unit.
         quantity: &'static str,
         /// The value given.
         found: f64,
         /// The valid range.
         expected: &'static str,
     },
-    /// A name without a meaning.
+    /// An unknown name.
     #[error(transparent)]
     UnknownName(#[from] UnknownName),
     /// A sample that is NaN or infinite.
@@ -46,7 +46,7 @@ pub enum ModelError {
         /// The channel that it is compared with.
         reference: String,
     },
-    /// Parameters of an operator that do not make one.
+    /// Invalid parameters of an operator.
     #[error("{reason}")]
     Operator {
         /// The problem.
@@ -72,27 +72,27 @@ pub enum ModelError {
         /// The names that exist.
         available: String,
     },
-    /// A sampling rate that cannot be lowered so.
+    /// A sampling rate that cannot be lowered in this way.
     #[error("decimation of {label}: found {found}, expected {expected}")]
     Decimation {
         /// Label of the record.
         label: String,
-        /// The findings.
+        /// The value found.
         found: String,
         /// The expected value.
         expected: String,
     },
-    /// Two records that do not follow each other.
+    /// Two records that cannot be joined.
     #[error("{label} cannot be joined: found {found}, expected {expected}")]
     Joined {
         /// Label of the second record.
         label: String,
         /// The differences.
         found: String,
-        /// Requirements.
+        /// The requirements.
         expected: &'static str,
     },
-    /// A time span that holds no samples of the record.
+    /// A time span without samples of the record.
     #[error("the span {from_s} to {to_s} s holds no samples: the record covers {start_s} to {end_s} s")]
     EmptySpan {
         /// Start of the span, s.
@@ -112,7 +112,7 @@ pub enum ModelError {
         /// The problem, and the remedy.
         expected: String,
     },
-    /// A transfer function that the method cannot treat.
+    /// A transfer function for which the method is not valid.
     #[error("transfer function {found}: {expected}")]
     TransferFunction {
         /// The transfer function as given.
@@ -135,15 +135,15 @@ pub enum ModelError {
         /// The limit for an infinite gain.
         largest: f64,
     },
-    /// A closed loop that is not stable has no stationary variance and no margins.
+    /// An unstable closed loop, which has no stationary variance and no margins.
     #[error("the closed loop of operator and controlled element is not stable: {reason}")]
     UnstableLoop {
-        /// How it was found.
+        /// The evidence.
         reason: String,
     },
 }
 
-/// Why a discrete model has no counterpart with physical meaning in continuous time.
+/// The reason why a discrete model has no counterpart with physical meaning in continuous time.
 #[derive(Debug, Clone, PartialEq, Error, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum NotConvertible {
@@ -153,7 +153,7 @@ pub enum NotConvertible {
         /// Name of the form.
         form: String,
     },
-    /// Polynomials of no operator of the family.
+    /// Polynomials that correspond to no operator of the family.
     #[error("the polynomials are those of no operator of the family: {reason}")]
     NotOfTheFamily {
         /// The problem.
@@ -178,7 +178,7 @@ pub enum NotConvertible {
     /// `b0 + b1 = 0`: no response to a constant error, so that T_L = K_e_dot / K_e does not exist.
     #[error("the gain K_e is zero (b0 + b1 = 0), so that the lead time T_L = K_e_dot / K_e does not exist")]
     ZeroGain,
-    /// Polynomials of other orders than those of the operator model.
+    /// Polynomials with other orders than those of the operator model.
     #[error("the operator model has two coefficients in B and two poles, found nb = {nb} and {poles} poles")]
     OtherOrders {
         /// Coefficients in B.
@@ -194,7 +194,7 @@ pub enum NotConvertible {
         /// Coefficients of F.
         nf: usize,
     },
-    /// A zero-order hold makes at least one sample of delay.
+    /// A model without delay: a zero-order hold has at least one sample of delay.
     #[error("nk = 0: a zero-order hold delays by at least one sample, so that tau_e = (nk - 1) Ts would be negative")]
     NoDelay,
     /// A parameter that is not a finite number.
@@ -205,7 +205,7 @@ pub enum NotConvertible {
         /// Its value.
         value: f64,
     },
-    /// The noise polynomial does not look like a remnant filter.
+    /// A noise polynomial that does not correspond to a remnant filter.
     #[error("the noise model has no remnant filter of order {order}: {reason}")]
     NotARemnantFilter {
         /// Order m.

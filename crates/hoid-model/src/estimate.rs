@@ -4,8 +4,7 @@ use std::fmt;
 
 use crate::numbers::{DASH, with_uncertainty};
 
-/// A number with its standard error; `None` if the data give none (a delay that was fixed, a
-/// singular information matrix).
+/// A number with its standard error; `None` if the data determine none (a fixed delay, a singular information matrix).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Estimate {
     /// The estimate.
@@ -15,8 +14,8 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// An estimate with the variance of its error; a variance that is not finite or negative means
-    /// no standard error.
+    /// Returns an estimate with the variance of its error; a variance that is not finite or negative gives no standard
+    /// error.
     pub fn with_variance(value: f64, variance: f64) -> Self {
         Self {
             value,
@@ -24,7 +23,7 @@ impl Estimate {
         }
     }
 
-    /// A number without uncertainty of its own.
+    /// Returns a number without uncertainty.
     pub fn fixed(value: f64) -> Self {
         Self {
             value,
@@ -34,8 +33,7 @@ impl Estimate {
 }
 
 impl fmt::Display for Estimate {
-    /// `value ± standard error` with two digits of the error, the value alone where there is no
-    /// error.
+    /// Formats `value ± standard error` with two digits of the error, or only the value if there is no error.
     ///
     /// ```
     /// # use hoid_model::uncertainty::Estimate;

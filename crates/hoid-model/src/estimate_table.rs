@@ -1,7 +1,7 @@
-//! Estimates as a table of plain text: name, value ± standard error, unit.
+//! Estimates as a plain text table: name, value ± standard error, unit.
 //!
-//! The standard error decides the digits ([`crate::numbers`]); values are aligned at their right,
-//! standard errors at their left.
+//! The standard error determines the digits ([`crate::numbers`]); values are right-aligned, standard errors are
+//! left-aligned.
 
 use std::fmt;
 
@@ -10,8 +10,7 @@ use crate::{
     numbers::{DASH, with_uncertainty},
 };
 
-/// Writes a row for each name, estimate and unit (empty for none), each with a line feed in front
-/// except for the first.
+/// Writes a row for each name, estimate and unit (empty for none), each preceded by a line feed except for the first.
 ///
 /// # Errors
 /// The errors of the formatter.

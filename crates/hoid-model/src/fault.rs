@@ -1,37 +1,37 @@
-//! A fault of recorded data: kind, place, size, and the actions taken about it.
+//! A fault of recorded data: kind, place, size, and action.
 //!
-//! A [`Fault`] is a place in one channel of a record (or in all of them) where the numbers cannot be what the channel
-//! did. How faults are found is reported where that is done; this text describes one, so that a file, a fit and a
-//! stream report it alike. [`fault_findings`] turns faults into what a [`Verdict`](crate::Verdict) is made of: a fault
-//! that was repaired is worth a note, one that is still in the data a doubt.
+//! A [`Fault`] is a place in one channel of a record (or in all of them) where the values cannot be those of the
+//! channel. The detection is documented in its own modules; this module describes a fault, so that a file, a fit and a
+//! stream report it in the same way. [`fault_findings`] converts faults to the findings of a
+//! [`Verdict`](crate::Verdict): a repaired fault gives a note, one that is still in the data a doubt.
 
 use std::fmt;
 
 use crate::Finding;
 
-/// The problem.
+/// Kind of a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum FaultKind {
-    /// One or few samples that those before and after them rule out.
+    /// One or few samples that are inconsistent with their neighbours.
     Spike,
     /// A constant that the channel jumps to and back from.
     Dropout,
     /// A channel that holds its value while the others continue.
     Frozen,
-    /// A stretch in which nothing happens in any channel.
+    /// A stretch in which all channels are constant.
     Idle,
-    /// A value that left one end of its range and came in at the other.
+    /// A value that left one end of its range and re-entered at the other.
     Wrap,
-    /// A level that changes from one sample to the next, and stays.
+    /// A level that changes from one sample to the next, permanently.
     Step,
     /// A stretch in other units, larger by orders of magnitude.
     Scale,
-    /// A time that cannot be in seconds.
+    /// A time that is not in seconds.
     TimeUnit,
-    /// Input and output that look exchanged.
+    /// Input and output that are probably exchanged.
     Exchanged,
-    /// An output that answers with the wrong sign.
+    /// An output that responds with the wrong sign.
     Sign,
 }
 
@@ -48,12 +48,12 @@ crate::named_choice!(FaultKind, "kind of fault", 10, {
     Sign => "sign",
 });
 
-/// How faults are handled.
+/// Handling of faults.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum FaultHandling {
-    /// They are reported, and the data stay as they are.
+    /// They are reported, and the data remain unchanged.
     Report,
-    /// Short ones are bridged, the record is cut at long ones.
+    /// Short ones are bridged, and the record is cut at long ones.
     #[default]
     Bridge,
     /// The record is cut at all of them.
@@ -69,12 +69,12 @@ crate::named_choice!(FaultHandling, "handling of faults", 4, {
     Keep => "keep",
 });
 
-/// Processing applied to a fault.
+/// Action for a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum FaultAction {
-    /// It is reported; the data are as they were.
+    /// It is reported; the data are unchanged.
     Reported,
-    /// Its samples were replaced by what those around them report; a wrap was unwrapped.
+    /// Its samples were interpolated from their neighbours; a wrap was unwrapped.
     Bridged,
     /// The record ends before it and another starts after it.
     Cut,
@@ -89,7 +89,7 @@ crate::named_choice!(FaultAction, "action on a fault", 3, {
 /// One fault.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Fault {
-    /// Its definition.
+    /// Its kind.
     pub kind: FaultKind,
     /// The channel; empty for all channels and for the time.
     pub channel: String,
@@ -97,20 +97,20 @@ pub struct Fault {
     pub from_s: f64,
     /// Time of the sample after its last, s.
     pub to_s: f64,
-    /// How many samples.
+    /// Number of samples.
     pub samples: usize,
-    /// How large, in the unit of the channel: by how much a spike or a step is off, the modulus of a
-    /// wrap, the length of what is frozen or idle in s, the factor of a scale, the sample time in s.
+    /// Its size in the unit of the channel: the deviation of a spike or a step, the modulus of a wrap, the duration in
+    /// s of a frozen or idle stretch, the factor of a scale, the sample time in s.
     pub size: f64,
-    /// The size in robust standard deviations of what the statistic of this kind leaves of good data; none if the kind
-    /// has no such statistic.
+    /// The size in robust standard deviations of the statistic of this kind for good data; `None` if the kind has no
+    /// such statistic.
     pub deviations: Option<f64>,
-    /// The actions taken.
+    /// The action.
     pub action: FaultAction,
 }
 
 impl Fault {
-    /// Remedy by hand.
+    /// Returns the manual remedy.
     pub fn remedy(&self) -> &'static str {
         match self.kind {
             FaultKind::TimeUnit => "t must be in s: divide a t in ms by 1000, or give the sampling frequency with --fs",
@@ -123,7 +123,7 @@ impl Fault {
 }
 
 impl fmt::Display for Fault {
-    /// A sentence without a full stop: "spike in e at 41.2 s, off by 30 (210 robust standard
+    /// Formats the fault as a sentence without a full stop: "spike in e at 41.2 s, off by 30 (210 robust standard
     /// deviations): bridged".
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let time = |s: f64| short(s, 6);
@@ -165,7 +165,7 @@ impl fmt::Display for Fault {
     }
 }
 
-/// A number of a given number of significant digits, without trailing zeros.
+/// Formats a number with a given number of significant digits, without trailing zeros.
 fn short(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
@@ -183,13 +183,13 @@ fn short(value: f64, digits: usize) -> String {
     }
 }
 
-/// Faults of one kind that are reported one by one; more are counted.
+/// Number of faults of one kind that are reported individually; more are only counted.
 const TOLD: usize = 3;
-/// Share of the samples that may be repaired before the rest is doubted.
+/// Share of the samples that may be repaired without a doubt about the rest.
 pub const MOST_MENDED: f64 = 0.2;
 
-/// Information of faults about a result: a note where all of a kind were repaired, a doubt where
-/// they were not, and a doubt where more than [`MOST_MENDED`] of the samples are gone.
+/// Returns the findings about faults: a note if all faults of a kind were repaired, a doubt if they were not, and a
+/// doubt if more than [`MOST_MENDED`] of the samples are lost.
 pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
     let mut all = Vec::new();
     for kind in FaultKind::ALL {
@@ -208,7 +208,7 @@ pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
             let words = words.join("; ");
             all.push(match (left, kind) {
                 (false, _) => Finding::note("faults", words),
-                // In wrong seconds no parameter means what its name states.
+                // With a wrong unit of time, no parameter is valid.
                 (true, FaultKind::TimeUnit) => Finding::undetermined("faults", words),
                 (true, _) => Finding::doubt("faults", words),
             });
@@ -219,7 +219,7 @@ pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
         .filter(|fault| fault.action != FaultAction::Reported && fault.kind != FaultKind::Wrap)
         .map(|fault| fault.samples)
         .sum();
-    // What is idle is not a part of the run.
+    // Idle stretches are not a part of the run.
     let idle: usize = (faults.iter())
         .filter(|fault| fault.action == FaultAction::Cut && fault.kind == FaultKind::Idle)
         .map(|fault| fault.samples)

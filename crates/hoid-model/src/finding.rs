@@ -1,24 +1,23 @@
-//! Findings that make a result doubtful, as text and in a form for programs.
+//! Findings about a result, as text and in a form for programs.
 //!
-//! A [`Finding`] is one observation about a result: how a search ended, a parameter at its bound,
-//! methods that do not agree, a quantity that the data do not determine. It has a kind (a name that
-//! does not change), a severity and a sentence for the user. The [`Verdict`] follows from the
-//! findings alone: the gravest severity decides.
+//! A [`Finding`] is one observation about a result: the termination of a search, a parameter at its bound, methods that
+//! do not agree, a quantity that the data do not determine. It has a kind (a name that does not change), a severity and
+//! a sentence for the user. The [`Verdict`] depends only on the findings: the highest severity is decisive.
 //!
-//! | gravest severity | level |
+//! | highest severity | level |
 //! |---|---|
 //! | none, or [`Severity::Note`] | trustworthy |
 //! | [`Severity::Doubt`] | doubtful |
 //! | [`Severity::Undetermined`] | not determined |
 //!
-//! Code that judges something new adds findings; no other code decides what they amount to.
+//! Code with a new test adds findings; no other code decides about the verdict.
 
 use std::fmt;
 
-/// How much a finding weighs.
+/// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum Severity {
-    /// Worth knowing; the result remains valid.
+    /// Information; the result remains valid.
     Note,
     /// The result may be wrong.
     Doubt,
@@ -35,28 +34,28 @@ crate::named_choice!(Severity, "severity", 3, {
 /// One observation about a result.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Finding {
-    /// The observation, as a name for programs: `not-converged`, `delay-at-bound`.
+    /// Kind of the observation, as a name for programs: `not-converged`, `delay-at-bound`.
     #[serde(deserialize_with = "crate::interned::name")]
     pub kind: crate::interned::Name,
-    /// How much it weighs.
+    /// Its severity.
     pub severity: Severity,
-    /// The observation in a sentence, with its numbers, without a full stop.
+    /// The observation as a sentence, with its numbers, without a full stop.
     #[serde(rename = "words")]
     pub message: String,
 }
 
 impl Finding {
-    /// A finding that the result is in spite of.
+    /// Returns a finding that does not affect the validity of the result.
     pub fn note(kind: &'static str, message: impl Into<String>) -> Self {
         Self::new(kind, Severity::Note, message)
     }
 
-    /// A finding that makes the result doubtful.
+    /// Returns a finding that makes the result doubtful.
     pub fn doubt(kind: &'static str, message: impl Into<String>) -> Self {
         Self::new(kind, Severity::Doubt, message)
     }
 
-    /// A finding that leaves the question open.
+    /// Returns a finding that the data do not determine the result.
     pub fn undetermined(kind: &'static str, message: impl Into<String>) -> Self {
         Self::new(kind, Severity::Undetermined, message)
     }
@@ -73,9 +72,9 @@ impl Finding {
 /// Reliability of a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum VerdictLevel {
-    /// Nothing speaks against it.
+    /// There is no evidence against it.
     Trustworthy,
-    /// Something does; the reasons report what.
+    /// There is evidence against it, stated by the reasons.
     Doubtful,
     /// The data do not determine it.
     NotDetermined,
@@ -87,16 +86,16 @@ crate::named_choice!(VerdictLevel, "verdict", 3, {
     NotDetermined => "not determined",
 });
 
-/// The level, and the findings it rests on, the gravest first.
+/// The level with its findings, the highest severity first.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Verdict {
-    /// Verdict on the result.
+    /// Level of the verdict.
     pub level: VerdictLevel,
     findings: Vec<Finding>,
 }
 
 impl Verdict {
-    /// The verdict of these findings; those of one severity keep their order.
+    /// Returns the verdict of these findings; findings of equal severity keep their order.
     pub fn of(mut findings: Vec<Finding>) -> Self {
         findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
         let level = match findings.first().map(|finding| finding.severity) {
@@ -107,22 +106,22 @@ impl Verdict {
         Self { level, findings }
     }
 
-    /// The verdict of these findings and more.
+    /// Returns the verdict of these findings followed by others.
     pub fn append(self, more: impl IntoIterator<Item = Finding>) -> Self {
         Self::of(self.findings.into_iter().chain(more).collect())
     }
 
-    /// The verdict of these findings behind others, from which they may follow.
+    /// Returns the verdict of these findings preceded by others, from which they may follow.
     pub fn prepend(self, first: impl IntoIterator<Item = Finding>) -> Self {
         Self::of(first.into_iter().chain(self.findings).collect())
     }
 
-    /// All findings, the gravest first.
+    /// Returns all findings, the highest severity first.
     pub fn findings(&self) -> &[Finding] {
         &self.findings
     }
 
-    /// Findings against the result: the findings that are more than notes.
+    /// Returns the findings against the result: all except notes.
     pub fn reasons(&self) -> impl Iterator<Item = &str> {
         let weighs = |finding: &&Finding| finding.severity > Severity::Note;
         self.findings
@@ -131,7 +130,7 @@ impl Verdict {
             .map(|finding| finding.message.as_str())
     }
 
-    /// Additional notes.
+    /// Returns the notes.
     pub fn notes(&self) -> impl Iterator<Item = &str> {
         let light = |finding: &&Finding| finding.severity == Severity::Note;
         self.findings
@@ -142,7 +141,7 @@ impl Verdict {
 }
 
 impl fmt::Display for Verdict {
-    /// The level on the first line, then a line for each finding.
+    /// Formats the level on the first line, followed by a line for each finding.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "Verdict: {}", self.level)?;
         for reason in self.reasons() {

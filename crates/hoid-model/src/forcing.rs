@@ -2,13 +2,12 @@
 //!
 //! `f_t(t) = sum A_k sin(omega_k t + phi_k)` (eq. 42), with t = 0 at the start of the measurement.
 //!
-//! The sinusoids also run before t = 0, so that the run-in settles on them. The reference
-//! frequencies are whole multiples of `2 pi / 81.92 s`: each sinusoid fits the measurement a whole
-//! number of times and does not leak into others.
+//! The sinusoids also run before t = 0, so that the loop is settled after the run-in. The reference frequencies are
+//! integer multiples of `2 pi / 81.92 s`: the measurement contains an integer number of periods of each sinusoid, and
+//! there is no leakage.
 //!
-//! [`ForcingFunction::samples`] uses `sin(a + b) = sin a cos b + cos a sin b` with b from a table
-//! over one block: two products a sinusoid and sample instead of a sine, and no error that grows
-//! along the record as in a recurrence.
+//! [`ForcingFunction::samples`] uses `sin(a + b) = sin a cos b + cos a sin b` with b from a table over one block: two
+//! products per sinusoid and sample instead of a sine, and no error that grows along the record as in a recurrence.
 
 use std::f64::consts::TAU;
 
@@ -31,7 +30,7 @@ pub struct ForcingFunction {
     sinusoids: Vec<Sinusoid>,
 }
 
-/// Duration in s that the reference frequencies fit a whole number of times.
+/// Duration in s that contains an integer number of periods of each reference frequency.
 pub const REFERENCE_PERIOD_S: f64 = 81.92;
 
 /// Table 1: n_t, A_k in deg, phi_k in rad.
@@ -48,16 +47,15 @@ const TABLE_1: [(f64, f64, f64); 10] = [
     (229.0, 0.025, 0.604),
 ];
 
-/// Samples of one block of the table of angles: near the square root of a record, where both kinds
-/// of sine are fewest.
+/// Samples of one block of the table of angles: near the square root of the length of a record, where the total number
+/// of sines is smallest.
 const BLOCK: usize = 96;
 
 impl ForcingFunction {
-    /// A forcing function of any number of sinusoids; none is a target at rest.
+    /// Returns a forcing function of any number of sinusoids; without any it is a target at rest.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] when a number is not finite, a frequency is not positive, or two
-    /// frequencies are the same.
+    /// [`ModelError::OutOfRange`] if a number is not finite, a frequency is not positive, or two frequencies are equal.
     pub fn new(sinusoids: Vec<Sinusoid>) -> Result<Self, ModelError> {
         let refuse = |quantity, found, expected| {
             Err(ModelError::OutOfRange {
@@ -88,7 +86,7 @@ impl ForcingFunction {
         Ok(Self { sinusoids })
     }
 
-    /// The ten sinusoids of Table 1, `omega_k = n_t 2 pi / 81.92` exactly.
+    /// Returns the ten sinusoids of Table 1, `omega_k = n_t 2 pi / 81.92` exactly.
     pub fn reference() -> Self {
         let term = |(multiple, amplitude_deg, phase_rad)| Sinusoid {
             amplitude_deg,
@@ -100,12 +98,12 @@ impl ForcingFunction {
         }
     }
 
-    /// The terms.
+    /// Returns the terms.
     pub fn sinusoids(&self) -> &[Sinusoid] {
         &self.sinusoids
     }
 
-    /// Amplitudes and frequencies, as the remnant gain needs them.
+    /// Returns amplitudes and frequencies, as needed for the remnant gain.
     pub fn lines(&self) -> Vec<SpectralLine> {
         let line = |s: &Sinusoid| SpectralLine {
             amplitude: s.amplitude_deg,
@@ -114,14 +112,14 @@ impl ForcingFunction {
         self.sinusoids.iter().map(line).collect()
     }
 
-    /// f_t(t) in deg.
+    /// Returns f_t(t) in deg.
     pub fn value(&self, t_s: f64) -> f64 {
         let term = |s: &Sinusoid| s.amplitude_deg * (s.omega_rad_s * t_s + s.phase_rad).sin();
         self.sinusoids.iter().map(term).sum()
     }
 
-    /// f_t in deg at `start_s + k Ts`, k from 0 to `n - 1`: [`ForcingFunction::value`] to rounding,
-    /// without its sines.
+    /// Returns f_t in deg at `start_s + k Ts`, k from 0 to `n - 1`: equal to [`ForcingFunction::value`] up to rounding,
+    /// but faster.
     pub fn samples(&self, start_s: f64, sample_time: SampleTime, n: usize) -> Vec<f64> {
         let mut values = vec![0.0; n];
         for s in &self.sinusoids {

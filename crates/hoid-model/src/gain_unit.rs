@@ -1,18 +1,18 @@
 //! Units of an operator's gains.
 //!
-//! A gain is a ratio of the output u to the input e, so that its unit is that of u by that of e. It
-//! is reported only where both channels show theirs; a recording without units has gains without
-//! units. An operator `K (1 + T_L s) / (1 + T_I s)` has the gain `K` in u/e, the gain of the rate
-//! of the error `K_e_dot = K T_L` in u s/e, and the ratio `K / T_I` in u/(e s).
+//! A gain is a ratio of the output u to the input e, so that its unit is the ratio of their units. It is reported only
+//! if the units of both channels are declared; a recording without units has gains without units. An operator
+//! `K (1 + T_L s) / (1 + T_I s)` has the gain `K` in u/e, the gain of the error rate `K_e_dot = K T_L` in u s/e, and
+//! the ratio `K / T_I` in u/(e s).
 
 use crate::Record;
 
-/// The units of the channels from which a gain goes, and to which.
+/// Units of the two channels of a gain, input and output.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct GainUnit(Option<(String, String)>);
 
 impl GainUnit {
-    /// The units of a record: none if one of the two is not declared.
+    /// Returns the units of a record; none if one of the two is not declared.
     pub fn of(record: &Record) -> Self {
         let units = record
             .input_channel()
@@ -21,8 +21,8 @@ impl GainUnit {
         Self(declared.map(|(e, u)| (e.to_owned(), u.to_owned())))
     }
 
-    /// Unit of a parameter, of its name and of the unit `own` that it has next to that of the gain
-    /// ("s" of K_e_dot, "1/s" of K/T_I, "deg/deg" or "" of K). What is not a gain keeps its own.
+    /// Returns the unit of a parameter from its name and the unit `own` that it has in addition to that of the gain
+    /// ("s" of K_e_dot, "1/s" of K/T_I, "deg/deg" or "" of K). The unit of a parameter that is not a gain is unchanged.
     ///
     /// ```
     /// # use hoid_model::{Channel, GainUnit, Record, SampleTime};
@@ -41,7 +41,7 @@ impl GainUnit {
         }
         match (&self.0, own) {
             (None, _) => String::new(),
-            // For like units a ratio has none, and time is left.
+            // For equal units only that of time is left.
             (Some((e, u)), "s" | "1/s") if e == u => own.to_owned(),
             (Some((e, u)), "s") => format!("{u} s/{e}"),
             (Some((e, u)), "1/s") => format!("{u}/({e} s)"),
@@ -50,8 +50,7 @@ impl GainUnit {
     }
 }
 
-/// Whether a parameter scales with u/e. The gain of the remnant K_n does not: it is a ratio of u to
-/// white noise.
+/// True if a parameter is proportional to u/e. The gain of the remnant K_n is not: it is a ratio of u to white noise.
 fn is_gain(parameter: &str) -> bool {
     let name = parameter.trim_end_matches(|c: char| c.is_ascii_digit());
     matches!(name, "K" | "K_e" | "K_e_dot" | "K_over_T_I" | "K_I")

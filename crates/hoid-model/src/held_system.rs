@@ -1,27 +1,27 @@
 //! The exact zero-order hold of any rational transfer function, as a state space.
 //!
-//! `x' = A x + B v(t - delta)`, `y = C x` in controllable canonical form, with an input v that is
-//! held over each sample and comes a fraction `0 <= delta < Ts` of a sample late:
+//! `x' = A x + B v(t - delta)`, `y = C x` in controllable canonical form, with an input v that is held over each sample
+//! and delayed by a fraction `0 <= delta < Ts` of a sample:
 //!
 //! `x(k+1) = Phi x(k) + Gamma_0 v(k) + Gamma_1 v(k-1)`,
 //! `Phi = e^{A Ts}`, `Gamma_0 = Gamma(Ts - delta)`, `Gamma_1 = e^{A (Ts - delta)} Gamma(delta)`,
 //! `Gamma(h) = int_0^h e^{A s} ds B`
 //!
-//! (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, 1997, section 3.2). Exponential
-//! and integral are those of `[A B; 0 0] h` (C. F. Van Loan, IEEE Trans. Automatic Control 23 (1978)
-//! 395-404). Time counts in samples inside, so that the entries are of moderate size. Poles may lie
-//! anywhere: at the origin, twice, or to the right of it.
+//! (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, 1997, section 3.2). Exponential and integral are
+//! those of `[A B; 0 0] h` (C. F. Van Loan, IEEE Trans. Automatic Control 23 (1978) 395-404). Internally, time is in
+//! samples, so that the entries are of moderate size. Poles may be anywhere: at the origin, multiple, or in the right
+//! half plane.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use crate::{ModelError, SampleTime};
 
-/// A held system; its state is that of `1/den`, the numerator is in the output.
+/// A held system; its state is that of `1/den`, and the numerator is in the output row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldSystem {
     order: usize,
-    /// By rows.
+    /// The matrix by rows.
     transition: Vec<f64>,
     /// Gamma_0.
     now: Vec<f64>,
@@ -33,12 +33,12 @@ pub struct HeldSystem {
 }
 
 impl HeldSystem {
-    /// `num(s)/den(s)` by descending powers of s, den monic, num of no higher degree; `late` is
+    /// Creates the system `num(s)/den(s)` by descending powers of s, den monic, num of no higher degree; `late` is
     /// delta/Ts.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] when `late` is not in `[0, 1)` or an exponential overflows;
-    /// [`ModelError::TransferFunction`] when num has a higher degree or den is not monic.
+    /// [`ModelError::OutOfRange`] if `late` is not in `[0, 1)` or an exponential overflows;
+    /// [`ModelError::TransferFunction`] if num has a higher degree or den is not monic.
     pub fn new(num: &[f64], den: &[f64], late: f64, sample_time: SampleTime) -> Result<Self, ModelError> {
         if !(0.0..1.0).contains(&late) {
             return Err(ModelError::OutOfRange {
@@ -99,33 +99,34 @@ impl HeldSystem {
         self.order
     }
 
-    /// The transition of the state over one sample, by rows.
+    /// Returns the transition matrix of the state over one sample, by rows.
     pub fn transition(&self) -> &[f64] {
         &self.transition
     }
 
-    /// Contribution of the input v(k) to the state; all of it where the input is not late.
+    /// Returns the contribution of the input v(k) to the state; without a delay this is the whole contribution.
     pub fn input(&self) -> &[f64] {
         &self.now
     }
 
-    /// The row C of the output.
+    /// Returns the row C of the output.
     pub fn output_row(&self) -> &[f64] {
         &self.output
     }
 
-    /// The part of the input that passes at once.
+    /// Returns the direct feedthrough.
     pub fn direct(&self) -> f64 {
         self.direct
     }
 
-    /// `C x`, without the direct part.
+    /// Returns `C x`, without the direct feedthrough.
     #[inline]
     pub fn output(&self, state: &[f64]) -> f64 {
         self.output.iter().zip(state).map(|(c, x)| c * x).sum()
     }
 
-    /// One sample on with the inputs v(k) and v(k-1); `next` is written, as long as `state`.
+    /// Computes one step with the inputs v(k) and v(k-1); the result is written to `next`, which has the length of
+    /// `state`.
     #[inline]
     pub fn step(&self, state: &[f64], now: f64, before: f64, next: &mut [f64]) {
         let rows = self.transition.chunks_exact(self.order.max(1));
@@ -135,9 +136,9 @@ impl HeldSystem {
         }
     }
 
-    /// `C (z I - Phi)^-1 (Gamma_0 + Gamma_1/z)` at `z = e^{j omega Ts}`, without the direct part.
+    /// Returns `C (z I - Phi)^-1 (Gamma_0 + Gamma_1/z)` at `z = e^{j omega Ts}`, without the direct feedthrough.
     ///
-    /// `None` where z is a pole.
+    /// `None` if z is a pole.
     pub fn response(&self, omega_rad_s: f64) -> Option<Complex64> {
         let n = self.order;
         if n == 0 {

@@ -1,8 +1,8 @@
-//! Names that live as long as the program, of results that are read again.
+//! Names with static lifetime, for results that are read from files.
 //!
-//! Kinds of findings and units are literals of the program (`&'static str`). In a result that was written by
-//! another version may stand one that this program does not have: it is kept once, in a set that only grows.
-//! What is no such name (long, or one too many) is refused, so that no file can fill the memory.
+//! Kinds of findings and units are literals of the program (`&'static str`). A result of another version may contain a
+//! name that this program does not have: it is stored once, in a set that only grows. Names that are too long or too
+//! many are refused, so that no file can exhaust the memory.
 
 use std::{
     collections::BTreeSet,
@@ -11,17 +11,17 @@ use std::{
 
 use serde::{Deserialize, Deserializer, de::Error};
 
-/// A name, under another type than a reference: those serde would borrow from what it reads.
+/// A name, as a type alias: serde would borrow a plain reference from its input.
 pub type Name = &'static str;
 
-/// Bytes of the longest name.
+/// Longest name in bytes.
 const LONGEST: usize = 64;
-/// Names that are kept at most.
+/// Largest number of stored names.
 const MOST: usize = 10_000;
 
 static NAMES: LazyLock<Mutex<BTreeSet<Name>>> = LazyLock::new(Mutex::default);
 
-/// The name as a literal; `None` for one that is too long, or one too many.
+/// Returns the name with static lifetime; `None` if it is too long, or if there are too many.
 pub fn interned(name: &str) -> Option<Name> {
     let mut names = NAMES.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(known) = names.get(name) {
@@ -38,7 +38,7 @@ pub fn interned(name: &str) -> Option<Name> {
 /// Reads a name: `#[serde(deserialize_with = "hoid_model::interned::name")]`.
 ///
 /// # Errors
-/// The errors of the reader, and for a name that is too long.
+/// The errors of the reader, and an error for a name that is too long.
 pub fn name<'de, D: Deserializer<'de>>(reader: D) -> Result<Name, D::Error> {
     let text = String::deserialize(reader)?;
     interned(&text).ok_or_else(|| {

@@ -1,12 +1,10 @@
-//! Models of hoid and mathematics that needs no data: records, polynomial models, exact discretisation, the operator's
-//! parameters and the task in which an operator is measured.
+//! Models of hoid and the mathematics that needs no data: records, polynomial models, exact discretisation, the
+//! parameters of the operator, and the task in which an operator is measured.
 //!
-//! A person who tracks a target sees the error e and answers with the control u. The operator model
-//! is a gain, a lead, a delay and the neuromuscular dynamics,
-//! `K_e (1 + T_L s) omega^2 / (s^2 + 2 zeta omega s + omega^2) e^{-tau s}`, with a remnant of
-//! filtered white noise. What is estimated from samples is a polynomial model in `q^-1`. This crate
-//! takes one to the other, both ways and with derivatives, and describes the loop around the
-//! operator.
+//! A person who tracks a target sees the error e and responds with the control u. The operator model is a gain, a lead,
+//! a delay and the neuromuscular dynamics, `K_e (1 + T_L s) omega^2 / (s^2 + 2 zeta omega s + omega^2) e^{-tau s}`,
+//! with a remnant of filtered white noise. The model estimated from samples is a polynomial model in `q^-1`. This crate
+//! converts one to the other, in both directions and with derivatives, and describes the loop around the operator.
 //!
 //! ```
 //! use hoid_model::{
@@ -38,16 +36,16 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`record`] | [`Record`]: evenly sampled input, output and what else was measured |
+//! | [`record`] | [`Record`]: evenly sampled input, output and further channels |
 //! | [`polynomial`] | polynomials in `q^-1`, their roots and stability |
 //! | [`structure`] | [`Structure`], [`Orders`], names of the parameters |
 //! | [`polynomial_model`] | `A u = (B/F) q^-nk e + (C/D) eps`: prediction, simulation, frequency response |
 //! | [`transfer_function`] | transfer functions in s and in z |
 //! | [`discretise`] | the discretisations of Table 5.2 for general transfer functions |
-//! | [`second_order`] | exact zero-order hold of second-order systems, both ways, with derivatives |
+//! | [`second_order`] | exact zero-order hold of second-order systems, in both directions, with derivatives |
 //! | [`operator`] | [`OperatorParameters`] and their discrete model |
 //! | [`delayed_operator`](mod@delayed_operator) | the operator with a delay of any fraction of a sample |
-//! | [`operator_family`] | gain, lead and lag with their powers: the operators that people are found to be |
+//! | [`operator_family`] | gain, lead and lag with their powers: the operators found for people |
 //! | [`resampling`] | other sampling rates: the filter, and [`Decimation`] of records and streams |
 //! | [`remnant`] | the remnant filter, its discretisations and its retrieval |
 //! | [`remnant_noise`] | the noise model of the exactly held remnant as a function of T_n, with derivatives |
@@ -57,9 +55,9 @@
 //! | [`family_scenario`] | tasks of people: any operator of the family, any controlled element, a rich remnant |
 //! | [`held_system`] | exact zero-order hold of any rational transfer function |
 //! | [`margins`] | crossover frequency, phase and gain margin |
-//! | [`remnant_gain`] | the gain K_n that gives a demanded noise level |
-//! | [`GainUnit`] | the units of gains, of what the channels are measured in |
-//! | [`Finding`], [`Verdict`] | what makes a result doubtful, and its reliability |
+//! | [`remnant_gain`] | the gain K_n for a demanded noise level |
+//! | [`GainUnit`] | the units of gains, from those of the channels |
+//! | [`Finding`], [`Verdict`] | reasons to doubt a result, and its reliability |
 //! | [`named_choice!`], [`NamedChoice`] | the names that users type |
 
 mod error;

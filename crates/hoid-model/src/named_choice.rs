@@ -1,21 +1,21 @@
-//! Choices that users type by a name: on the command line, in files and in Python.
+//! Choices with names that users type: on the command line, in files and in Python.
 
 use thiserror::Error;
 
-/// A choice with a name that users type. [`named_choice!`](crate::named_choice) implements it.
+/// A choice with a name that users type. The macro [`named_choice!`](crate::named_choice) implements it.
 pub trait NamedChoice: Copy + PartialEq + Sized + 'static {
-    /// The choice, for messages: "structure".
+    /// The kind of the choice, for messages: "structure".
     const WHAT: &'static str;
     /// All choices, in the order in which they are listed.
     const CHOICES: &'static [Self];
 
-    /// The name that users type.
+    /// Returns the name that users type.
     fn choice_name(self) -> &'static str;
 
-    /// The choice of a name, whatever its case.
+    /// Returns the choice with a name, case-insensitively.
     ///
     /// # Errors
-    /// [`UnknownName`], which lists the names that exist.
+    /// [`UnknownName`], which lists the available names.
     fn of_name(name: &str) -> Result<Self, UnknownName> {
         let name = name.trim();
         let known = |choice: &&Self| choice.choice_name().eq_ignore_ascii_case(name);
@@ -34,15 +34,15 @@ pub trait NamedChoice: Copy + PartialEq + Sized + 'static {
     }
 }
 
-/// A name without a meaning.
+/// An unknown name.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("there is no {what} {found}; expected {expected}")]
 pub struct UnknownName {
-    /// The quantity to be chosen.
+    /// The kind of the choice.
     pub what: &'static str,
     /// The name given.
     pub found: String,
-    /// The names that exist.
+    /// The available names.
     pub expected: String,
 }
 

@@ -4,7 +4,7 @@
 //! significant digits and the value with the same decimals (ISO/IEC Guide 98-3, 7.2.6). Numbers
 //! without a standard error get five significant digits.
 
-/// Used where there is no number.
+/// Text for a missing number.
 pub const DASH: &str = "\u{2013}";
 
 /// Two-sided 95 % point of the normal distribution.
@@ -13,13 +13,13 @@ pub const Z_95: f64 = 1.959_963_984_540_054;
 const DIGITS_OF_ERROR: i32 = 2;
 const DIGITS_ALONE: i32 = 5;
 
-/// Part of a number below which an error is one of its last digits, and no uncertainty.
+/// Relative error below which it is rounding of the last digits, and no uncertainty.
 const LAST_DIGITS: f64 = 16.0 * f64::EPSILON;
-/// Digits of a number that is known to its last ones.
+/// Number of digits of a value that is exact to rounding.
 const ALL_DIGITS: i32 = 15;
 
-/// Value and standard error as text, both with the decimals that two significant digits of the error need; the value
-/// with all its digits where its error is in the last ones. A dash for non-finite values.
+/// Returns value and standard error as text, both with the decimals for two significant digits of the error; the value
+/// has all its digits if its error is rounding. Returns a dash for non-finite values.
 pub fn with_uncertainty(value: f64, standard_error: Option<f64>) -> (String, String) {
     if !value.is_finite() {
         return (DASH.to_owned(), DASH.to_owned());
@@ -35,8 +35,7 @@ pub fn with_uncertainty(value: f64, standard_error: Option<f64>) -> (String, Str
     }
 }
 
-/// The interval `value +- factor * standard_error` with the same decimals; a dash without a
-/// standard error.
+/// Returns the interval `value +- factor * standard_error` with the same decimals; a dash without a standard error.
 pub fn interval(value: f64, standard_error: Option<f64>, factor: f64) -> String {
     match standard_error.filter(|s| s.is_finite() && *s > 0.0 && value.is_finite()) {
         None => DASH.to_owned(),
@@ -49,12 +48,12 @@ pub fn interval(value: f64, standard_error: Option<f64>, factor: f64) -> String 
     }
 }
 
-/// A number without standard error: five significant digits. A dash for non-finite values.
+/// Returns a number without standard error: five significant digits. A dash for non-finite values.
 pub fn plain(value: f64) -> String {
     significant(value, DIGITS_ALONE)
 }
 
-/// A number with `digits` significant digits; a dash for non-finite values.
+/// Returns a number with `digits` significant digits; a dash for non-finite values.
 pub fn significant(value: f64, digits: i32) -> String {
     if !value.is_finite() {
         return DASH.to_owned();
@@ -70,7 +69,7 @@ pub fn significant(value: f64, digits: i32) -> String {
     }
 }
 
-/// A number with a fixed number of decimals; a dash for non-finite values.
+/// Returns a number with a fixed number of decimals; a dash for non-finite values.
 pub fn fixed(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
         return DASH.to_owned();
@@ -86,7 +85,7 @@ fn last_digit(value: f64, digits: i32) -> i32 {
     exponent - (digits - 1)
 }
 
-/// Zero where the number is readable with plain decimals, else its power of ten.
+/// Returns zero if the number is readable with plain decimals, otherwise its power of ten.
 fn exponent_for(size: f64) -> i32 {
     let exponent = size.log10().floor();
     if (-3.0..6.0).contains(&exponent) {

@@ -29,7 +29,7 @@ pub struct OperatorParameters {
     pub tau_e_s: f64,
 }
 
-/// The operator as the estimators see it: two coefficients in B, two poles, and a delay in samples.
+/// The discrete operator of the estimators: two coefficients in B, two poles, and a delay in samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DiscreteOperator {
     /// `(b0 + b1 q^-1) q^-1 / (1 + f1 q^-1 + f2 q^-2)`.
@@ -40,20 +40,18 @@ pub struct DiscreteOperator {
     pub sample_time: SampleTime,
 }
 
-/// Size of `1 + f1 + f2` below which a pole counts as lying at the origin of s: four digits above
-/// rounding.
+/// Value of `1 + f1 + f2` below which a pole counts as being at the origin of s: four digits above rounding.
 const AT_ORIGIN: f64 = 1e-12;
 
-/// Names of the physical parameters in the order of rows and columns of every Jacobian here.
+/// Names of the physical parameters in the order of rows and columns of every Jacobian in this module.
 pub const PHYSICAL_NAMES: [&str; 4] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm"];
 
 impl OperatorParameters {
-    /// From the parameters by name: `K_e`, `T_L` or `K_e_dot`, `omega_nm`, `zeta_nm`, and `tau_e`,
-    /// which is zero when it is not named.
+    /// Creates an operator from the parameters by name: `K_e`, `T_L` or `K_e_dot`, `omega_nm`, `zeta_nm`, and `tau_e`,
+    /// which is zero by default.
     ///
     /// # Errors
-    /// [`ModelError::Operator`] for a name that does not exist, is lacking, or is next to one that
-    /// states the same.
+    /// [`ModelError::Operator`] for a name that is unknown or missing, or for two names of the same quantity.
     pub fn of_names(pairs: &[(String, f64)]) -> Result<Self, ModelError> {
         const NAMES: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
         let wrong = |reason: String| ModelError::Operator { reason };
@@ -87,20 +85,20 @@ impl OperatorParameters {
         self.k_e * self.t_l_s
     }
 
-    /// In the order of [`PHYSICAL_NAMES`].
+    /// Returns the parameters in the order of [`PHYSICAL_NAMES`].
     fn without_delay(&self) -> [f64; 4] {
         [self.k_e, self.k_e_dot(), self.omega_nm_rad_s, self.zeta_nm]
     }
 
-    /// True when the neuromuscular poles lie in the open left half plane.
+    /// True if the neuromuscular poles are in the open left half plane.
     pub fn is_stable(&self) -> bool {
         self.zeta_nm > 0.0
     }
 
-    /// H(s) with its delay.
+    /// Returns H(s) with its delay.
     ///
     /// # Errors
-    /// [`ModelError`] when a parameter is not finite or the delay is negative.
+    /// [`ModelError`] if a parameter is not finite or the delay is negative.
     pub fn transfer_function(&self) -> Result<ContinuousTransferFunction, ModelError> {
         let w2 = self.omega_nm_rad_s * self.omega_nm_rad_s;
         ContinuousTransferFunction::new(
@@ -110,11 +108,11 @@ impl OperatorParameters {
         .with_delay(self.tau_e_s)
     }
 
-    /// The exact discrete model for an error held over each sample.
+    /// Returns the exact discrete model for an error held over each sample.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] when omega_nm is not positive, a parameter is not finite, or the
-    /// delay is not a whole number of samples.
+    /// [`ModelError::OutOfRange`] if omega_nm is not positive, a parameter is not finite, or the delay is not an
+    /// integer number of samples.
     pub fn discretise(&self, sample_time: SampleTime) -> Result<DiscreteOperator, ModelError> {
         let checks = [
             ("error gain K_e", self.k_e, true),
@@ -152,17 +150,17 @@ impl OperatorParameters {
 }
 
 impl DiscreteOperator {
-    /// The operator that has this discrete model (eq. 12).
+    /// Returns the operator with this discrete model (eq. 12).
     ///
     /// # Errors
-    /// [`NotConvertible`] with the reason; never a clipped number.
+    /// [`NotConvertible`] with the reason; numbers are never clipped.
     pub fn parameters(&self) -> Result<OperatorParameters, NotConvertible> {
         if self.nk == 0 {
             return Err(NotConvertible::NoDelay);
         }
         let c = self.held.inverse_zoh(self.sample_time)?;
-        // K_e and omega_nm hang on 1 + f1 + f2, a difference of numbers of size 1: below this
-        // nothing of it is left.
+        // K_e and omega_nm depend on 1 + f1 + f2, a difference of numbers of order 1: below this value only rounding is
+        // left.
         let at_one = (1.0 + self.held.f1 + self.held.f2).abs();
         if c.a2 <= 0.0 || at_one < AT_ORIGIN {
             return Err(NotConvertible::NoNaturalFrequency { a1: c.a1, a2: c.a2 });
@@ -182,14 +180,13 @@ impl DiscreteOperator {
     }
 }
 
-/// Jacobian of `[b0, b1, f1, f2]` (rows) with respect to `[K_e, K_e_dot, omega_nm, zeta_nm]`
-/// (columns).
+/// Returns the Jacobian of `[b0, b1, f1, f2]` (rows) with respect to `[K_e, K_e_dot, omega_nm, zeta_nm]` (columns).
 pub fn discretisation_jacobian(operator: &OperatorParameters, sample_time: SampleTime) -> [[f64; 4]; 4] {
     held_operator(operator.without_delay(), sample_time.s()).1
 }
 
-/// Jacobian of `[K_e, K_e_dot, omega_nm, zeta_nm]` (rows) with respect to `[b0, b1, f1, f2]`
-/// (columns): the inverse of [`discretisation_jacobian`]. `None` when that is singular.
+/// Returns the Jacobian of `[K_e, K_e_dot, omega_nm, zeta_nm]` (rows) with respect to `[b0, b1, f1, f2]` (columns): the
+/// inverse of [`discretisation_jacobian`]. `None` if that is singular.
 pub fn retrieval_jacobian(operator: &OperatorParameters, sample_time: SampleTime) -> Option<[[f64; 4]; 4]> {
     let forward = discretisation_jacobian(operator, sample_time);
     let matrix = Matrix4::from_fn(|i, j| forward[i][j]);

@@ -1,15 +1,14 @@
 //! Polynomials and their roots.
 //!
-//! Coefficients are stored in one order, `p[0] + p[1] x + ... + p[n] x^n` with `x = q^-1` for
-//! discrete time; transfer functions in s store descending powers and report it. Roots come from
-//! the eigenvalues of the balanced companion matrix (Edelman and Murakami, 1995) and one Newton
-//! step each.
+//! Coefficients are stored in one order, `p[0] + p[1] x + ... + p[n] x^n` with `x = q^-1` for discrete time; transfer
+//! functions in s store descending powers, as documented there. Roots are computed as the eigenvalues of the balanced
+//! companion matrix (Edelman and Murakami, 1995), with one Newton step each.
 
 use hoid_core::stability::roots_inside;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-/// Product of two polynomials (any order of powers, the same for both).
+/// Returns the product of two polynomials (any order of powers, the same for both).
 pub fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
     if a.is_empty() || b.is_empty() {
         return Vec::new();
@@ -23,13 +22,13 @@ pub fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
     p
 }
 
-/// Value at `x` of `p[0] + p[1] x + ... + p[n] x^n`.
+/// Returns the value at `x` of `p[0] + p[1] x + ... + p[n] x^n`.
 pub fn value(p: &[f64], x: Complex64) -> Complex64 {
     p.iter().rev().fold(Complex64::new(0.0, 0.0), |sum, &c| sum * x + c)
 }
 
-/// Monic polynomial `z^n + p[1] z^{n-1} + ... + p[n]` with these roots, `p[0] = 1`. Complex roots
-/// must come in conjugate pairs; the remainder of the imaginary parts by rounding is dropped.
+/// Returns the monic polynomial `z^n + p[1] z^{n-1} + ... + p[n]` with these roots, `p[0] = 1`. Complex roots must
+/// occur in conjugate pairs; the imaginary remainder due to rounding is dropped.
 pub fn from_roots(roots: &[Complex64]) -> Vec<f64> {
     let mut p = vec![Complex64::new(1.0, 0.0)];
     for root in roots {
@@ -42,12 +41,11 @@ pub fn from_roots(roots: &[Complex64]) -> Vec<f64> {
     p.into_iter().map(|c| c.re).collect()
 }
 
-/// Roots z of `p[0] z^n + p[1] z^{n-1} + ... + p[n]`, largest modulus first, conjugates next to
-/// each other.
+/// Returns the roots z of `p[0] z^n + p[1] z^{n-1} + ... + p[n]`, largest modulus first, with conjugates adjacent.
 ///
-/// For a polynomial in `q^-1` with `p[0] = 1` these are its zeros in z. Leading zero coefficients
-/// lower the degree; the zero polynomial and constants have no roots. `None` when a coefficient is
-/// not finite or the eigenvalue iteration fails.
+/// For a polynomial in `q^-1` with `p[0] = 1` these are its zeros in z. Leading zero coefficients lower the degree; the
+/// zero polynomial and constants have no roots. `None` if a coefficient is not finite or the eigenvalue iteration
+/// fails.
 pub fn roots(p: &[f64]) -> Option<Vec<Complex64>> {
     if p.iter().any(|c| !c.is_finite()) {
         return None;
@@ -103,7 +101,7 @@ fn by_companion(p: &[f64]) -> Option<Vec<Complex64>> {
     Some(polished)
 }
 
-/// One Newton step, kept only when it lowers the residual (it may not at a multiple root).
+/// One Newton step, used only if it reduces the residual (it may not at a multiple root).
 fn newton_step(p: &[f64], z: Complex64) -> Complex64 {
     let horner = |z: Complex64| {
         let mut f = Complex64::new(0.0, 0.0);
@@ -125,8 +123,8 @@ fn newton_step(p: &[f64], z: Complex64) -> Complex64 {
     if horner(better).0.norm() < f.norm() { better } else { z }
 }
 
-/// Monic `[p_1, ..., p_n]` with each root outside the unit circle replaced by the inverse of its
-/// conjugate, which leaves the shape of the spectrum as it is. `None` if the roots cannot be found.
+/// Returns the monic `[p_1, ..., p_n]` with each root outside the unit circle replaced by the inverse of its conjugate,
+/// which preserves the shape of the spectrum. `None` if the roots cannot be found.
 pub fn reflected_inside(coefficients: &[f64]) -> Option<Vec<f64>> {
     if roots_inside(coefficients, 1.0) {
         return Some(coefficients.to_vec());
@@ -135,7 +133,7 @@ pub fn reflected_inside(coefficients: &[f64]) -> Option<Vec<f64>> {
         .into_iter()
         .map(|z| match z.norm() {
             r if r > 1.0 => 1.0 / z.conj(),
-            // On the circle: pulled in a little, or the filter would never forget.
+            // A root on the circle is moved inwards slightly, or the filter would never forget.
             r if r > 0.999 => z * (0.999 / r),
             _ => z,
         })

@@ -1,4 +1,4 @@
-//! The identified object: polynomials with numbers in them.
+//! The identified model: polynomials with numerical coefficients.
 //!
 //! `A u = (B/F) q^-nk e + (C/D) eps`, with theta = `[a1.. b0.. c1.. d1.. f1..]`. The system from e
 //! to u is `B q^-nk/(A F)`, the noise filter `C/(A D)`.
@@ -21,7 +21,7 @@ pub struct PolynomialModel {
     theta: Vec<f64>,
 }
 
-/// A model as it is written, not yet checked.
+/// A model as read from a file, not yet checked.
 #[derive(serde::Deserialize)]
 struct Written {
     structure: Structure,
@@ -39,11 +39,11 @@ impl TryFrom<Written> for PolynomialModel {
 }
 
 impl PolynomialModel {
-    /// A model from its parameter vector.
+    /// Creates a model from its parameter vector.
     ///
     /// # Errors
-    /// [`ModelError::Orders`] when orders and structure contradict each other or theta has another
-    /// length; [`ModelError::TransferFunction`] when a coefficient is not finite.
+    /// [`ModelError::Orders`] if orders and structure contradict each other or theta has another length;
+    /// [`ModelError::TransferFunction`] if a coefficient is not finite.
     pub fn new(
         structure: Structure,
         orders: Orders,
@@ -120,22 +120,20 @@ impl PolynomialModel {
         self.part(self.orders.parameters() - self.orders.nf, self.orders.nf)
     }
 
-    /// True when the predictor `D A/C u`, `B D/(F C) e` is stable: all roots of C and F inside the
-    /// unit circle.
+    /// True if the predictor `D A/C u`, `B D/(F C) e` is stable: all roots of C and F are inside the unit circle.
     pub fn predictor_is_stable(&self) -> bool {
         roots_inside(self.c(), 1.0) && roots_inside(self.f(), 1.0)
     }
 
-    /// True when the system from e to u is stable: all roots of A F inside the unit circle.
+    /// True if the system from e to u is stable: all roots of A F are inside the unit circle.
     pub fn is_stable(&self) -> bool {
         roots_inside(self.a(), 1.0) && roots_inside(self.f(), 1.0)
     }
 
-    /// `B q^-nk / (A F)`.
+    /// Returns `B q^-nk / (A F)`.
     ///
     /// # Errors
-    /// None for a model that could be made; the signature follows the constructor of the transfer
-    /// function.
+    /// None for a valid model; the signature is that of the constructor of the transfer function.
     pub fn system(&self) -> Result<DiscreteTransferFunction, ModelError> {
         let mut num = vec![0.0; self.orders.nk];
         num.extend_from_slice(self.b());
@@ -143,12 +141,12 @@ impl PolynomialModel {
         DiscreteTransferFunction::new(&num, &den, self.sample_time)
     }
 
-    /// Frequency response from e to u, `B q^-nk/(A F)` at `e^{j omega Ts}`.
+    /// Returns the frequency response from e to u, `B q^-nk/(A F)` at `e^{j omega Ts}`.
     pub fn response(&self, omega_rad_s: f64) -> Complex64 {
         self.response_and_gradient(omega_rad_s).0
     }
 
-    /// Frequency response and its gradient with respect to theta: `dH/db_j = z^{-nk-j}/(A F)`,
+    /// Returns the frequency response and its gradient with respect to theta: `dH/db_j = z^{-nk-j}/(A F)`,
     /// `dH/df_j = -H z^-j/F`, `dH/da_j = -H z^-j/A`; zero for c and d.
     pub fn response_and_gradient(&self, omega_rad_s: f64) -> (Complex64, Vec<Complex64>) {
         let phase = omega_rad_s * self.sample_time.s();
@@ -169,7 +167,7 @@ impl PolynomialModel {
         (h, gradient)
     }
 
-    /// The model as a discrete operator, when it has two coefficients in B and two poles.
+    /// Returns the model as a discrete operator if it has two coefficients in B and two poles.
     ///
     /// # Errors
     /// [`NotConvertible::OtherOrders`], [`NotConvertible::PolesInBoth`].
@@ -192,14 +190,14 @@ impl PolynomialModel {
         }
     }
 
-    /// The polynomial that holds the operator's poles: A where there is no F (ARX and its kin),
-    /// else F.
+    /// Returns the polynomial with the poles of the operator: A if there is no F (ARX and related structures),
+    /// otherwise F.
     fn operator_poles(&self) -> &[f64] {
         if self.orders.nf == 0 { self.a() } else { self.f() }
     }
 
-    /// Positions of `[b0, b1, f1, f2]` (or a1, a2) in theta, for models that
-    /// [`PolynomialModel::discrete_operator`] takes.
+    /// Returns the positions of `[b0, b1, f1, f2]` (or a1, a2) in theta, for models that
+    /// [`PolynomialModel::discrete_operator`] accepts.
     pub fn operator_positions(&self) -> [usize; 4] {
         let b = self.orders.na;
         let f = if self.orders.nf == 0 {
@@ -211,7 +209,7 @@ impl PolynomialModel {
     }
 }
 
-/// The polynomial with its leading one.
+/// Returns the polynomial with its leading one.
 pub fn monic(coefficients: &[f64]) -> Vec<f64> {
     let mut p = Vec::with_capacity(coefficients.len() + 1);
     p.push(1.0);

@@ -1,25 +1,24 @@
-//! An evenly sampled record of a person at work.
+//! An evenly sampled record of a person's control activity.
 //!
-//! A [`Record`] holds the input of the person (the tracking error e), the output (the control u)
-//! and any other channel that was measured or simulated with them. It is checked when it is made:
-//! all channels have the same length and every sample is finite, so that nothing behind it has to
-//! look again.
+//! A [`Record`] contains the input of the person (the tracking error e), the output (the control u) and any other
+//! channel that was measured or simulated with them. It is checked when it is created: all channels have the same
+//! length and every sample is finite, so that later code need not check again.
 
 use crate::{ModelError, SampleTime};
 
 /// One named signal of a record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
-    /// Name, as in the column of a file.
+    /// Name, as in the header of a file.
     pub name: String,
-    /// Unit as text, empty when unknown.
+    /// Unit as text, empty if unknown.
     pub unit: String,
-    /// One value a sample.
+    /// One value per sample.
     pub values: Vec<f64>,
 }
 
 impl Channel {
-    /// A channel with a unit.
+    /// Creates a channel with a unit.
     pub fn new(name: impl Into<String>, unit: impl Into<String>, values: Vec<f64>) -> Self {
         Self {
             name: name.into(),
@@ -29,15 +28,15 @@ impl Channel {
     }
 }
 
-/// Trend to remove from input and output before a fit.
+/// Trend to be removed from input and output before a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Detrend {
-    /// Nothing: the data as they are.
+    /// No trend: the data remain unchanged.
     #[default]
     None,
     /// The mean of each channel.
     Mean,
-    /// The straight line of least squares of each channel.
+    /// The least squares line of each channel.
     Linear,
 }
 
@@ -55,14 +54,13 @@ pub struct Record {
 }
 
 impl Record {
-    /// A record of the input (tracking error) and the output (control), both with one value a
-    /// sample.
+    /// Creates a record of the input (tracking error) and the output (control), both with one value per sample.
     ///
     /// # Errors
     /// [`ModelError::EmptyRecord`], [`ModelError::LengthMismatch`], [`ModelError::NotFinite`],
     /// [`ModelError::DuplicateChannel`].
     pub fn new(sample_time: SampleTime, input: Channel, output: Channel) -> Result<Self, ModelError> {
-        // The input gives the length that the output is held to.
+        // The input determines the length.
         let record = Self::of_output(sample_time, input)?;
         record.check(&output)?;
         Ok(Self {
@@ -72,7 +70,7 @@ impl Record {
         })
     }
 
-    /// A record of an output alone, for the structures that have no input (AR, MA, ARMA).
+    /// Creates a record of an output alone, for the structures without an input (AR, MA, ARMA).
     ///
     /// # Errors
     /// [`ModelError::EmptyRecord`], [`ModelError::NotFinite`].
@@ -93,19 +91,19 @@ impl Record {
         })
     }
 
-    /// The same record with a name for messages and reports.
+    /// Returns the same record with a name for messages and reports.
     pub fn labelled(mut self, label: impl Into<String>) -> Self {
         self.label = label.into();
         self
     }
 
-    /// The same record with the time of its first sample in s.
+    /// Returns the same record with the time of its first sample in s.
     pub fn starting_at(mut self, start_s: f64) -> Self {
         self.start_s = start_s;
         self
     }
 
-    /// The same record with one more channel.
+    /// Returns the same record with an additional channel.
     ///
     /// # Errors
     /// [`ModelError::DuplicateChannel`], [`ModelError::LengthMismatch`], [`ModelError::NotFinite`].
@@ -147,14 +145,14 @@ impl Record {
         self.output.values.len()
     }
 
-    /// Never true: a record without samples cannot be made.
+    /// Always false: a record without samples cannot be created.
     pub fn is_empty(&self) -> bool {
         self.output.values.is_empty()
     }
 
     /// Time of sample `k` in s.
     pub fn time_s(&self, k: usize) -> f64 {
-        // From the index, not by summing up: no rounding error grows along the record.
+        // From the index, not by summation: no rounding error grows along the record.
         self.start_s + k as f64 * self.sample_time.s()
     }
 
@@ -163,48 +161,48 @@ impl Record {
         (0..self.len()).map(|k| self.time_s(k)).collect()
     }
 
-    /// Input e, one value a sample; empty for a record of an output alone.
+    /// Returns the input e, one value per sample; empty for a record of an output alone.
     pub fn input(&self) -> &[f64] {
         self.input.as_ref().map_or(&[], |c| &c.values)
     }
 
-    /// Output u, one value a sample.
+    /// Returns the output u, one value per sample.
     pub fn output(&self) -> &[f64] {
         &self.output.values
     }
 
-    /// The input with its name and unit; `None` for a record of an output alone.
+    /// Returns the input with its name and unit; `None` for a record of an output alone.
     pub fn input_channel(&self) -> Option<&Channel> {
         self.input.as_ref()
     }
 
-    /// The output with its name and unit.
+    /// Returns the output with its name and unit.
     pub fn output_channel(&self) -> &Channel {
         &self.output
     }
 
-    /// All channels: input, output, then the others in the order in which they were added.
+    /// Iterates over all channels: input, output, then the others in the order in which they were added.
     pub fn channels(&self) -> impl Iterator<Item = &Channel> {
         self.input.iter().chain([&self.output]).chain(&self.others)
     }
 
-    /// Its channels to keep, without a copy: input, output, others.
+    /// Returns its channels by value, without a copy: input, output, others.
     pub fn into_channels(self) -> (Option<Channel>, Channel, Vec<Channel>) {
         (self.input, self.output, self.others)
     }
 
-    /// The values of a channel by its name.
+    /// Returns the values of a channel by its name.
     pub fn channel(&self, name: &str) -> Option<&[f64]> {
         self.channels().find(|c| c.name == name).map(|c| c.values.as_slice())
     }
 
-    /// The samples with `from_s <= t < to_s`.
+    /// Returns the samples with `from_s <= t < to_s`.
     ///
     /// # Errors
-    /// [`ModelError::EmptySpan`] when there are none.
+    /// [`ModelError::EmptySpan`] if there are none.
     pub fn span(&self, from_s: f64, to_s: f64) -> Result<Self, ModelError> {
         let ts = self.sample_time.s();
-        // A bound that falls on a sample, up to rounding, takes that sample.
+        // A bound at a sample, up to rounding, includes that sample.
         let index = |time_s: f64| ((time_s - self.start_s) / ts - 1e-6).ceil().max(0.0) as usize;
         let (first, end) = (index(from_s), index(to_s).min(self.len()));
         if from_s.is_nan() || to_s.is_nan() || first >= end {
@@ -226,15 +224,14 @@ impl Record {
         })
     }
 
-    /// This record and, from its next sample on, another: what happens at the seam is known to have
-    /// happened there.
+    /// Returns this record followed, from its next sample on, by another; any event at the boundary of the two has its
+    /// known time.
     ///
-    /// Channels that only one of them has are left out; label, names and units are those of the
-    /// first.
+    /// Channels that only one of them has are left out; label, names and units are those of the first.
     ///
     /// # Errors
-    /// [`ModelError::Joined`] when their sample times differ by more than one part in a million, or
-    /// only one of them has an input.
+    /// [`ModelError::Joined`] if their sample times differ by more than one part in a million, or only one of them has
+    /// an input.
     pub fn joined(mut self, next: &Self) -> Result<Self, ModelError> {
         let (first, second) = (self.sample_time.s(), next.sample_time.s());
         let refuse = |found: String, expected: &'static str| ModelError::Joined {
@@ -270,25 +267,25 @@ impl Record {
         Ok(self)
     }
 
-    /// The same record with the mean or the line taken out of input and output; other channels stay
-    /// as they are.
+    /// Returns the same record with the mean or the line removed from input and output; other channels remain
+    /// unchanged.
     pub fn detrended(mut self, how: Detrend) -> Self {
         self.signals_mut().for_each(|values| take_out(how, values));
         self
     }
 
-    /// The same record with input and output changed, one after the other, as by a filter; other
-    /// channels stay as they are.
+    /// Returns the same record with a function, such as a filter, applied to input and output; other channels remain
+    /// unchanged.
     ///
     /// # Errors
-    /// [`ModelError::NotFinite`] where what was made of a signal is not finite.
+    /// [`ModelError::NotFinite`] if a changed value is not finite.
     pub fn map_signals(mut self, change: impl FnMut(&mut [f64])) -> Result<Self, ModelError> {
         self.signals_mut().for_each(change);
         self.input.iter().chain([&self.output]).try_for_each(check_finite)?;
         Ok(self)
     }
 
-    /// The values of input and output, in this order.
+    /// Iterates over the values of input and output, in this order.
     fn signals_mut(&mut self) -> impl Iterator<Item = &mut [f64]> {
         let channels = self.input.iter_mut().chain([&mut self.output]);
         channels.map(|channel| channel.values.as_mut_slice())
@@ -307,7 +304,7 @@ fn check_finite(channel: &Channel) -> Result<(), ModelError> {
 }
 
 impl Detrend {
-    /// The values without it.
+    /// Returns the values without the trend.
     #[must_use]
     pub fn taken_out(self, values: &[f64]) -> Vec<f64> {
         let mut left = values.to_vec();

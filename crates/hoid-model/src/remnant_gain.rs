@@ -1,4 +1,4 @@
-//! The remnant gain K_n that gives a demanded noise level P_n (appendix A of the thesis).
+//! The remnant gain K_n for a demanded noise level P_n (appendix A of the thesis).
 //!
 //! With `S = 1/(1 + H_HO H_CE)`, unit white noise drawn once a sample (its power spreads evenly
 //! over 0 to pi/Ts), and
@@ -16,11 +16,11 @@
 //! - `P_n = var(n)/var(u)`: `K_n^2 = P_n V_f / (V_n - P_n V_u)` (A.17), for P_n from 0 to below
 //!   `V_n/V_u`.
 //!
-//! All quantities are those of the continuous loop, as in the text. V_n has a closed form. V_u is
-//! integrated by the adaptive Gauss-Kronrod rule of 7 and 15 points to 1e-10 relative, from a
-//! partition at the local maxima of the integrand: the peaks near crossover and at lightly damped
-//! closed-loop modes. S is evaluated from polynomials, `D / (D + N e^{-j omega tau})`, which is 0
-//! at an integrator of the loop where `1/(1 + infinity)` would not be a number.
+//! All quantities are those of the continuous loop, as in the thesis. V_n has a closed form. V_u is integrated by the
+//! adaptive Gauss-Kronrod rule of 7 and 15 points to 1e-10 relative, from a partition at the local maxima of the
+//! integrand: the peaks near crossover and at lightly damped closed-loop modes. S is evaluated from polynomials,
+//! `D / (D + N e^{-j omega tau})`, which is 0 at an integrator of the loop where `1/(1 + infinity)` would not be a
+//! number.
 
 use num_complex::Complex64;
 
@@ -28,11 +28,11 @@ use crate::{
     ContinuousTransferFunction, ModelError, SampleTime, margins::closed_loop_is_stable, remnant::RemnantFilter,
 };
 
-/// Reference of the noise level P_n.
+/// Definition of the noise level P_n.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum NoiseDefinition {
-    /// `var(u_n)/var(u)`: the part of the operator's output that is due to the remnant, fed back
-    /// through the loop (eq. 43, A.14).
+    /// `var(u_n)/var(u)`: the part of the operator's output that is caused by the remnant, through the loop (eq. 43,
+    /// A.14).
     #[default]
     Response,
     /// `var(n)/var(u)`: the remnant itself (A.17).
@@ -41,7 +41,7 @@ pub enum NoiseDefinition {
 
 crate::named_choice!(NoiseDefinition, "noise definition", 2, { Response => "response", Remnant => "remnant" });
 
-/// One sine of the forcing function.
+/// One sinusoid of the forcing function.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpectralLine {
     /// Amplitude A_k, deg.
@@ -53,17 +53,16 @@ pub struct SpectralLine {
 /// Relative tolerance of the integral.
 const TOLERANCE: f64 = 1e-10;
 
-/// The remnant gain K_n for a noise level P_n.
+/// Computes the remnant gain K_n for a noise level P_n.
 ///
 /// `order` and `time_constant_s` are those of the remnant filter, `lines` the forcing function,
 /// `sample_time` that of the noise draws. K_n is 0 for a level of 0.
 ///
 /// # Errors
-/// [`ModelError::OutOfRange`] for a level below 0 (or not below 1 for
-/// [`NoiseDefinition::Response`]), a remnant order other than 1 to 4, a time constant or a line
-/// without meaning, or a forcing function that does not excite u; [`ModelError::UnstableLoop`] when
-/// operator and controlled element make no stable loop; [`ModelError::UnreachableNoiseLevel`] for a
-/// level that [`NoiseDefinition::Remnant`] cannot have.
+/// [`ModelError::OutOfRange`] for a level below 0 (or not below 1 for [`NoiseDefinition::Response`]), a remnant order
+/// other than 1 to 4, an invalid time constant or line, or a forcing function that does not excite u;
+/// [`ModelError::UnstableLoop`] if the loop of operator and controlled element is unstable;
+/// [`ModelError::UnreachableNoiseLevel`] for a level that [`NoiseDefinition::Remnant`] cannot reach.
 #[allow(clippy::too_many_arguments)]
 pub fn remnant_gain(
     level: f64,
@@ -106,7 +105,7 @@ pub fn remnant_gain(
             }
         }
     }
-    // Silence has no gain to find, in an unstable loop either.
+    // A level of zero needs no gain, also in an unstable loop.
     if level == 0.0 {
         return Ok(0.0);
     }
@@ -160,7 +159,7 @@ pub fn remnant_gain(
     }
 }
 
-/// Magnitudes in the closed loop, from polynomials.
+/// Magnitudes in the closed loop, computed from polynomials.
 struct Loop<'a> {
     operator: &'a ContinuousTransferFunction,
     controlled_element: &'a ContinuousTransferFunction,
@@ -179,8 +178,8 @@ impl Loop<'_> {
         (num_operator * den_element / characteristic).norm()
     }
 
-    /// Numerator and denominator of the operator without delay, denominator of the element,
-    /// characteristic function.
+    /// Returns numerator and denominator of the operator without delay, denominator of the element, and characteristic
+    /// function.
     fn at(&self, omega: f64) -> [Complex64; 4] {
         let s = Complex64::new(0.0, omega);
         let horner = |p: &[f64]| p.iter().fold(Complex64::new(0.0, 0.0), |sum, &c| sum * s + c);
@@ -231,7 +230,7 @@ const GAUSS_WEIGHTS: [f64; 4] = [
     0.417_959_183_673_469_4,
 ];
 
-/// One interval with its integral and the difference of the two rules.
+/// An interval with its integral and the difference of the two rules.
 struct Interval {
     from: f64,
     to: f64,
@@ -273,7 +272,7 @@ fn integrate(f: impl Fn(f64) -> f64, band: f64) -> f64 {
     let mut edges = vec![0.0];
     for i in 0..points {
         let peak = i > 0 && values[i] >= values[i - 1] && values[i] >= values[i + 1];
-        // Every decade an edge at least, so that no scale is overlooked.
+        // At least one edge per decade, so that no scale is overlooked.
         if peak || i % PER_DECADE == 0 {
             edges.push(at(i));
         }
@@ -282,7 +281,7 @@ fn integrate(f: impl Fn(f64) -> f64, band: f64) -> f64 {
     let mut intervals: Vec<Interval> = edges.windows(2).map(|e| Interval::new(&f, e[0], e[1])).collect();
     while intervals.len() < MOST_INTERVALS {
         let total: f64 = intervals.iter().map(|i| i.integral).sum();
-        // Each interval is allowed its share; all that exceed it are halved at once.
+        // Each interval has its share of the tolerance; all that exceed it are halved.
         let allowed = TOLERANCE * total / intervals.len() as f64;
         let (good, poor): (Vec<Interval>, Vec<Interval>) = intervals.into_iter().partition(|i| i.error <= allowed);
         intervals = good;

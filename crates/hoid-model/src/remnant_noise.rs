@@ -1,4 +1,4 @@
-//! The noise model of the exactly held remnant as a function of T_n alone, with its derivatives.
+//! The noise model of the exactly held remnant as a function of T_n, with its derivatives.
 //!
 //! `K_n/(T_n s + 1)^m`, driven by one normal deviate of unit variance a sample, has the innovation
 //! form `C/D eps` with `D = (1 - p q^-1)^m`, `p = e^{-Ts/T_n}`, C the monic spectral factor of the
@@ -28,12 +28,11 @@ pub struct RemnantNoise {
     pub log_gain_slope: f64,
 }
 
-/// The innovation form for the time constant T_n in s and the order m; m = 0 is white noise, with
-/// no coefficients and g = 1.
+/// Returns the innovation form for the time constant T_n in s and the order m; m = 0 is white noise, without
+/// coefficients and with g = 1.
 ///
 /// # Errors
-/// [`ModelError::OutOfRange`] when m is above 4, or T_n (which m = 0 does not use) not between 1e-9
-/// and 1e9 samples.
+/// [`ModelError::OutOfRange`] if m is above 4, or T_n (which m = 0 does not use) is not between 1e-9 and 1e9 samples.
 pub fn remnant_noise(time_constant_s: f64, order: usize, sample_time: SampleTime) -> Result<RemnantNoise, ModelError> {
     if order == 0 {
         return Ok(RemnantNoise {
@@ -54,14 +53,14 @@ pub fn remnant_noise(time_constant_s: f64, order: usize, sample_time: SampleTime
     let held = Factored::new(order, a);
     let a_slope = -a / time_constant_s;
     let d = denominator(order, (-a).exp());
-    // Zeros that vanish for a fast filter leave C shorter than its order.
+    // Zeros that vanish for a fast filter make C shorter than its order.
     let padded = |p: &[f64], factor: f64| -> Vec<f64> {
         (1..order).map(|i| factor * p.get(i).copied().unwrap_or(0.0)).collect()
     };
     Ok(RemnantNoise {
         c: padded(&held.c, 1.0),
         c_slope: padded(&held.c_derivative, a_slope),
-        // d_i goes with p^i, and p with e^-a.
+        // d_i is proportional to p^i, and p to e^-a.
         d_slope: (1..=order).map(|i| -(i as f64) * d[i] * a_slope).collect(),
         d: d[1..].to_vec(),
         gain: held.innovation_sd,

@@ -1,4 +1,4 @@
-//! The sample time, checked once.
+//! The validated sample time.
 
 use crate::ModelError;
 
@@ -25,10 +25,10 @@ impl SampleTime {
     /// 0.01 s, the sample time of the reference task.
     pub const HUNDREDTH: Self = Self(0.01);
 
-    /// 1/60 s, that of a typical screen and of recorded experiments.
+    /// 1/60 s, the sample time of a typical screen and of recorded experiments.
     pub const SIXTIETH: Self = Self(1.0 / 60.0);
 
-    /// A sample time in s.
+    /// Creates a sample time in s.
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] unless it is positive and finite.
@@ -44,8 +44,8 @@ impl SampleTime {
         }
     }
 
-    /// The nearest delay of b0 in samples, `nk = tau_e/Ts + 1`, for a delay tau_e in s; without end where
-    /// no number is as large.
+    /// Returns the nearest delay of b0 in samples, `nk = tau_e/Ts + 1`, for a delay tau_e in s; the largest number if
+    /// it is out of range.
     pub fn nk(self, tau_e_s: f64) -> usize {
         ((tau_e_s / self.0).round() as usize).saturating_add(1)
     }
@@ -55,23 +55,21 @@ impl SampleTime {
         self.0
     }
 
-    /// Half the sampling frequency in rad/s: `pi / Ts`.
+    /// Returns half the sampling frequency in rad/s: `pi / Ts`.
     pub fn nyquist_rad_s(self) -> f64 {
         std::f64::consts::PI / self.0
     }
 
-    /// A time in s as a whole number of samples, when it is one within `1e-6` of a sample.
+    /// Returns a time in s as an integer number of samples if it is one within `1e-6` of a sample.
     ///
-    /// The quotient is rounded, never cut off: `0.29 / 0.01` is `28.999999999999996` in floating
-    /// point and means 29.
+    /// The quotient is rounded, never truncated: `0.29 / 0.01` is `28.999999999999996` in floating point and means 29.
     pub fn whole_samples(self, time_s: f64) -> Option<usize> {
         let samples = time_s / self.0;
         let rounded = samples.round();
         ((samples - rounded).abs() <= 1e-6 && (0.0..1e15).contains(&rounded)).then_some(rounded as usize)
     }
 
-    /// True when two sample times are the same up to rounding (1e-6 relative): records with both
-    /// can be fitted together.
+    /// True if two sample times are equal up to rounding (1e-6 relative), so that their records can be fitted together.
     pub fn matches(self, other: Self) -> bool {
         (self.0 - other.0).abs() <= 1e-6 * self.0
     }

@@ -1,4 +1,4 @@
-//! Scenarios: who controls what, with which noise, and how it changes.
+//! Scenarios: operator, controlled element, remnant, and their change.
 //!
 //! The thesis's two states of adaptation (Table 2) and its six conditions (Table 4.4) are here as
 //! data:
@@ -10,11 +10,10 @@
 //! | C3, C4 | s1 to s2 at 40.96 s | 0.5, 100 1/s |
 //! | C5, C6 | s2 to s1 at 40.96 s | 0.5, 100 1/s |
 //!
-//! The gains, time constants and frequencies of operator and controlled element and the remnant
-//! gain K_n follow one sigmoid (eq. 5); the remnant time constant is constant. The delay is that of
-//! the text's conditions throughout; where it changes it goes along the same sigmoid, in steps of a
-//! sample. The remnant gain of each state gives the demanded noise level in that state (eq. 43 or
-//! A.17).
+//! The gains, time constants and frequencies of operator and controlled element and the remnant gain K_n follow one
+//! sigmoid (eq. 5); the remnant time constant is constant. The delay is constant in the conditions of the thesis; if it
+//! changes, it follows the same sigmoid, in steps of a sample. The remnant gain of each state gives the demanded noise
+//! level in that state (eq. 43 or A.17).
 
 use crate::{
     ModelError, OperatorParameters, SampleTime,
@@ -25,8 +24,7 @@ use crate::{
     schedule::Schedule,
 };
 
-/// Longest run, in samples: 11 days at 100 Hz. A slip in the exponent of a time is found before it
-/// asks for all the memory.
+/// Longest run, in samples: 11 days at 100 Hz. It reports a wrong exponent of a time before all memory is allocated.
 const MOST_SAMPLES: usize = 100_000_000;
 
 /// A state of adaptation: the operator and the controlled element.
@@ -39,7 +37,7 @@ pub struct OperatingState {
 }
 
 impl OperatingState {
-    /// State s1 of Table 2: nearly a single integrator, crossover 1.56 rad/s.
+    /// Returns state s1 of Table 2: nearly a single integrator, crossover 1.56 rad/s.
     pub fn s1() -> Self {
         Self {
             operator: OperatorParameters {
@@ -56,7 +54,7 @@ impl OperatingState {
         }
     }
 
-    /// State s2 of Table 2: nearly a double integrator, crossover 2.75 rad/s.
+    /// Returns state s2 of Table 2: nearly a double integrator, crossover 2.75 rad/s.
     pub fn s2() -> Self {
         let s1 = Self::s1();
         Self {
@@ -94,14 +92,14 @@ crate::named_choice!(Condition, "condition", 6, {
     C6 => "C6",
 });
 
-/// How strong the remnant is.
+/// Strength of the remnant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RemnantStrength {
-    /// The gain that gives this noise level in each state.
+    /// The gain is computed for this noise level in each state.
     Level {
         /// Noise level P_n.
         level: f64,
-        /// Reference of P_n.
+        /// Definition of P_n.
         definition: NoiseDefinition,
     },
     /// The gain K_n itself, before and after the change.
@@ -114,8 +112,8 @@ pub enum RemnantStrength {
 }
 
 impl RemnantStrength {
-    /// With another level, another definition of it, or both. `None` for a definition without a
-    /// level where the gain itself is given.
+    /// Returns the strength with another level, another definition of it, or both. `None` for a definition without a
+    /// level if the gain itself is given.
     pub fn changed(self, level: Option<f64>, definition: Option<NoiseDefinition>) -> Option<Self> {
         match (self, level, definition) {
             (same, None, None) => Some(same),
@@ -139,12 +137,12 @@ pub struct RemnantSetting {
     pub order: usize,
     /// Time constant T_n, s.
     pub time_constant_s: f64,
-    /// How strong it is.
+    /// Its strength.
     pub strength: RemnantStrength,
 }
 
 impl Default for RemnantSetting {
-    /// First order, T_n = 0.06 s, noise level 0.1 of the control variance.
+    /// First order, T_n = 0.06 s, noise level 0.1 of the variance of the control.
     fn default() -> Self {
         Self {
             order: 1,
@@ -157,14 +155,13 @@ impl Default for RemnantSetting {
     }
 }
 
-/// Where K_c is in the state-space form of the controlled element.
+/// Position of K_c in the state-space form of the controlled element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Realisation {
     /// In the input matrix: the output x is continuous when K_c jumps.
     #[default]
     Input,
-    /// In the output matrix, as the controllable canonical form of the thesis has it: x jumps when
-    /// K_c jumps.
+    /// In the output matrix, as in the controllable canonical form of the thesis: x jumps when K_c jumps.
     Output,
 }
 
@@ -195,7 +192,7 @@ pub struct Scenario {
     pub realisation: Realisation,
 }
 
-/// The parameters that are in force at one instant.
+/// The parameters at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrueParameters {
     /// Operator.
@@ -208,7 +205,7 @@ pub struct TrueParameters {
     pub t_n_s: f64,
 }
 
-/// A scenario that has been checked, with everything computed once that a simulation needs.
+/// A validated scenario, with the precomputed quantities of a simulation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResolvedScenario {
     scenario: Scenario,
@@ -219,7 +216,7 @@ pub struct ResolvedScenario {
 }
 
 impl Scenario {
-    /// A condition of the thesis with the default remnant.
+    /// Returns a condition of the thesis with the default remnant.
     pub fn condition(condition: Condition) -> Self {
         let (s1, s2) = (OperatingState::s1(), OperatingState::s2());
         let (initial, last, rate) = match condition {
@@ -240,7 +237,7 @@ impl Scenario {
             }),
             forcing: ForcingFunction::reference(),
             remnant: RemnantSetting::default(),
-            // 0.01 is a sample time.
+            // 0.01 s is the sample time of the thesis.
             sample_time: SampleTime::HUNDREDTH,
             measurement_s: REFERENCE_PERIOD_S,
             run_in_s: 10.0,
@@ -248,7 +245,7 @@ impl Scenario {
         }
     }
 
-    /// Remnant gain of a state: the given one, or the one that gives the demanded noise level.
+    /// Returns the remnant gain of a state: the given one, or the one for the demanded noise level.
     ///
     /// # Errors
     /// As [`remnant_gain`].
@@ -268,7 +265,7 @@ impl Scenario {
         )
     }
 
-    /// Remnant gain of a state for another order and noise level than those of the scenario.
+    /// Returns the remnant gain of a state for an order and a noise level other than those of the scenario.
     ///
     /// # Errors
     /// As [`remnant_gain`].
@@ -285,10 +282,10 @@ impl Scenario {
         scenario.remnant_gain_of(state, 0.0)
     }
 
-    /// Checks the scenario and computes what a simulation needs.
+    /// Checks the scenario and computes the quantities for a simulation.
     ///
     /// # Errors
-    /// [`ModelError`] that names the parameter.
+    /// [`ModelError`] with the parameter.
     pub fn resolve(&self) -> Result<ResolvedScenario, ModelError> {
         self.schedule.check()?;
         let samples = |quantity: &'static str, time_s: f64| {
@@ -341,33 +338,33 @@ impl Scenario {
 }
 
 impl ResolvedScenario {
-    /// The scenario as it was described.
+    /// Returns the original scenario.
     pub fn scenario(&self) -> &Scenario {
         &self.scenario
     }
 
-    /// Operator delay tau_e in samples before and after the change.
+    /// Returns the operator delay tau_e in samples before and after the change.
     pub fn delay_samples(&self) -> [usize; 2] {
         self.delay_samples
     }
 
-    /// Operator delay tau_e in samples at time `t_s`: the nearest whole number on its way.
+    /// Returns the operator delay tau_e in samples at time `t_s`, rounded to the nearest integer.
     pub fn delay_samples_at(&self, t_s: f64) -> usize {
         let [initial, last] = self.delay_samples;
         self.scenario.schedule.value(initial as f64, last as f64, t_s).round() as usize
     }
 
-    /// Samples before t = 0.
+    /// Number of samples before t = 0.
     pub fn run_in_samples(&self) -> usize {
         self.run_in_samples
     }
 
-    /// Samples of the measurement.
+    /// Number of samples of the measurement.
     pub fn measurement_samples(&self) -> usize {
         self.measurement_samples
     }
 
-    /// The parameters at time `t_s`; t = 0 is the start of the measurement.
+    /// Returns the parameters at time `t_s`; t = 0 is the start of the measurement.
     pub fn parameters_at(&self, t_s: f64) -> TrueParameters {
         let Scenario {
             initial,

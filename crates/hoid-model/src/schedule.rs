@@ -1,8 +1,8 @@
-//! How parameters change over time.
+//! Change of parameters over time.
 //!
 //! `p(t) = p_i + (p_f - p_i) / (1 + e^{-G (t - t_M)})`   (eq. 5)
 //!
-//! A person who changes again and again has a sigmoid of alternating sign every T seconds,
+//! A person with repeated changes has a sigmoid of alternating sign every T seconds,
 //! `p(t) = p_i + (p_f - p_i) sum over k of (-1)^k / (1 + e^{-G (t - t_M - k T)})`.
 
 use crate::ModelError;
@@ -20,7 +20,7 @@ pub enum Schedule {
         /// Time of the largest rate of change t_M, s from the start of the measurement.
         midpoint_s: f64,
     },
-    /// There and back again, for as long as the run lasts.
+    /// Repeated changes back and forth, for the whole run.
     Alternating {
         /// Transition rate G of each change, 1/s.
         rate_per_s: f64,
@@ -31,8 +31,7 @@ pub enum Schedule {
     },
 }
 
-/// Transitions are as good as over after a given number of their time constants 1/G: e^-40 is below
-/// half a last digit.
+/// Number of time constants 1/G after which a transition is complete: e^-40 is below half a unit in the last place.
 const OVER: f64 = 40.0;
 /// Least interval between two changes, in time constants 1/G.
 const SHORTEST: f64 = 1.0;
@@ -78,7 +77,7 @@ impl Schedule {
         Ok(())
     }
 
-    /// Time of the first change t_M in s, where there is one.
+    /// Returns the time of the first change t_M in s, if there is one.
     pub fn change_s(&self) -> Option<f64> {
         match *self {
             Self::Constant => None,
@@ -86,7 +85,7 @@ impl Schedule {
         }
     }
 
-    /// Transition rate G in 1/s, where there is a change.
+    /// Returns the transition rate G in 1/s, if there is a change.
     pub fn rate_per_s(&self) -> Option<f64> {
         match *self {
             Self::Constant => None,
@@ -94,7 +93,7 @@ impl Schedule {
         }
     }
 
-    /// The times t_M + k T of all changes up to `end_s`.
+    /// Returns the times t_M + k T of all changes up to `end_s`.
     pub fn changes_s(&self, end_s: f64) -> Vec<f64> {
         match *self {
             Self::Constant => Vec::new(),
@@ -108,14 +107,13 @@ impl Schedule {
         }
     }
 
-    /// p(t) between `initial` and `finally`. Far from t_M it is either of them to the last bit.
+    /// Returns p(t) between `initial` and `finally`. Far from t_M it equals one of them to the last bit.
     pub fn value(&self, initial: f64, finally: f64, t_s: f64) -> f64 {
         match *self {
             Self::Constant => initial,
             Self::Sigmoid { rate_per_s, midpoint_s } => {
                 let x = rate_per_s * (t_s - midpoint_s);
-                // The exponential of the nearer end: it cannot overflow, and that end is met
-                // exactly.
+                // The exponential of the nearer end: it cannot overflow, and that end is exact.
                 let far = (-x.abs()).exp();
                 let part = (finally - initial) * (far / (1.0 + far));
                 if x < 0.0 { initial + part } else { finally - part }
@@ -126,7 +124,7 @@ impl Schedule {
                 interval_s,
             } => {
                 let (since, reach) = ((t_s - midpoint_s) / interval_s, OVER / (rate_per_s * interval_s));
-                // Changes before the first of these are over: two by two they cancel.
+                // Changes before the first of these are complete: in pairs they cancel.
                 let first = 2.0 * ((since - reach).max(0.0) / 2.0).floor();
                 let last = (since + reach).ceil();
                 let (mut covered, mut k) = (0.0, first);

@@ -1,4 +1,4 @@
-//! Exact zero-order hold of second-order systems, both ways.
+//! Exact zero-order hold of second-order systems, and its inverse.
 //!
 //! The continuous system `(b0 s + b1) / (s^2 + a1 s + a2)` (eq. 12) driven by an input that is held
 //! over each sample Ts is, at the samples, `(b0 + b1 q^-1) q^-1 / (1 + f1 q^-1 + f2 q^-2)` exactly.
@@ -13,11 +13,10 @@
 //!   frequency gives `b0_d + b1_d = b1 Ts^2 chi`,
 //!   `chi = (1 + f1 + f2) / q = exp[0, z1] exp[0, z2]`.
 //!
-//! All of these are symmetric in the poles and entire in (s, q): complex, real, double poles and
-//! poles at the origin of s are the same formulas ([`hoid_core::divided_differences`]). This
-//! replaces the matrix exponential and logarithm of the extended matrix (eq. B.7); it gives the
-//! same numbers. The inverse exists when no pole in z lies on the closed negative real axis (then
-//! the logarithm is the principal one). Source: N. J. Higham, *Functions of Matrices*, 2008,
+//! All of these are symmetric in the poles and entire in (s, q): complex, real and double poles and poles at the origin
+//! of s have the same formulas ([`hoid_core::divided_differences`]). This replaces the matrix exponential and logarithm
+//! of the extended matrix (eq. B.7); the results are the same. The inverse exists if no pole in z is on the closed
+//! negative real axis (then the logarithm is the principal one). Source: N. J. Higham, *Functions of Matrices*, 2008,
 //! sections 2.4 and B.16 (divided differences); eq. B.3-B.10 of the thesis.
 
 use hoid_core::divided_differences::DividedDifferences;
@@ -51,11 +50,11 @@ pub struct HeldSecondOrder {
 }
 
 impl SecondOrder {
-    /// The exact discrete model for an input held over each sample.
+    /// Returns the exact discrete model for an input held over each sample.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] when the result is not finite (an unstable pole so fast that its
-    /// exponential overflows, or a coefficient that is not a finite number).
+    /// [`ModelError::OutOfRange`] if the result is not finite (an unstable pole so fast that its exponential overflows,
+    /// or a coefficient that is not finite).
     pub fn zoh(self, sample_time: SampleTime) -> Result<HeldSecondOrder, ModelError> {
         let ts = sample_time.s();
         let poles = DividedDifferences::at(-self.a1 * ts, self.a2 * ts * ts);
@@ -71,7 +70,7 @@ impl SecondOrder {
 }
 
 impl HeldSecondOrder {
-    /// Itself, when an exponential has not overflowed.
+    /// Returns the model itself if no exponential has overflowed.
     pub(crate) fn finite(self) -> Result<Self, ModelError> {
         for (quantity, found) in [("b0", self.b0), ("b1", self.b1), ("f1", self.f1), ("f2", self.f2)] {
             if !found.is_finite() {
@@ -85,7 +84,7 @@ impl HeldSecondOrder {
         Ok(self)
     }
 
-    /// The continuous system that has this exact discrete model.
+    /// Returns the continuous system with this exact discrete model.
     ///
     /// # Errors
     /// [`NotConvertible::NegativeRealPole`], [`NotConvertible::NotFinite`].
@@ -123,8 +122,8 @@ pub struct HeldStates {
 }
 
 impl HeldStates {
-    /// With `h = Ts phi1` and `g = Ts^2 phi2`: transition
-    /// `[[1 - a2 g, h], [-a2 h, 1 - a2 g - a1 h]]`, input `[g, h]`.
+    /// Computes, with `h = Ts phi1` and `g = Ts^2 phi2`, the transition `[[1 - a2 g, h], [-a2 h, 1 - a2 g - a1 h]]` and
+    /// the input `[g, h]`.
     pub fn new(a1: f64, a2: f64, sample_time: SampleTime) -> Self {
         let ts = sample_time.s();
         let poles = DividedDifferences::at(-a1 * ts, a2 * ts * ts);
@@ -136,7 +135,7 @@ impl HeldStates {
         }
     }
 
-    /// One sample on.
+    /// Returns the state one sample later.
     #[inline]
     pub fn step(&self, x: [f64; 2], u: f64) -> [f64; 2] {
         let [[a, b], [c, d]] = self.transition;
@@ -147,14 +146,13 @@ impl HeldStates {
     }
 }
 
-/// Direct feedthrough next to the strictly proper part: `d + (b0 s + b1)/(s^2 + a1 s + a2)`,
-/// numerator and denominator by descending powers.
+/// Zero-order hold of a system with a direct feedthrough d in addition to the strictly proper part:
+/// `d + (b0 s + b1)/(s^2 + a1 s + a2)`, numerator and denominator by descending powers.
 ///
 /// The held system has the numerator `d + (d f1 + b0_d) q^-1 + (d f2 + b1_d) q^-2`.
 ///
 /// # Errors
-/// As [`SecondOrder::zoh`]; [`ModelError::TransferFunction`] when the leading coefficient of `den`
-/// is zero.
+/// As [`SecondOrder::zoh`]; [`ModelError::TransferFunction`] if the leading coefficient of `den` is zero.
 pub fn hold_biproper(
     num: [f64; 3],
     den: [f64; 3],
@@ -178,7 +176,7 @@ pub fn hold_biproper(
     Ok(([d, d * held.f1 + held.b0, d * held.f2 + held.b1], [held.f1, held.f2]))
 }
 
-/// The inverse of [`hold_biproper`]: numerator and monic denominator by descending powers of s.
+/// Inverse of [`hold_biproper`]: returns numerator and monic denominator by descending powers of s.
 ///
 /// # Errors
 /// As [`HeldSecondOrder::inverse_zoh`].
@@ -201,7 +199,7 @@ pub fn unhold_biproper(
     ))
 }
 
-/// Sum and product of the poles times Ts that `1 + f1 q^-1 + f2 q^-2` has in s, by the principal
+/// Returns the sum and the product, times Ts and Ts^2, of the poles in s of `1 + f1 q^-1 + f2 q^-2`, by the principal
 /// logarithm.
 fn continuous_poles(f1: f64, f2: f64) -> Result<(f64, f64), NotConvertible> {
     let half = -f1 / 2.0;

@@ -1,11 +1,11 @@
 //! Model structures and their orders (Table 5.1).
 //!
-//! The general family is `A(q^-1) u(t) = B(q^-1)/F(q^-1) e(t-nk) + C(q^-1)/D(q^-1) eps(t)` (eq. 5.1
-//! times A). A structure shows which polynomials are there. Orders follow the field's software: nb
-//! counts the coefficients `b0 ... b_{nb-1}` of B, the others count the coefficients after the
-//! leading one, nk is the delay of b0 in samples.
+//! The general family is `A(q^-1) u(t) = B(q^-1)/F(q^-1) e(t-nk) + C(q^-1)/D(q^-1) eps(t)` (eq. 5.1 times A). A
+//! structure defines which polynomials are present. Orders follow the convention of the field's software: nb is the
+//! number of coefficients `b0 ... b_{nb-1}` of B, the others are the numbers of coefficients after the leading one, nk
+//! is the delay of b0 in samples.
 //!
-//! This is the one list of structures: the command line, plans and Python take their names from it.
+//! This is the only list of structures: the command line, plans and Python take their names from it.
 //!
 //! ```
 //! use hoid_model::Structure;
@@ -23,7 +23,7 @@ pub use hoid_core::stability::MAX_ORDER;
 
 use crate::ModelError;
 
-/// Which polynomials a model has (Table 5.1).
+/// The polynomials of a model (Table 5.1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum Structure {
@@ -52,7 +52,7 @@ pub enum Structure {
 }
 
 impl Structure {
-    /// The polynomials of the structure, in the order of theta.
+    /// Returns the polynomials of the structure, in the order of theta.
     pub fn polynomials(self) -> &'static str {
         match self {
             Self::Fir => "b",
@@ -69,21 +69,20 @@ impl Structure {
         }
     }
 
-    /// True when the structure describes how the output follows an input; AR, MA and ARMA describe
-    /// the output alone.
+    /// True if the structure describes the response of the output to an input; AR, MA and ARMA describe the output
+    /// alone.
     pub fn has_input(self) -> bool {
         self.polynomials().contains('b')
     }
 
-    /// True when the residual is linear in theta, so that least squares gives the fit in one step:
-    /// FIR, AR, ARX.
+    /// True if the residual is linear in theta, so that least squares gives the fit in one step: FIR, AR, ARX.
     pub fn is_linear(self) -> bool {
         matches!(self, Self::Fir | Self::Ar | Self::Arx)
     }
 
-    /// The orders with which the structure comes nearest to the human operator (two poles, b0 and
-    /// b1) with a remnant of first order: `ARX(na=2, nb=2)`, `BJ(nb=2, nc=0, nd=1, nf=2)`. A
-    /// structure without poles or input takes orders that are typical for it.
+    /// Returns the orders with which the structure is nearest to the human operator (two poles, b0 and b1) with a
+    /// remnant of first order: `ARX(na=2, nb=2)`, `BJ(nb=2, nc=0, nd=1, nf=2)`. For a structure without poles or input,
+    /// these are typical orders.
     pub fn operator_orders(self, nk: usize) -> Orders {
         let base = Orders {
             nb: 2,
@@ -120,7 +119,7 @@ impl Structure {
         }
     }
 
-    /// The name as it is in tables and figures: `ARX`, `BJ`.
+    /// Returns the name in tables and figures: `ARX`, `BJ`.
     pub fn label(self) -> String {
         match self {
             Self::General => self.name().to_owned(),
@@ -165,7 +164,7 @@ pub struct Orders {
 }
 
 impl Orders {
-    /// Each order with its name.
+    /// Returns each order with its name.
     pub fn named(&self) -> [(&'static str, usize); 6] {
         [
             ("na", self.na),
@@ -177,12 +176,12 @@ impl Orders {
         ]
     }
 
-    /// Number of coefficients, the length of theta.
+    /// Returns the number of coefficients, which is the length of theta.
     pub fn parameters(&self) -> usize {
         self.na + self.nb + self.nc + self.nd + self.nf
     }
 
-    /// Names of the coefficients in the order of theta: `a1 .. b0 .. c1 .. d1 .. f1 ..`.
+    /// Returns the names of the coefficients in the order of theta: `a1 .. b0 .. c1 .. d1 .. f1 ..`.
     pub fn parameter_names(&self) -> Vec<String> {
         let named = |letter: char, first: usize, n: usize| (first..first + n).map(move |i| format!("{letter}{i}"));
         named('a', 1, self.na)
@@ -193,8 +192,8 @@ impl Orders {
             .collect()
     }
 
-    /// First sample at which the undisturbed part can be computed without any input or output from
-    /// before the record: `max(na, nk + nb - 1)`.
+    /// Returns the first sample at which the regression needs no input or output from before the record:
+    /// `max(na, nk + nb - 1)`.
     pub fn first_regressed_sample(&self) -> usize {
         self.na.max(self.nk.saturating_add(self.nb.saturating_sub(1)))
     }
@@ -268,7 +267,7 @@ impl fmt::Display for Orders {
     }
 }
 
-/// Theta in the order of these names: every coefficient once.
+/// Returns theta in the order of these names, with every coefficient given once.
 ///
 /// # Errors
 /// The problem, as the end of a sentence that starts with the name of the option.

@@ -1,4 +1,4 @@
-//! Transfer functions in s and in z. `text` reads and shows those in s.
+//! Transfer functions in s and in z. The module `text` reads and formats those in s.
 
 mod text;
 
@@ -15,11 +15,11 @@ pub struct ContinuousTransferFunction {
 }
 
 impl ContinuousTransferFunction {
-    /// A proper transfer function; the denominator is made monic.
+    /// Creates a proper transfer function; the denominator is made monic.
     ///
     /// # Errors
-    /// [`ModelError::TransferFunction`] when a coefficient is not finite, the denominator is zero,
-    /// or the degree of the numerator exceeds that of the denominator.
+    /// [`ModelError::TransferFunction`] if a coefficient is not finite, the denominator is zero, or the degree of the
+    /// numerator exceeds that of the denominator.
     pub fn new(num: &[f64], den: &[f64]) -> Result<Self, ModelError> {
         let refuse = |expected: &str| ModelError::TransferFunction {
             found: format!("{num:?} / {den:?}"),
@@ -46,10 +46,10 @@ impl ContinuousTransferFunction {
         })
     }
 
-    /// The same dynamics after a pure delay.
+    /// Returns the same dynamics with a pure delay.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] when the delay is negative or not finite.
+    /// [`ModelError::OutOfRange`] if the delay is negative or not finite.
     pub fn with_delay(mut self, delay_s: f64) -> Result<Self, ModelError> {
         if !(delay_s.is_finite() && delay_s >= 0.0) {
             return Err(ModelError::OutOfRange {
@@ -77,7 +77,7 @@ impl ContinuousTransferFunction {
         self.delay_s
     }
 
-    /// Series connection: the product of both, delays added.
+    /// Returns the series connection: the product of both, with the delays added.
     pub fn series(&self, other: &Self) -> Self {
         Self {
             num: polynomial::product(&self.num, &other.num),
@@ -98,8 +98,8 @@ fn without_leading_zeros(p: &[f64]) -> &[f64] {
     &p[p.iter().position(|&c| c != 0.0).unwrap_or(p.len())..]
 }
 
-/// `H(z) = num(z^-1) / den(z^-1)`, coefficients by ascending powers of `z^-1`, `den[0] = 1`. A pure
-/// delay of n samples is n leading zeros in `num`.
+/// `H(z) = num(z^-1) / den(z^-1)`, coefficients by ascending powers of `z^-1`, `den[0] = 1`. A pure delay of n samples
+/// is represented by n leading zeros in `num`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiscreteTransferFunction {
     num: Vec<f64>,
@@ -108,10 +108,10 @@ pub struct DiscreteTransferFunction {
 }
 
 impl DiscreteTransferFunction {
-    /// A causal transfer function; it is scaled so that `den[0] = 1`.
+    /// Creates a causal transfer function; it is scaled so that `den[0] = 1`.
     ///
     /// # Errors
-    /// [`ModelError::TransferFunction`] when a coefficient is not finite or `den[0]` is zero.
+    /// [`ModelError::TransferFunction`] if a coefficient is not finite or `den[0]` is zero.
     pub fn new(num: &[f64], den: &[f64], sample_time: SampleTime) -> Result<Self, ModelError> {
         let refuse = |expected: &str| ModelError::TransferFunction {
             found: format!("{num:?} / {den:?}"),

@@ -17,10 +17,10 @@ use crate::{
 
 pub use crate::estimate::Estimate;
 
-/// The operator with the uncertainty of each parameter.
+/// The operator with the standard errors of its parameters.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct OperatorEstimate {
-    /// Error gain K_e, in the unit of u by that of e.
+    /// Error gain K_e, in the unit of u divided by that of e.
     pub k_e: Estimate,
     /// Lead time constant T_L, s.
     pub t_l_s: Estimate,
@@ -30,13 +30,12 @@ pub struct OperatorEstimate {
     pub omega_nm_rad_s: Estimate,
     /// Neuromuscular damping zeta_nm.
     pub zeta_nm: Estimate,
-    /// Delay tau_e = (nk - 1) Ts, s: a whole number of samples, without a standard error where it was
-    /// given.
+    /// Delay tau_e = (nk - 1) Ts, s: an integer number of samples, without a standard error if it was given.
     pub tau_e_s: Estimate,
 }
 
 impl From<OperatorParameters> for OperatorEstimate {
-    /// Parameters that are given and not estimated: no standard errors.
+    /// Converts given parameters, which have no standard errors.
     fn from(o: OperatorParameters) -> Self {
         Self {
             k_e: Estimate::fixed(o.k_e),
@@ -50,7 +49,7 @@ impl From<OperatorParameters> for OperatorEstimate {
 }
 
 impl OperatorEstimate {
-    /// The parameters without their errors.
+    /// Returns the parameters without their errors.
     pub fn parameters(&self) -> OperatorParameters {
         OperatorParameters {
             k_e: self.k_e.value,
@@ -61,8 +60,8 @@ impl OperatorEstimate {
         }
     }
 
-    /// Name, unit and estimate of each parameter, in the order of the tables; gains as
-    /// [`GainUnit`](crate::GainUnit) takes them.
+    /// Returns name, unit and estimate of each parameter, in the order of the tables; the names of gains are those of
+    /// [`GainUnit`](crate::GainUnit).
     pub fn rows(&self) -> [(&'static str, &'static str, Estimate); 6] {
         [
             ("K_e", "", self.k_e),
@@ -76,7 +75,7 @@ impl OperatorEstimate {
 }
 
 impl fmt::Display for OperatorEstimate {
-    /// A row for each parameter: name, value ± standard error, unit.
+    /// Formats a row for each parameter: name, value ± standard error, unit.
     ///
     /// ```
     /// # use hoid_model::{OperatorParameters, uncertainty::OperatorEstimate};
@@ -89,7 +88,7 @@ impl fmt::Display for OperatorEstimate {
     }
 }
 
-/// The remnant filter with the uncertainty of its parameters.
+/// The remnant filter with the standard errors of its parameters.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct RemnantEstimate {
     /// Order m of the filter.
@@ -103,7 +102,7 @@ pub struct RemnantEstimate {
 }
 
 impl fmt::Display for RemnantEstimate {
-    /// A row for each parameter: name, value ± standard error, unit.
+    /// Formats a row for each parameter: name, value ± standard error, unit.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write_rows(f, [("T_n", self.t_n_s, "s"), ("K_n", self.k_n, "")])
     }
@@ -126,7 +125,7 @@ pub fn variance_along(gradient: &[f64], covariance: &[f64]) -> f64 {
     }
 }
 
-/// Operator parameters of a model with the covariance of its theta (by rows).
+/// Returns the operator parameters of a model with the covariance of its theta (by rows).
 ///
 /// # Errors
 /// [`NotConvertible`] with the reason.
@@ -156,9 +155,9 @@ pub fn operator_estimate(model: &PolynomialModel, covariance: &[f64]) -> Result<
     })
 }
 
-/// T_n and K_n of a model's noise polynomial D, with the covariance of its theta (by rows) and the
-/// standard deviation of the innovation, itself known to `innovation_sd_variance` and uncorrelated
-/// with theta (Gaussian innovations).
+/// Returns T_n and K_n of a model's noise polynomial D, with the covariance of its theta (by rows) and the standard
+/// deviation of the innovation, whose own variance is `innovation_sd_variance` and which is uncorrelated with theta
+/// (Gaussian innovations).
 ///
 /// # Errors
 /// [`NotConvertible`] with the reason.

@@ -4,7 +4,7 @@
 //! `max_{j <= i} min(1, (m - j + 1) p_j)`. The chance of one false finding or more among them is at most the level,
 //! however the tests depend on each other.
 
-/// Adjusted probabilities, in the order of the given ones.
+/// Returns the adjusted probabilities, in the order of the given ones.
 pub fn holm(probabilities: &[f64]) -> Vec<f64> {
     let m = probabilities.len();
     let mut order: Vec<usize> = (0..m).collect();

@@ -1,4 +1,4 @@
-//! From a group to a comparison.
+//! Comparison of the people and conditions of a group.
 
 use hoid_analysis::Setting;
 use hoid_model::{Finding, Verdict, named_choice};
@@ -17,13 +17,13 @@ use super::{
     sentence::sentence,
 };
 
-/// Treatment of many tests.
+/// Adjustment of the probabilities of several tests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Adjustment {
     /// Holm's, over all differences of the comparison.
     #[default]
     Holm,
-    /// Nothing.
+    /// No adjustment.
     None,
 }
 
@@ -43,32 +43,32 @@ named_choice!(Covariate, "covariate", 1, {
     Run => "run",
 });
 
-/// How people and conditions are compared.
+/// Options of a comparison of people and conditions.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Comparing {
-    /// The factors; the conditions where there is none.
+    /// The factors; if empty, the conditions are the levels of one factor.
     pub factors: Vec<Factor>,
-    /// Where they vary; found from the group where it is not specified.
+    /// Whether the factors vary within or between people; determined from the group if `None`.
     pub variation: Option<Variation>,
-    /// Quantities compared; [`Quantity::defaults`], as far as it is there, where there is nothing.
+    /// Quantities to compare; if empty, those of [`Quantity::defaults`] that the group has.
     pub of: Vec<Quantity>,
-    /// Trend removed from the estimates.
+    /// Covariate whose effect is removed from the estimates.
     pub covariate: Option<Covariate>,
-    /// Treatment of many tests.
+    /// Adjustment of the probabilities of several tests.
     pub adjustment: Adjustment,
-    /// How people are weighted.
+    /// Weights of the people.
     pub weights: Weights,
 }
 
-/// Part of a parameter that is prior, beyond which differences are drawn together.
+/// Share of the prior in an estimate above which it is reported.
 const PRIOR_WEIGHS: f64 = 0.5;
 
 impl Comparing {
-    /// Compares.
+    /// Computes the comparison.
     ///
     /// # Errors
-    /// The errors of factors without meaning, and [`CompareError::NotInJson`]. What cannot be estimated of a person is
-    /// part of the result.
+    /// The errors of invalid factors, and [`CompareError::NotInJson`]. A quantity that cannot be estimated for a person
+    /// is reported in the result.
     pub fn run(&self, group: &GroupEstimates) -> Result<Comparison, CompareError> {
         let asked = match self.factors.is_empty() {
             true => vec![Factor::conditions()],
@@ -165,19 +165,19 @@ impl Comparing {
     }
 }
 
-/// A comparison in the making.
+/// Intermediate results of a comparison.
 struct Work<'a> {
     group: &'a GroupEstimates,
     factors: &'a [Resolved],
     covariate: Option<Covariate>,
     weights: Weights,
     findings: Vec<Finding>,
-    /// Parameters that are of several forms, by the reason.
+    /// Parameters that belong to several forms, by the reason why they are not compared.
     apart: Vec<(String, Vec<String>)>,
     result: Comparison,
 }
 
-/// The estimate of a cell, or why there is none, and its change a run.
+/// The estimate of a cell and its change per run, or the reason why there is none.
 type OfCell = (String, String, Result<(EstimatedValue, Option<Coefficient>), String>);
 
 impl Work<'_> {
@@ -192,7 +192,7 @@ impl Work<'_> {
         }
     }
 
-    /// The estimates of all people and conditions that are compared.
+    /// Returns the estimates of all people and conditions that are compared.
     fn cells(&self, quantity: &Quantity) -> Vec<OfCell> {
         let conditions = conditions_of(self.factors, self.group);
         let practice = self.covariate.map(|Covariate::Run| Practice::of(self.group, quantity));
@@ -221,7 +221,7 @@ impl Work<'_> {
             .collect()
     }
 
-    /// Parameters are those of one form alone.
+    /// Returns true if the quantity can be compared: parameters only within one form.
     fn is_comparable(&mut self, quantity: &Quantity, cells: &[OfCell]) -> bool {
         let mut forms: Vec<(&str, Vec<String>)> = Vec::new();
         for (subject, condition, _) in cells {
@@ -262,7 +262,7 @@ impl Work<'_> {
         false
     }
 
-    /// The estimates, their means by condition, and the changes from run to run.
+    /// Stores the estimates, their means by condition, and the changes from run to run.
     fn keep(&mut self, quantity: &Quantity, cells: &[OfCell]) {
         let group_of = |subject: &str| {
             let between = self.factors.iter().find(|f| f.of_people);
@@ -356,7 +356,7 @@ impl Work<'_> {
         }
     }
 
-    /// One difference, of the people who have all that it takes.
+    /// Computes one difference, from the people who have all of its conditions.
     fn difference(&mut self, quantity: &Quantity, contrast: &Contrast, cells: &[OfCell]) {
         let mut people: Vec<(String, usize)> = Vec::new();
         let mut of: Vec<EstimatedValue> = Vec::new();
@@ -457,7 +457,7 @@ impl Work<'_> {
     }
 }
 
-/// The mean, or the difference of the groups.
+/// Computes the mean, or the difference of the groups.
 fn fitted(
     contrast: &Contrast,
     people: &[(String, usize)],
@@ -473,7 +473,7 @@ fn fitted(
     }
 }
 
-/// With the squares of the errors; where someone has none each counts the same.
+/// Observations with squared standard errors; if one of these is missing, all have the same weight.
 fn observations(all: &[EstimatedValue]) -> Vec<Observation> {
     let known = all
         .iter()
@@ -499,7 +499,7 @@ fn known_of(e: &PersonEstimate) -> EstimatedValue {
     known(e.value, e.standard_error)
 }
 
-/// Missing people, by their reason.
+/// Returns a finding about missing people, by reason.
 fn missing(result: &Comparison) -> Vec<Finding> {
     let mut all: Vec<(String, Vec<String>)> = Vec::new();
     for out in &result.left_out {
@@ -514,7 +514,7 @@ fn missing(result: &Comparison) -> Vec<Finding> {
     all.into_iter().map(one).collect()
 }
 
-/// People whose own verdict is doubtful, and who count.
+/// Returns a finding about people who are included although their own verdict is doubtful.
 fn doubtful(group: &GroupEstimates, result: &Comparison) -> Option<Finding> {
     let counts = |subject: &str, condition: &str| {
         let mut all = result.estimates.iter();

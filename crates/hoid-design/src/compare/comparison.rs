@@ -7,39 +7,39 @@ use serde_json::{Map, Value, json};
 
 use super::{Coefficient, EffectSize, Quantity, Variation};
 
-/// An estimate of a person, of which the means and differences are made.
+/// An estimate of a person, from which the means and differences are computed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PersonEstimate {
-    /// What.
+    /// The quantity.
     pub quantity: Quantity,
-    /// Who.
+    /// Name of the person.
     pub subject: String,
-    /// In which condition.
+    /// The condition.
     pub condition: String,
-    /// The group of people that they are in; empty if none are compared.
+    /// Group of the person; empty if groups are not compared.
     pub group: String,
-    /// The value; with a covariate that at its middle.
+    /// The value; with a covariate, the value at the centre of the covariate.
     pub value: f64,
     /// Its standard error.
     pub standard_error: Option<f64>,
-    /// Runs after it.
+    /// Number of runs from which it was estimated.
     pub runs: usize,
 }
 
-/// The mean over people.
+/// Mean over people.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Mean {
-    /// Of what.
+    /// The quantity.
     pub quantity: Quantity,
-    /// In which condition.
+    /// The condition.
     pub condition: String,
-    /// Of which group of people; empty if none are compared.
+    /// Group of people; empty if groups are not compared.
     pub group: String,
-    /// How many people.
+    /// Number of people.
     pub people: usize,
-    /// Standard deviation between people, beyond their errors.
+    /// Standard deviation between people, without the errors of their estimates.
     pub tau: f64,
-    /// The mean with its interval.
+    /// The mean with its confidence interval.
     #[serde(flatten)]
     pub estimate: Coefficient,
 }
@@ -47,94 +47,94 @@ pub struct Mean {
 /// A difference between two levels of a factor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Difference {
-    /// Of what.
+    /// The quantity.
     pub quantity: Quantity,
-    /// The factor; of an interaction both.
+    /// The factor; for an interaction, both factors.
     pub factor: String,
-    /// Where it varies.
+    /// Whether the factor varies within or between people.
     pub variation: Variation,
     /// The level that is subtracted.
     pub from: String,
-    /// The level from which it is.
+    /// The level from which it is subtracted.
     pub to: String,
-    /// For an interaction the factor whose effect differs, and its levels.
+    /// For an interaction: the factor whose effect differs, and its levels.
     pub effect: Option<[String; 3]>,
-    /// The people, and of a difference between them the group of each.
+    /// The people, each with the number of the group; the group differs only in comparisons between people.
     pub people: Vec<(String, usize)>,
-    /// The difference with its interval, t and p.
+    /// The difference with its confidence interval, t and p.
     #[serde(flatten)]
     pub estimate: Coefficient,
     /// Degrees of freedom of t.
     pub degrees_of_freedom: usize,
-    /// p next to all other differences of this comparison.
+    /// p adjusted for all differences of this comparison.
     pub p_adjusted: f64,
-    /// Its size.
+    /// Effect size of the difference.
     pub effect_size: Option<EffectSize>,
-    /// Standard deviation of the difference between people, beyond their errors.
+    /// Standard deviation of the difference between people, without the errors of their estimates.
     pub tau: f64,
-    /// Share of that in the variance of a typical estimate.
+    /// Share of this variance in the variance of a typical estimate.
     pub i_squared: Option<f64>,
-    /// Heterogeneity Q and its probability where all people are the same.
+    /// Heterogeneity Q, and its probability if all people are equal.
     pub heterogeneity: Option<(f64, f64)>,
-    /// The t test in which each person counts the same.
+    /// The t test with equal weights of all people.
     pub unweighted: Coefficient,
-    /// The difference in a sentence.
+    /// The difference as a sentence.
     pub sentence: String,
 }
 
-/// How a quantity changes from run to run.
+/// Change of a quantity from run to run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Learning {
-    /// What.
+    /// The quantity.
     pub quantity: Quantity,
-    /// In which condition; empty for the mean over all of them.
+    /// The condition; empty for the mean over all conditions.
     pub condition: String,
-    /// How many people.
+    /// Number of people.
     pub people: usize,
-    /// Change a run, with its interval.
+    /// Change per run, with its confidence interval.
     #[serde(flatten)]
     pub estimate: Coefficient,
 }
 
-/// An estimate that does not exist, and why.
+/// A missing estimate, with the reason.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LeftOut {
     /// The quantity that was compared without it.
     pub quantity: Quantity,
-    /// Who.
+    /// Name of the person.
     pub subject: String,
-    /// In which condition.
+    /// The condition.
     pub condition: String,
-    /// Why it is missing.
+    /// The reason.
     pub reason: String,
 }
 
-/// Do conditions differ, and people?
+/// Comparison of conditions and of people.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Comparison {
     /// Name of the group.
     pub group: String,
-    /// The estimates of people.
+    /// The estimates of the people.
     pub estimates: Vec<PersonEstimate>,
-    /// Their means by condition.
+    /// Means of the estimates by condition.
     pub means: Vec<Mean>,
     /// The differences.
     pub differences: Vec<Difference>,
-    /// Changes from run to run, where they were requested.
+    /// Changes from run to run, if requested.
     pub learning: Vec<Learning>,
-    /// Missing people.
+    /// Missing estimates.
     pub left_out: Vec<LeftOut>,
     /// The settings.
     pub settings: Vec<Setting>,
-    /// The verdict on it.
+    /// The verdict on the comparison.
     pub verdict: Verdict,
 }
 
-/// Kind in the JSON of [`Comparison::json`].
+/// Value of `kind` in the JSON of [`Comparison::json`].
 const KIND: &str = "comparison";
 
 impl Comparison {
-    /// The quantities that were compared, in their order.
+    /// Returns the quantities that were compared, in their order.
     pub fn quantities(&self) -> Vec<&Quantity> {
         let mut all: Vec<&Quantity> = Vec::new();
         for one in self.estimates.iter().map(|e| &e.quantity) {
@@ -145,7 +145,7 @@ impl Comparison {
         all
     }
 
-    /// The object of the contract.
+    /// Returns the JSON object.
     pub fn json(&self) -> Map<String, Value> {
         let mut map = json::envelope(KIND, &[], &[], &[], &self.verdict, &self.settings);
         let with_unit = |quantity: &Quantity, one: Value| {
@@ -173,7 +173,7 @@ impl Comparison {
         map
     }
 
-    /// The same as text, indented.
+    /// Returns the JSON as indented text.
     pub fn to_json(&self) -> String {
         format!("{:#}", Value::Object(self.json()))
     }
@@ -181,8 +181,7 @@ impl Comparison {
     /// Reads the output of [`Self::to_json`].
     ///
     /// # Errors
-    /// [`AnalysisError::NotAResult`] for a text that is invalid, is damaged, or is of another
-    /// version.
+    /// [`AnalysisError::NotAResult`] if the text is invalid or damaged, or has another version.
     pub fn from_json(text: &str) -> Result<Self, AnalysisError> {
         let none = |found: String| AnalysisError::NotAResult { found };
         let object: Value = serde_json::from_str(text).map_err(|error| none(format!("it is not JSON: {error}")))?;

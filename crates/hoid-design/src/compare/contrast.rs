@@ -1,4 +1,4 @@
-//! Quantity compared for each person: a sum of their conditions with weights.
+//! Contrasts: for each person, a weighted sum of the estimates in their conditions.
 //!
 //! - A factor **within** people: the mean over the conditions of the one level less that over those of the other, so
 //!   that a second factor is averaged out. One contrast a person, and its mean over people: no assumption on how the
@@ -16,33 +16,33 @@ use super::{
     factor::{CONDITION, Factor, Variation},
 };
 
-/// A level with its data.
+/// A level with its members.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Members {
     pub name: String,
     pub members: Vec<String>,
 }
 
-/// A factor whose levels are known, and where it varies.
+/// A factor with known levels, and whether it varies within or between people.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Resolved {
     pub name: String,
     pub variation: Variation,
     pub levels: Vec<Members>,
-    /// Whether the members are people, not conditions.
+    /// True if the members are people, false if they are conditions.
     pub of_people: bool,
 }
 
-/// One comparison: weights of conditions, and the two groups of people where it is between them.
+/// One comparison: weights of the conditions and, for a comparison between people, the two groups.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Contrast {
     pub factor: String,
     pub variation: Variation,
     pub from: String,
     pub to: String,
-    /// For an interaction the effect that differs, and its levels.
+    /// For an interaction: the effect that differs, and its levels.
     pub effect: Option<[String; 3]>,
-    /// People with the weights of their conditions, of group 0 or 1.
+    /// People with the weights of their conditions and their group, 0 or 1.
     pub people: Vec<(String, BTreeMap<String, f64>, usize)>,
 }
 
@@ -117,7 +117,7 @@ impl Resolved {
         Ok(resolved)
     }
 
-    /// The levels that a person is in.
+    /// Returns the levels that contain a person.
     pub fn levels_of(&self, subject: &str, group: &GroupEstimates) -> Vec<&str> {
         let is_in = |level: &&Members| {
             if self.of_people {
@@ -142,7 +142,7 @@ impl Resolved {
     }
 }
 
-/// The conditions that count: those of all factors over conditions.
+/// Returns the conditions that are compared: those of all factors over conditions.
 pub(super) fn conditions_of(factors: &[Resolved], group: &GroupEstimates) -> Vec<String> {
     let counts = |condition: &String| {
         let mut over = factors.iter().filter(|factor| !factor.of_people);
@@ -151,7 +151,7 @@ pub(super) fn conditions_of(factors: &[Resolved], group: &GroupEstimates) -> Vec
     group.conditions().into_iter().filter(counts).collect()
 }
 
-/// All comparisons of these factors.
+/// Returns all comparisons of these factors.
 pub(super) fn contrasts(factors: &[Resolved], group: &GroupEstimates) -> Result<Vec<Contrast>, CompareError> {
     let conditions = conditions_of(factors, group);
     let between: Vec<&Resolved> = factors.iter().filter(|f| f.variation == Variation::Between).collect();
@@ -261,7 +261,7 @@ pub(super) fn contrasts(factors: &[Resolved], group: &GroupEstimates) -> Result<
     Ok(all)
 }
 
-/// The mean over the conditions of b less that over those of a.
+/// Returns the mean over the conditions of b minus the mean over those of a.
 fn difference(conditions: &[String], a: &Members, b: &Members) -> BTreeMap<String, f64> {
     let mut weights = BTreeMap::new();
     for (level, sign) in [(a, -1.0), (b, 1.0)] {
@@ -320,7 +320,7 @@ mod tests {
             .iter()
             .map(|c| (c.from.as_str(), c.to.as_str(), c.people.len()))
             .collect();
-        // Q lacks c: that is found when its estimates are searched for, and named.
+        // Q lacks c, which is found and reported when its estimates are looked up.
         assert_eq!(pairs, [("a", "b", 2), ("a", "c", 2), ("b", "c", 2)]);
         let all = of(&three[..4], &["who:one=P;two=Q"]).unwrap();
         assert_eq!((all.len(), all[0].variation), (1, Variation::Between));

@@ -1,14 +1,15 @@
-//! Effect sizes by name.
+//! Effect sizes.
 //!
 //! | name | of | value |
 //! |---|---|---|
 //! | `d_z` | differences within n people | mean over standard deviation of the differences, `t/sqrt(n)` |
 //! | Hedges `g` | two groups of people | difference of means over the pooled standard deviation, times `J(n_1 + n_2 - 2)` |
 //!
-//! Both are of the estimates as they are, each person with one, without weights (J. Cohen, *Statistical Power Analysis*, 1988,
-//! sections 2.2 and 2.3; L. V. Hedges, *J. Educ. Stat.* 6 (1981) 107-128). `J(m) = Gamma(m/2)/(sqrt(m/2) Gamma((m-1)/2))` takes out
-//! the bias of small groups. Intervals of 95 % turn the noncentral t distribution round (J. H. Steiger and R. T. Fouladi, 1997): t is
-//! noncentral by `delta = d sqrt(n)`, or `d sqrt(n_1 n_2/(n_1 + n_2))`, and the ends are those delta of which t is at the quantiles .975 and .025.
+//! Both use the estimates without weights, one for each person (J. Cohen, *Statistical Power Analysis*, 1988, sections
+//! 2.2 and 2.3; L. V. Hedges, *J. Educ. Stat.* 6 (1981) 107-128). `J(m) = Gamma(m/2)/(sqrt(m/2) Gamma((m-1)/2))`
+//! removes the bias of small groups. Confidence intervals of 95 % invert the noncentral t distribution (J. H. Steiger
+//! and R. T. Fouladi, 1997): t has the noncentrality `delta = d sqrt(n)`, or `d sqrt(n_1 n_2/(n_1 + n_2))`, and the
+//! ends are the two delta for which t is the .975 and the .025 quantile.
 //!
 //! With `f(s)` the density of `s = sqrt(chi^2_nu/nu)` the distribution is `P(T <= t) = int Phi(t s - delta) f(s) ds`, by
 //! Simpson's rule over the range in which f is not negligible.
@@ -27,18 +28,18 @@ pub struct EffectSize {
     pub name: String,
     /// Its value.
     pub value: f64,
-    /// The interval of 95 %.
+    /// The 95 % confidence interval.
     pub interval: (f64, f64),
 }
 
-/// d_z of the differences of people; none of fewer than two, or of those without scatter.
+/// Returns d_z of the differences of people; `None` for fewer than two people, or if the differences are all equal.
 pub fn d_z(differences: &[f64]) -> Option<EffectSize> {
     let n = differences.len() as f64;
     let deviation = sample_variance(differences).sqrt();
     of("d_z", mean(differences) / deviation, n.sqrt(), n - 1.0, 1.0)
 }
 
-/// Hedges g of the second group of people against the first.
+/// Returns Hedges' g of the second group of people against the first.
 pub fn hedges_g(first: &[f64], second: &[f64]) -> Option<EffectSize> {
     let (n1, n2) = (first.len() as f64, second.len() as f64);
     if n1 < 1.0 || n2 < 1.0 {
@@ -63,7 +64,7 @@ fn of(name: &str, d: f64, root: f64, dof: f64, correction: f64) -> Option<Effect
     })
 }
 
-/// J(m), by which the bias of small groups is taken out; none for one degree of freedom.
+/// J(m), which removes the bias of small groups; `None` for one degree of freedom.
 fn correction(m: f64) -> f64 {
     if m <= 1.0 {
         return f64::NAN;
@@ -71,13 +72,13 @@ fn correction(m: f64) -> f64 {
     (ln_gamma(0.5 * m) - ln_gamma(0.5 * (m - 1.0))).exp() / (0.5 * m).sqrt()
 }
 
-/// The delta of which `P(T <= t) = share`.
+/// Returns the delta for which `P(T <= t) = share`.
 fn noncentrality(t: f64, dof: f64, share: f64) -> f64 {
     let reach = 40.0 + 8.0 * t.abs();
     let (mut low, mut high) = (t - reach, t + reach);
     for _ in 0..80 {
         let middle = 0.5 * (low + high);
-        // More of T is above t the greater delta is.
+        // P(T > t) increases with delta.
         if noncentral_t(t, dof, middle) > share {
             low = middle;
         } else {
@@ -87,10 +88,10 @@ fn noncentrality(t: f64, dof: f64, share: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Intervals of Simpson's rule.
+/// Number of intervals of Simpson's rule.
 const INTERVALS: usize = 600;
 
-/// `P(T <= t)` of the noncentral t distribution.
+/// Computes `P(T <= t)` of the noncentral t distribution.
 pub(super) fn noncentral_t(t: f64, dof: f64, delta: f64) -> f64 {
     let normal = Normal::standard();
     // log f(s) = log(2) + nu/2 log(nu/2) - log Gamma(nu/2) + (nu - 1) log s - nu s^2/2
@@ -143,7 +144,7 @@ mod tests {
             };
             let [all, first, second] = of_case(cells[1]);
             let found = match cells[0] {
-                // R's own algorithm promises no more in the tails.
+                // R's own algorithm is no more accurate in the tails.
                 "pt" => {
                     close(noncentral_t(number(2), number(3), number(4)), 5, 1e-8);
                     seen += 1;

@@ -1,61 +1,61 @@
-//! Why people or conditions cannot be compared.
+//! Errors of the comparison of people or conditions.
 
 use hoid_study::StudyError;
 use thiserror::Error;
 
-/// Why there is no comparison.
+/// The reason why there is no comparison.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum CompareError {
-    /// No more people than coefficients.
+    /// Not more people than coefficients.
     #[error("{found} with an estimate, expected at least {expected}: record more, or compare fewer levels")]
     TooFew {
-        /// People, or runs.
+        /// Number of people, or of runs.
         found: usize,
-        /// The least number of them.
+        /// Minimum number.
         expected: usize,
     },
-    /// A value or an error that is not a number.
+    /// A value or a standard error that is not finite.
     #[error("an estimate or its standard error is not finite, or negative: leave that person out")]
     NotFinite,
-    /// Columns that cannot be distinguished.
+    /// Columns that are linearly dependent.
     #[error("the covariates cannot be distinguished (one is constant, or a sum of others): leave one out")]
     Collinear,
-    /// Nothing to judge a mean by.
+    /// No scatter from which the error of a mean could be estimated.
     #[error("all estimates are equal: there is no scatter to judge a difference by; is a run given twice?")]
     NoScatter,
-    /// A quantity that is invalid.
+    /// An invalid quantity.
     #[error(
         "there is no quantity {found:?} to compare; expected crossover, phase_margin, tau_e, gain_db@W or phase_deg@W with W in rad/s, rms_e, rms_u, or a parameter of the operator such as K, T_L, omega_nm"
     )]
     Quantity {
-        /// The request.
+        /// The requested quantity.
         found: String,
     },
-    /// A factor without meaning.
+    /// An invalid factor.
     #[error(
         "factor {name:?}: {reason}; expected NAME, or NAME:LEVEL=A,B;LEVEL=C with conditions or people of the group"
     )]
     Factor {
-        /// The request.
+        /// The requested factor.
         name: String,
         /// The problem.
         reason: String,
     },
-    /// A place that holds no group.
+    /// A path without the result of a group.
     #[error(
         "{place} holds no result of a group ({reason}); expected a directory that `hoid group DIR --out` wrote, or what `hoid group --json` printed"
     )]
     NoGroup {
-        /// The place.
+        /// The path.
         place: String,
         /// The problem.
         reason: String,
     },
-    /// Contents of the JSON of a group does not.
+    /// A quantity that is missing in the JSON of a group.
     #[error("{what} is not in the JSON of a group: name the directory that `hoid group DIR --out` wrote")]
     NotInJson {
-        /// The request.
+        /// The requested quantity.
         what: String,
     },
     /// Tables that cannot be read.

@@ -1,8 +1,8 @@
-//! Factors: what conditions, or people, differ in.
+//! Factors: the differences between conditions, or between people.
 //!
-//! A factor has levels, and a level members: conditions (`axis:roll=C1_roll,C2_roll;pitch=C1_pitch,C2_pitch`) or people
-//! (`training:yes=P1,P4;no=P2,P3`). It varies **within** people where each of them is in all of its levels, and **between** them
-//! where each is in one. Without more, conditions are the levels of the factor `condition`.
+//! A factor has levels, and a level has members: conditions (`axis:roll=C1_roll,C2_roll;pitch=C1_pitch,C2_pitch`) or
+//! people (`training:yes=P1,P4;no=P2,P3`). It varies **within** people if each person is in all of its levels, and
+//! **between** people if each person is in one. By default the conditions are the levels of the factor `condition`.
 
 use std::str::FromStr;
 
@@ -14,13 +14,13 @@ use super::CompareError;
 /// The factor whose levels are the conditions.
 pub const CONDITION: &str = "condition";
 
-/// Where a factor varies.
+/// Variation of a factor: within or between people.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Variation {
     /// Each person is in all of its levels.
     Within,
-    /// Each person is in one.
+    /// Each person is in exactly one of its levels.
     Between,
 }
 
@@ -38,17 +38,17 @@ pub struct Level {
     pub members: Vec<String>,
 }
 
-/// A factor as it is requested.
+/// A requested factor.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Factor {
     /// Its name.
     pub name: String,
-    /// Its levels; none if they are those of the manifest, or the conditions.
+    /// Its levels; if empty, those of the manifest, or the conditions.
     pub levels: Vec<Level>,
 }
 
 impl Factor {
-    /// The conditions as levels.
+    /// Returns the factor whose levels are the conditions.
     pub fn conditions() -> Self {
         Self {
             name: CONDITION.to_owned(),

@@ -1,10 +1,10 @@
-//! Report of a group on each person in each condition: from the directory of its results, or from the JSON that
-//! `hoid group` printed.
+//! Estimates of each person in each condition, from the result directory of a group or from the JSON that `hoid group`
+//! printed.
 //!
-//! A person in a condition is a cell. Crossover, margin and parameters are those of all runs together with
-//! the errors of the person; root mean squares are means over the runs, responses those of all runs, and the errors of both
-//! are the scatter between runs over the root of their number. Where some parameters are individual to each run, a
-//! cell is the mean of its runs.
+//! A person in a condition is a cell. Crossover, margin and parameters are those of the fit to all runs together, with
+//! the standard errors of that fit. Root mean squares are means over the runs, responses are those of all runs, and the
+//! standard errors of both are the standard deviation between runs divided by the root of their number. If some
+//! parameters were estimated for each run, a cell is the mean of its runs.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -18,7 +18,7 @@ use serde_json::Value;
 
 use super::{CompareError, Observation, Quantity};
 
-/// Known properties of a number.
+/// A value with its standard error, its share of prior, and the number of its runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct EstimatedValue {
     pub value: f64,
@@ -34,7 +34,7 @@ pub(super) struct Cell {
     pub subject: String,
     pub condition: String,
     pub form: String,
-    /// Why there is no operator of theirs.
+    /// The reason why the person has no operator.
     pub missing: Option<String>,
     pub doubtful: bool,
     runs: usize,
@@ -50,10 +50,10 @@ pub struct GroupEstimates {
 }
 
 impl GroupEstimates {
-    /// Reads a directory with the results of a group, or the JSON of one.
+    /// Reads the result directory of a group, or the JSON of one.
     ///
     /// # Errors
-    /// [`CompareError::NoGroup`] with the findings; those of tables that cannot be read.
+    /// [`CompareError::NoGroup`] with the reason; the errors of tables that cannot be read.
     pub fn read(place: &Path) -> Result<Self, CompareError> {
         let none = |reason: String| CompareError::NoGroup {
             place: place.display().to_string(),
@@ -82,7 +82,7 @@ impl GroupEstimates {
         })
     }
 
-    /// From the object that `hoid group --json` prints.
+    /// Reads the object that `hoid group --json` prints.
     fn of_json(object: &Value) -> Result<Self, String> {
         let people = object["people"].as_array().ok_or("it has no people")?;
         let cells: Vec<Cell> = people.iter().map(Cell::of_json).collect();
@@ -96,12 +96,12 @@ impl GroupEstimates {
         })
     }
 
-    /// The conditions, in the order of the manifest.
+    /// Returns the conditions, in the order of the manifest.
     pub fn conditions(&self) -> Vec<String> {
         distinct(self.cells.iter().map(|cell| &cell.condition))
     }
 
-    /// The people, in the order of the manifest.
+    /// Returns the people, in the order of the manifest.
     pub fn subjects(&self) -> Vec<String> {
         distinct(self.cells.iter().map(|cell| &cell.subject))
     }
@@ -111,7 +111,7 @@ impl GroupEstimates {
         self.cells.iter().find(is)
     }
 
-    /// A quantity of a cell, or why it has none.
+    /// Returns a quantity of a cell, or the reason why it has none.
     pub(super) fn estimate(&self, cell: &Cell, quantity: &Quantity) -> Result<EstimatedValue, String> {
         let of_runs = || {
             let all: Vec<f64> = self.of_runs(cell, quantity).into_iter().map(|(_, o)| o.value).collect();
@@ -153,7 +153,7 @@ impl GroupEstimates {
         }
     }
 
-    /// A quantity in each run of a cell, with the names of the runs; empty if the runs are not known.
+    /// Returns a quantity in each run of a cell, with the names of the runs; empty if the runs are not known.
     pub(super) fn of_runs(&self, cell: &Cell, quantity: &Quantity) -> Vec<(&str, Observation)> {
         let Some(runs) = &self.runs else { return Vec::new() };
         let one = |run: &str| match quantity.column() {
@@ -183,7 +183,7 @@ impl GroupEstimates {
         }
     }
 
-    /// Whether single runs are known: not from the JSON of a group.
+    /// True if the single runs are known; false for the JSON of a group.
     pub(super) fn has_runs(&self) -> bool {
         self.runs.is_some()
     }
@@ -289,13 +289,13 @@ fn known(value: f64, standard_error: Option<f64>, runs: usize) -> EstimatedValue
     }
 }
 
-/// The mean over runs, with the error of their scatter.
+/// Returns the mean over runs, with the standard error from their scatter.
 fn over_runs(values: &[f64]) -> EstimatedValue {
     let error = (sample_variance(values) / values.len() as f64).sqrt();
     known(mean(values), Some(error).filter(|e| e.is_finite()), values.len())
 }
 
-/// One cell of those of single runs.
+/// Merges the cells of single runs into one.
 fn merged(cells: Vec<Cell>) -> Vec<Cell> {
     let mut all: Vec<Vec<Cell>> = Vec::new();
     for cell in cells {
@@ -343,7 +343,7 @@ pub(super) mod tests {
 
     use super::*;
 
-    /// A group of people with crossover and its error by condition, through the JSON of a group.
+    /// A group of people with crossover and its standard error by condition, from the JSON of a group.
     pub fn group(people: &[(&str, &str, f64, f64)]) -> GroupEstimates {
         let person = |(subject, condition, value, error): &(&str, &str, f64, f64)| {
             json!({

@@ -1,8 +1,8 @@
 //! Learning: a quantity over the runs of a person in a condition.
 //!
-//! `y_r = a + b (r - r0) + u_r + e_r`, r the number of a run, r0 the middle of all runs of the group: a regression of
-//! the runs with their errors, and a variance between runs next to them ([`meta_regression`]). a is what is compared,
-//! so that conditions are compared at the same practice; b is the change a run, of which the mean over people is
+//! `y_r = a + b (r - r0) + u_r + e_r`, r the number of a run, r0 the centre of all runs of the group: a regression of
+//! the runs with their errors, and an additional variance between runs ([`meta_regression`]). The comparison uses a, so
+//! that conditions are compared at the same amount of practice; b is the change per run, whose mean over people is
 //! reported.
 
 use hoid_numerics::statistics::mean;
@@ -11,11 +11,11 @@ use super::{
     Coefficient, CompareError, GroupEstimates, Observation, Quantity, Weights, group_estimates::Cell, meta_regression,
 };
 
-/// Numbers of the runs: those of their names where all of them are numbers, else their places.
+/// Numbers of the runs: from their names if all of these are numbers, otherwise their positions.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Practice {
     by_name: bool,
-    /// The middle of all runs.
+    /// The centre of all runs.
     pub middle: f64,
 }
 
@@ -48,7 +48,8 @@ impl Practice {
         }
     }
 
-    /// The quantity of a cell at the middle of the runs, and its change a run with its error; or why not.
+    /// Returns the quantity of a cell at the centre of the runs and its change per run with its error, or the reason if
+    /// there is none.
     pub fn of_cell(
         &self,
         group: &GroupEstimates,
@@ -61,7 +62,7 @@ impl Practice {
             .enumerate()
             .map(|(place, (run, _))| vec![1.0, self.number(run, place) - self.middle])
             .collect();
-        // Errors that some runs lack are taken from none.
+        // If some runs lack a standard error, none is used.
         let all_known = runs.iter().all(|(_, o)| o.variance > 0.0);
         let observations: Vec<Observation> = runs
             .iter()

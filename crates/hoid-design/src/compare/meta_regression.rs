@@ -1,4 +1,4 @@
-//! Estimates with standard errors, one a person, over what differs between people.
+//! Meta-regression: estimates with standard errors, one per person, on properties that differ between people.
 //!
 //! `y_i = x_i' beta + u_i + e_i`, `u_i ~ N(0, tau^2)` between people, `e_i ~ N(0, v_i)` within them, `v_i` the
 //! square of the standard error. With `w_i = 1/(v_i + tau^2)`, `W = diag(w)` and
@@ -31,22 +31,22 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 use super::CompareError;
 
-/// An estimate of one person.
+/// The estimate of one person.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observation {
     /// The value.
     pub value: f64,
-    /// Square of its standard error; zero if it is not known.
+    /// Square of its standard error; zero if not known.
     pub variance: f64,
 }
 
-/// The people whose tau^2 enters the weights.
+/// The tau^2 on which the weights depend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Weights {
-    /// Kept away from zero.
+    /// The maximum of the penalised likelihood, which is never zero.
     #[default]
     Penalised,
-    /// The value for the restricted likelihood.
+    /// The maximum of the restricted likelihood.
     Restricted,
 }
 
@@ -55,7 +55,7 @@ named_choice!(Weights, "choice of weights", 2, {
     Restricted => "reml",
 });
 
-/// A coefficient with its inference.
+/// A coefficient with its standard error, test and confidence interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Coefficient {
     /// The value.
@@ -64,32 +64,32 @@ pub struct Coefficient {
     pub standard_error: f64,
     /// `value/standard_error`.
     pub t: f64,
-    /// Two-sided, Student's.
+    /// Two-sided p-value of Student's t.
     pub p: f64,
-    /// The interval of 95 %.
+    /// The 95 % confidence interval.
     pub interval: (f64, f64),
 }
 
-/// The findings.
+/// Result of a meta-regression.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MetaRegression {
-    /// By the columns of X.
+    /// Coefficients, in the order of the columns of X.
     pub coefficients: Vec<Coefficient>,
     /// Variance between people, by the restricted likelihood.
     pub tau_squared: f64,
-    /// The value for the weights.
+    /// The tau^2 from which the weights are computed.
     pub tau_squared_of_weights: f64,
     /// Degrees of freedom n - p.
     pub degrees_of_freedom: usize,
     /// Share of tau^2 in the variance of a typical estimate.
     pub i_squared: Option<f64>,
-    /// Heterogeneity Q and its probability where all people are the same.
+    /// Heterogeneity Q, and its probability if all people are equal.
     pub heterogeneity: Option<(f64, f64)>,
     /// `(X'W X)^-1` times s^2.
     pub covariance: DMatrix<f64>,
 }
 
-/// Mean over people: X of ones.
+/// Computes the mean over people: X is a column of ones.
 ///
 /// # Errors
 /// As [`meta_regression`].
@@ -97,7 +97,7 @@ pub fn meta_mean(observations: &[Observation], weights: Weights) -> Result<MetaR
     meta_regression(observations, &vec![vec![1.0]; observations.len()], weights)
 }
 
-/// The regression on the rows x of X.
+/// Computes the regression with the rows x of X.
 ///
 /// # Errors
 /// [`CompareError::TooFew`] for no more observations than columns, [`CompareError::NotFinite`],
@@ -139,7 +139,8 @@ pub fn meta_regression(
     })
 }
 
-/// The variance between people at the greatest of `l + log tau`: never zero, and less often too large than that of the weights.
+/// Returns the variance between people at the maximum of `l + log tau`. It is never zero, and less often too large than
+/// the tau^2 of the weights.
 ///
 /// # Errors
 /// As [`meta_regression`].
@@ -151,7 +152,7 @@ pub fn variance_between(observations: &[Observation]) -> Result<f64, CompareErro
     }
 }
 
-/// The model, the variance of y about its regression, and whether errors are known.
+/// Returns the model, the variance of y about its regression, and whether standard errors are known.
 fn checked(observations: &[Observation], x: &[Vec<f64>]) -> Result<(Model, f64, bool), CompareError> {
     let (n, p) = (observations.len(), x.first().map_or(0, Vec::len));
     if n <= p {
@@ -179,7 +180,7 @@ fn checked(observations: &[Observation], x: &[Vec<f64>]) -> Result<(Model, f64, 
 }
 
 impl Coefficient {
-    /// With Student's interval.
+    /// Returns a coefficient with the interval of Student's distribution.
     pub(super) fn of(value: f64, standard_error: f64, dof: usize) -> Self {
         let t = value / standard_error;
         let reach = student_quantile(0.975, dof as f64) * standard_error;
@@ -193,7 +194,7 @@ impl Coefficient {
     }
 }
 
-/// The quantile of Student's distribution; infinite for no degree of freedom.
+/// Quantile of Student's distribution; infinite for zero degrees of freedom.
 pub(super) fn student_quantile(share: f64, dof: f64) -> f64 {
     StudentsT::new(0.0, 1.0, dof).map_or(f64::INFINITY, |d| d.inverse_cdf(share))
 }
@@ -212,7 +213,7 @@ struct Model {
     v: Vec<f64>,
 }
 
-/// The model at a tau^2.
+/// The model at one tau^2.
 struct At {
     beta: DVector<f64>,
     /// `(X'W X)^-1`.
@@ -221,13 +222,13 @@ struct At {
     q: f64,
     /// tr P.
     trace: f64,
-    /// The restricted log-likelihood except for constants.
+    /// The restricted log-likelihood without its constants.
     likelihood: f64,
-    /// Its slope by tau^2.
+    /// Its derivative with respect to tau^2.
     slope: f64,
 }
 
-/// The grid of tau^2, in powers of ten of the scatter, and steps of one of them.
+/// Range of the grid of tau^2 in decades relative to the scatter, and steps per decade.
 const DECADES: (i32, i32) = (-8, 6);
 const STEPS: i32 = 3;
 
@@ -260,11 +261,11 @@ impl Model {
         })
     }
 
-    /// Variance of y about its regression, all weights equal; none if X is singular.
+    /// Variance of y about its regression with equal weights; `None` if X is singular.
     fn scatter(&self) -> Option<f64> {
         let (n, p) = self.x.shape();
         let information = self.x.transpose() * &self.x;
-        // Columns that are multiples of each other pass a factorisation by rounding alone.
+        // Rounding lets columns that are multiples of each other pass a factorisation.
         let scale = DVector::from_fn(p, |j, _| information[(j, j)].sqrt());
         if scale.iter().any(|s| *s == 0.0) {
             return None;
@@ -278,7 +279,7 @@ impl Model {
         Some((&self.y - &self.x * beta).norm_squared() / (n - p) as f64)
     }
 
-    /// The tau^2 at which `l + penalty log tau^2` is at its greatest; errors are known.
+    /// Returns the tau^2 that maximises `l + penalty log tau^2`, for known standard errors.
     fn tau_squared(&self, scatter: f64, penalty: f64) -> Option<f64> {
         let unit = scatter.max(self.v.iter().sum::<f64>() / self.v.len() as f64);
         let steps = (DECADES.0 * STEPS..=DECADES.1 * STEPS).map(|k| unit * 10f64.powf(f64::from(k) / f64::from(STEPS)));
@@ -289,7 +290,7 @@ impl Model {
         let heights: Vec<f64> = grid.iter().map(|tau| height(*tau)).collect::<Option<_>>()?;
         let best = (0..grid.len()).max_by(|a, b| heights[*a].total_cmp(&heights[*b]))?;
         let rises = slope(grid[best])? > 0.0;
-        // At the edges nothing is next to it.
+        // At the edges of the grid there is no neighbour.
         if (best == 0 && !rises) || (best + 1 == grid.len() && rises) {
             return Some(grid[best]);
         }
@@ -368,7 +369,7 @@ mod tests {
                 (_, "ci.ub") => of(k).interval.1,
                 _ => panic!("{name}"),
             };
-            // metafor stops its search at a step of 1e-12; the likelihood is flat to 1e-8 of tau there.
+            // metafor stops its search at a step of 1e-12; there the likelihood is flat within 1e-8 of tau.
             let tolerance = 1e-7 * expected.abs().max(1e-2);
             assert!(
                 (value - expected).abs() < tolerance,
@@ -418,7 +419,7 @@ mod tests {
 
     #[test]
     fn the_weights_are_kept_away_from_those_of_one_person() {
-        // l is at its greatest at zero, where the second person has 25 times the weight of the others.
+        // l has its maximum at zero, where the second person has 25 times the weight of the others.
         let all = [(0.3, 0.25), (-0.2, 0.01), (-0.4, 0.25), (0.1, 0.2)];
         let all = all.map(|(value, variance)| Observation { value, variance });
         let [penalised, restricted] = [Weights::Penalised, Weights::Restricted].map(|w| meta_mean(&all, w).unwrap());

@@ -1,18 +1,18 @@
-//! Do conditions differ, and people?
+//! Comparison of conditions and of people.
 //!
-//! Each person has an estimate with its error in each condition (`hoid group`). What is compared of them are contrasts of
-//! their conditions (`contrast`), and the mean of those over people, or the difference of groups of people, is a
-//! random-effects meta-analysis: people who are known well count more, as far as people are alike.
+//! Each person has an estimate with its standard error in each condition (`hoid group`). Contrasts of the conditions
+//! (`contrast`) are computed for each person, and their mean over people, or the difference of groups of people, by a
+//! random-effects meta-analysis: people with precise estimates have more weight if people are similar.
 //!
 //! | module | contents |
 //! |---|---|
 //! | [`meta_regression`](fn@meta_regression) | estimates of people with their errors: restricted likelihood, interval by Hartung and Knapp |
 //! | [`EffectSize`] | d_z, Hedges g, with intervals |
 //! | [`holm`] | probabilities of several tests |
-//! | [`GroupEstimates`] | what a group reports about each person, from its directory or its JSON |
-//! | [`Quantity`] | what is compared |
-//! | [`Factor`] | what conditions, or people, differ in; `contrast`: the weights of conditions |
-//! | [`Comparing`] | from a group to a comparison; `learning`: runs as a covariate |
+//! | [`GroupEstimates`] | estimates of a group for each person, from its directory or its JSON |
+//! | [`Quantity`] | quantities to compare |
+//! | [`Factor`] | differences between conditions, or between people; `contrast`: the weights of conditions |
+//! | [`Comparing`] | comparison of a group; `learning`: runs as a covariate |
 //! | [`Comparison`] | the result, its JSON and back; `sentence`: each difference for a paper |
 
 mod adjust;

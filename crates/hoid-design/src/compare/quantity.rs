@@ -1,4 +1,4 @@
-//! Quantities compared: quantities that mean the same for every person, and parameters of one form.
+//! Quantities to compare: those with the same meaning for every person, and the parameters of one form.
 
 use std::{fmt, str::FromStr};
 
@@ -10,7 +10,7 @@ use super::CompareError;
 /// The delay, a parameter of every form.
 const DELAY: &str = "tau_e";
 
-/// A quantity.
+/// A quantity to compare.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum Quantity {
@@ -31,12 +31,12 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// Default quantities of a comparison.
+    /// Returns the default quantities of a comparison.
     pub fn defaults() -> Vec<Self> {
         vec![Self::Crossover, Self::PhaseMargin, Self::Parameter(DELAY.to_owned())]
     }
 
-    /// Its unit; empty if there is none, or it is that of the recording.
+    /// Returns the unit; empty if there is none, or if it is that of the recording.
     pub fn unit(&self) -> &str {
         match self {
             Self::Crossover => "rad/s",
@@ -47,7 +47,7 @@ impl Quantity {
         }
     }
 
-    /// Its name in a sentence.
+    /// Returns the name for use in a sentence.
     pub fn words(&self) -> String {
         match self {
             Self::Crossover => "crossover".to_owned(),
@@ -61,12 +61,12 @@ impl Quantity {
         }
     }
 
-    /// Whether it means the same whatever the form: all but the parameters, of which the delay is in every form.
+    /// True if the meaning does not depend on the form: all quantities except the parameters other than the delay.
     pub fn is_of_any_form(&self) -> bool {
         !matches!(self, Self::Parameter(name) if name != DELAY)
     }
 
-    /// Its name in the tables of a group, where it is there as one number.
+    /// Returns its name in the tables of a group, if it is a single number there.
     pub(super) fn column(&self) -> Option<&str> {
         match self {
             Self::Crossover => Some("crossover_rad_s"),

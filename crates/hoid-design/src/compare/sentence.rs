@@ -1,14 +1,16 @@
-//! A difference as a sentence for a paper.
+//! Differences as sentences for a paper.
 
 use hoid_model::numbers::{significant, with_uncertainty};
 
 use super::{Difference, Variation};
 
-/// The level at which a difference is found.
+/// Significance level.
 pub(super) const LEVEL: f64 = 0.05;
 
-/// `crossover fell by 0.63 rad/s from fo to so (95 % 0.14 to 1.12, t(2) = -5.5, p = 0.032, d_z = -3.2, n = 3)`; where p
-/// next to the other tests is not below .05 that no difference was found. An interaction reports whose effect differs.
+/// Returns for example
+/// `crossover fell by 0.63 rad/s from fo to so (95 % 0.14 to 1.12, t(2) = -5.5, p = 0.032, d_z = -3.2, n = 3)`; if the
+/// adjusted p is not below .05, it reports that no difference was found. For an interaction it names the factor whose
+/// effect differs.
 pub(super) fn sentence(difference: &Difference, adjusted: bool) -> String {
     let Difference {
         quantity,
@@ -23,7 +25,7 @@ pub(super) fn sentence(difference: &Difference, adjusted: bool) -> String {
         unit => format!(" {unit}"),
     };
     let error = Some(estimate.standard_error);
-    // Ends of the interval have the digits of the value.
+    // The ends of the interval have the digits of the value.
     let digits = |v: f64| with_uncertainty(v, error).0;
     let test = test(difference, adjusted);
     let (low, high) = estimate.interval;
@@ -81,7 +83,7 @@ fn test(difference: &Difference, adjusted: bool) -> String {
     parts.join(", ")
 }
 
-/// `= 0.032`, or `< 0.0001`.
+/// Formats a probability: `= 0.032`, or `< 0.0001`.
 pub(super) fn probability(p: f64) -> String {
     if p < 1e-4 {
         "< 0.0001".to_owned()

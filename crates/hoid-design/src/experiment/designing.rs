@@ -1,20 +1,21 @@
-//! The forcing function that is most informative about a person.
+//! Design of the most informative forcing function.
 //!
-//! With a remnant that has its share of the variance of u, the errors depend on how the power of u is spread over the
-//! lines, not on its size (`information`): of the shares q of the lines in the response of u to the forcing function
-//! the information is `I = sum q_k M_k`. The quantities requested, parameters or crossover or margin with gradients g
-//! and accepted errors s, is the least `J = sum over wanted g' I^-1 g/s^2`, the sum of the squares of the errors by
-//! those that are accepted.
+//! If the remnant is a share of the variance of u, the errors depend on the distribution of the power of u over the
+//! lines, and not on its size (`information`): with the shares q of the lines in the response of u to the forcing
+//! function the information is `I = sum q_k M_k`. The requested quantities are parameters, crossover or margin, with
+//! gradients g and accepted errors s; the design minimises `J = sum over wanted g' I^-1 g/s^2`, the sum of the squared
+//! ratios of errors to accepted errors.
 //!
-//! - **Amplitudes.** J is convex in q. From equal shares on, `q_k <- q_k sqrt(d_k/sum q d)`, `d_k = sum g' I^-1 M_k I^-1 g/s^2`, which lets J fall in
-//!   every step (D. M. Titterington, *Applied Statistics* 27 (1978) 227-234; Y. Yu, *Ann. Stat.* 38 (2010) 1593-1606). Each line keeps a part of
-//!   an equal share at least, for people who are not quite as supposed.
-//! - **Places.** Each line in turn is moved to multiples near it, and stays where J is least (V. V. Fedorov, *Theory of Optimal
-//!   Experiments*, 1972), as long as no line is a harmonic of another.
-//! - **Limits.** Of a target with much power beyond the crossover people let the crossover fall (D. T. McRuer and H. R. Jex, *IEEE Trans. Human
-//!   Factors in Electronics* 8 (1967) 231-249): lines there are a shelf, of amplitudes up to a given part of the geometric mean of those below. Lines
-//!   below are within half and twice that mean. The size is then the greatest that the limits of the rms of e and u
-//!   leave.
+//! - **Amplitudes.** J is convex in q. From equal shares, `q_k <- q_k sqrt(d_k/sum q d)`,
+//!   `d_k = sum g' I^-1 M_k I^-1 g/s^2`, decreases J in every step (D. M. Titterington, *Applied Statistics* 27 (1978)
+//!   227-234; Y. Yu, *Ann. Stat.* 38 (2010) 1593-1606). Each line keeps at least a part of an equal share, for people
+//!   who differ from the assumed operator.
+//! - **Frequencies.** Each line in turn is moved to multiples near it and keeps the one with the smallest J (V. V.
+//!   Fedorov, *Theory of Optimal Experiments*, 1972), on condition that no line is a harmonic of another.
+//! - **Limits.** If a target has much power above the crossover frequency, people lower their crossover frequency (D.
+//!   T. McRuer and H. R. Jex, *IEEE Trans. Human Factors in Electronics* 8 (1967) 231-249): lines there form a shelf,
+//!   with amplitudes up to a given part of the geometric mean of those below. Lines below are between half and twice
+//!   that mean. The size is then the largest that satisfies the limits of the rms of e and u.
 
 use std::f64::consts::TAU;
 
@@ -28,29 +29,29 @@ use super::{
     lines::{crest_factor, multiples, set_phases},
 };
 
-/// Quantities requested of a person.
+/// A quantity to be estimated, with its accepted error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Wanted {
     /// `crossover`, `phase_margin`, or a parameter.
     pub name: String,
-    /// The standard error that is accepted: of the phase margin in deg, else as a part of the value.
+    /// The accepted standard error: in deg for the phase margin, relative to the value for all others.
     pub error: f64,
 }
 
-/// How a forcing function is designed.
+/// Options of the design of a forcing function.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Designing {
-    /// The quantities requested; all parameters, each by its value, where there is nothing.
+    /// The requested quantities; if empty, all parameters, each relative to its value.
     pub wanted: Vec<Wanted>,
-    /// Its period, s: one run, or a whole part of one.
+    /// Period in s: the duration of a run, or an integer fraction of it.
     pub period_s: f64,
-    /// Lines.
+    /// Number of lines.
     pub lines: usize,
     /// The lowest and the highest frequency, rad/s.
     pub band_rad_s: (f64, f64),
-    /// Greatest amplitude of a line beyond the crossover, as a part of the geometric mean of those below.
+    /// Largest amplitude of a line above the crossover, relative to the geometric mean of those below.
     pub shelf: f64,
-    /// Greatest rms of e, and of u; the forcing function has an rms of one where there is none.
+    /// Largest rms of e and of u; without limits the forcing function has an rms of one.
     pub most_rms: [Option<f64>; 2],
 }
 
@@ -67,37 +68,37 @@ impl Default for Designing {
     }
 }
 
-/// A forcing function and what is to be expected of it.
+/// A forcing function with its expected errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Designed {
     /// The forcing function.
     pub forcing: ForcingFunction,
-    /// Its peak over its rms.
+    /// Peak divided by rms.
     pub crest_factor: f64,
-    /// The errors of one period.
+    /// Expected errors for one period.
     pub expected: Expected,
-    /// Periods until everything that is wanted has its error; one at least.
+    /// Number of periods until every requested quantity has its accepted error; at least one.
     pub periods: usize,
 }
 
-/// Greatest amplitude of a line below the crossover, by the geometric mean of all there, and what the least is divided by.
+/// Largest ratio of the amplitude of a line below the crossover to their geometric mean; its inverse is the smallest.
 const WITHIN: f64 = 2.0;
-/// Part of an equal share that each line keeps.
+/// Part of an equal share that each line keeps at least.
 const LEAST_SHARE: f64 = 0.1;
-/// Steps of the shares, and of those of a line that is tried elsewhere.
+/// Steps of the iteration of the shares, and steps if a line is moved for a trial.
 const STEPS: usize = 400;
 const STEPS_OF_TRIAL: usize = 60;
-/// By how many multiples a line is moved, and rounds of it.
+/// Multiples by which a line is moved, and number of rounds.
 const MOVES: [i64; 6] = [-4, -2, -1, 1, 2, 4];
 const ROUNDS: usize = 3;
-/// Least improvement for a move.
+/// Least relative improvement for which a line is moved.
 const WORTH: f64 = 1e-3;
 
 impl Designing {
-    /// Designs it.
+    /// Designs the forcing function.
     ///
     /// # Errors
-    /// [`DesignError`]: as [`super::expected`], and for what is wanted and is not there.
+    /// [`DesignError`] as for [`super::expected`], and if a requested quantity does not exist.
     pub fn run(&self, task: &Task) -> Result<Designed, DesignError> {
         let least = (self.band_rad_s.0 * self.period_s / TAU).ceil();
         let largest = (self.band_rad_s.1 * self.period_s / TAU).floor();
@@ -168,7 +169,7 @@ impl Designing {
         })
     }
 
-    /// The gradients of what is wanted, each by the error that is accepted.
+    /// Gradients of the requested quantities, each divided by the accepted error.
     fn gradients(&self, all: &Loop<'_>) -> Result<Vec<DVector<f64>>, DesignError> {
         let known = all.gradients();
         let of = |wanted: &Wanted| {
@@ -198,7 +199,7 @@ impl Designing {
     }
 }
 
-/// Periods until each has its error.
+/// Number of periods until each quantity has its accepted error.
 pub fn periods(of_one: &Expected, wanted: &[Wanted]) -> usize {
     let needed = wanted
         .iter()
@@ -218,7 +219,7 @@ impl Search<'_> {
         f64::from(multiple) * TAU / self.period_s
     }
 
-    /// The best shares of lines at these places, and J.
+    /// Returns the best shares of lines at these frequencies, and J.
     fn shares(&self, places: &[u32], steps: usize) -> Result<(Vec<f64>, f64), DesignError> {
         let by_share: Vec<DMatrix<f64>> = places
             .iter()
@@ -256,7 +257,7 @@ impl Search<'_> {
         Ok((shares, last))
     }
 
-    /// Limits lines to their largest amplitude, and spreads the rest, and makes the sum one.
+    /// Limits the amplitudes of the lines, redistributes the rest, and normalises the sum to one.
     fn limit(&self, places: &[u32], shares: &mut [f64]) {
         let lines: Vec<(f64, bool)> = places
             .iter()
@@ -280,7 +281,7 @@ impl Search<'_> {
         shares.iter_mut().for_each(|q| *q /= whole);
     }
 
-    /// Lines of these shares, of an rms of one together.
+    /// Returns lines with these shares and a total rms of one.
     fn lines(&self, places: &[u32], shares: &[f64]) -> Vec<Sinusoid> {
         let power = |(m, q): (&u32, &f64)| q / self.all.control_by_power(self.omega(*m));
         let powers: Vec<f64> = places.iter().zip(shares).map(power).collect();
@@ -320,7 +321,7 @@ mod tests {
         assert!(designed.crest_factor < 2.5 && designed.periods == 1);
         assert!((designed.forcing.rms_deg() - 1.0).abs() < 1e-9);
         assert_eq!(designed, Designing::default().run(&task).unwrap());
-        // The shelf beyond the crossover, and no line that drowns the others.
+        // The shelf above the crossover, and no dominant line.
         let crossover = designed.expected.crossover_rad_s.value;
         let amplitudes = |beyond: bool| -> Vec<f64> {
             let of = designed

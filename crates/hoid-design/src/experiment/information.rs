@@ -1,4 +1,4 @@
-//! Report of an experiment will on a person: standard errors before it is done.
+//! Standard errors of an experiment before it is done.
 //!
 //! A person H(s; theta) answers the error of a loop with the controlled element P, `u = H e + n`, and a line of the forcing function of
 //! amplitude A at omega makes one of e of amplitude `a = A |S|` (a target), or `A |P S|` (a disturbance at the input of P), with `S = 1/(1 + H P)`.
@@ -9,16 +9,17 @@
 //! `I = sum over lines of T a^2/(2 S_n) Re[(dH/dtheta)* (dH/dtheta)']`,
 //!
 //! whose inverse is the least covariance that an unbiased estimate can have (H. Cramér, *Mathematical Methods of Statistics*, 1946, section
-//! 32.6). What the remnant itself excites, as it goes round the loop, is not counted: where the noise model is free that
-//! information is lost to it (U. Forssell and L. Ljung, *Automatica* 35 (1999) 1215-1241, section 5). Errors of functions of theta, such as
-//! crossover and margin, are those of the first order.
+//! 32.6). The part of the loop signals that the remnant itself excites is not counted: with a free noise model this
+//! information is lost to it (U. Forssell and L. Ljung, *Automatica* 35 (1999) 1215-1241, section 5). Errors of
+//! functions of theta, such as crossover and margin, are to first order.
 //!
-//! It uses lines that exceed the remnant in e: at a line that does not, H is drawn to -1/P, and
-//! predicted to be known better than it is.
+//! The lines have to exceed the remnant in e: at a line that does not, the estimate of H is drawn to -1/P, and the
+//! predicted error is too small.
 //!
 //! **The remnant** is a lag of order m, `S_n = K^2/(1 + (T_n omega)^2)^m`, whose share p of the variance of u, through the loop,
-//! sets K: `K^2 = p/(1 - p) sum a^2 |H|^2/2 / int |S|^2/(1 + (T_n omega)^2)^m df`. It grows with the forcing function, as people's
-//! does, so that errors do not depend on the size of it: only on where its power is, and on T.
+//! sets K: `K^2 = p/(1 - p) sum a^2 |H|^2/2 / int |S|^2/(1 + (T_n omega)^2)^m df`. It is proportional to the forcing
+//! function, as it is for people, so that errors do not depend on the amplitude but on the distribution of power over
+//! frequency, and on T.
 
 use std::f64::consts::TAU;
 
@@ -32,10 +33,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::DesignError;
 
-/// Where the forcing function enters the loop.
+/// Point at which the forcing function enters the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Enters {
-    /// It is the signal to be tracked.
+    /// It is the target signal.
     #[default]
     Target,
     /// It is added at the input of the controlled element.
@@ -47,14 +48,14 @@ pub enum Enters {
 pub struct Remnant {
     /// Its share of the variance of u.
     pub share: f64,
-    /// T_n, s; zero is white.
+    /// Time constant T_n in s; zero for white noise.
     pub time_constant_s: f64,
-    /// m.
+    /// Order m.
     pub order: i32,
 }
 
 impl Default for Remnant {
-    /// A fifth of the variance of u, of first order with .06 s.
+    /// A fifth of the variance of u, of first order with a time constant of .06 s.
     fn default() -> Self {
         Self {
             share: 0.2,
@@ -64,51 +65,51 @@ impl Default for Remnant {
     }
 }
 
-/// Who does what.
+/// The loop of an experiment: person, controlled element, forcing function and remnant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Task {
     /// The person and the controlled element.
     pub state: FamilyState,
-    /// Where the forcing function enters.
+    /// Point at which the forcing function enters.
     pub enters: Enters,
-    /// Additional activity of the person.
+    /// Remnant of the person.
     pub remnant: Remnant,
 }
 
-/// The errors to be expected.
+/// Expected standard errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expected {
-    /// The parameters of the person: name, unit, value and error.
+    /// Parameters of the person: name, unit, and value with standard error.
     pub parameters: Vec<(&'static str, &'static str, Estimate)>,
-    /// Crossover, rad/s.
+    /// Crossover frequency, rad/s.
     pub crossover_rad_s: Estimate,
     /// Phase margin, deg.
     pub phase_margin_deg: Estimate,
-    /// Root mean square of the error, of the unit of the forcing function.
+    /// Root mean square of the error, in the unit of the forcing function.
     pub rms_e: f64,
     /// Root mean square of the control.
     pub rms_u: f64,
 }
 
-/// Reliability of a line, before its amplitude.
+/// Power and information of a line, for unit amplitude.
 struct Worth {
-    /// `|e|^2` by `A^2`.
+    /// `|e|^2` divided by `A^2`.
     error: f64,
-    /// `|u|^2` by `A^2`.
+    /// `|u|^2` divided by `A^2`.
     control: f64,
-    /// `Re[conj(dH) dH']` by the density of the remnant of unit gain.
+    /// `Re[conj(dH) dH']` divided by the density of the remnant of unit gain.
     information: DMatrix<f64>,
 }
 
-/// The line densities of a task, ready for any forcing function.
+/// Quantities of a task that do not depend on the forcing function.
 pub(super) struct Loop<'a> {
     task: &'a Task,
-    /// `int |S|^2 density df`, and the same through P, of a remnant of unit gain.
+    /// `int |S|^2 density df`, and the same through P, for a remnant of unit gain.
     noise: [f64; 2],
     pub crossover_rad_s: f64,
 }
 
-/// Range of the integrals over frequency, rad/s, and their points.
+/// Range of the integrals over frequency in rad/s, and number of points.
 const RANGE: (f64, f64) = (1e-3, 1e3);
 const POINTS: usize = 6000;
 
@@ -129,7 +130,7 @@ impl<'a> Loop<'a> {
             noise: [0.0; 2],
             crossover_rad_s,
         };
-        // Trapezia over log omega; both signs of f.
+        // Trapezoidal rule over log omega; both signs of f.
         let ratio = (RANGE.1 / RANGE.0).ln() / (POINTS - 1) as f64;
         for k in 0..POINTS {
             let omega = RANGE.0 * (ratio * k as f64).exp();
@@ -143,7 +144,7 @@ impl<'a> Loop<'a> {
         Ok(all)
     }
 
-    /// S and P.
+    /// Returns S and P.
     fn sensitivity(&self, omega: f64) -> (Complex64, Complex64) {
         let p = self.task.state.controlled_element.response(omega);
         let h = self.task.state.operator.response(omega);
@@ -175,7 +176,7 @@ impl<'a> Loop<'a> {
         }
     }
 
-    /// rms of e and u, and K^2 of the remnant, of a forcing function.
+    /// Returns the rms of e and u, and K^2 of the remnant, for a forcing function.
     fn powers(&self, worths: &[Worth], lines: &[Sinusoid]) -> [f64; 3] {
         let sum = |of: fn(&Worth) -> f64| -> f64 {
             let one = |(w, line): (&Worth, &Sinusoid)| 0.5 * line.amplitude_deg.powi(2) * of(w);
@@ -191,7 +192,7 @@ impl<'a> Loop<'a> {
         ]
     }
 
-    /// The errors of a forcing function over a given number of seconds of whole periods.
+    /// Computes the expected errors of a forcing function over a given number of seconds of whole periods.
     pub fn expected(&self, forcing: &ForcingFunction, length_s: f64) -> Result<Expected, DesignError> {
         if !(length_s.is_finite() && length_s > 0.0) {
             return Err(DesignError::OutOfRange {
@@ -226,7 +227,7 @@ impl<'a> Loop<'a> {
         })
     }
 
-    /// Information of a line that makes all of the response of u, over one second, with the share of the remnant.
+    /// Information in one second of a line that makes the whole response of u, with the share of the remnant.
     pub fn information_by_share(&self, omega: f64) -> DMatrix<f64> {
         let worth = self.worth(omega);
         let share = self.task.remnant.share;
@@ -235,13 +236,13 @@ impl<'a> Loop<'a> {
         worth.information * scale
     }
 
-    /// Variance of u by that of a line of the forcing function.
+    /// Variance of u divided by that of a line of the forcing function.
     pub fn control_by_power(&self, omega: f64) -> f64 {
         self.worth(omega).control
     }
 
-    /// Quantities that can be requested: its name, its gradient along the coordinates, and what its error is reported
-    /// by: 1 deg, or the value.
+    /// Quantities that can be requested: name, gradient with respect to the coordinates, and the scale of the error: 1
+    /// deg, or the value.
     pub fn gradients(&self) -> Vec<(&'static str, DVector<f64>, f64)> {
         let [(crossover, of_crossover), (_, of_margin)] = self.margin_gradients(&self.task.state.operator);
         let parameters = self.task.state.operator.named_gradients().into_iter();
@@ -264,7 +265,7 @@ impl<'a> Loop<'a> {
         let response = operator.response_and_gradient(omega);
         let logarithm = |w: f64| (operator.response(w) * self.task.state.controlled_element.response(w)).ln();
         let step = 1e-5 * omega;
-        // The phase may step by a whole turn between the two.
+        // The phase may differ by a whole turn between the two.
         let slope = {
             let difference = logarithm(omega + step) - logarithm(omega - step);
             let turn = difference.im - TAU * (difference.im / TAU).round();
@@ -281,7 +282,7 @@ impl<'a> Loop<'a> {
 }
 
 impl Expected {
-    /// The same with errors that are scaled by a factor.
+    /// Returns the same with all errors multiplied by a factor.
     #[must_use]
     pub fn scaled(&self, by: f64) -> Self {
         let of = |e: &Estimate| Estimate {
@@ -300,7 +301,7 @@ impl Expected {
         }
     }
 
-    /// The error of `crossover` or a parameter as a part of its value, of `phase_margin` in deg.
+    /// Error of `crossover` or of a parameter relative to its value; of `phase_margin` in deg.
     pub fn relative_error(&self, name: &str) -> Option<f64> {
         let relative = |e: &Estimate| Some(e.standard_error? / e.value.abs());
         match name {
@@ -311,15 +312,16 @@ impl Expected {
     }
 }
 
-/// The errors that an experiment is to be expected to have: `length_s` is that of all runs together, in whole periods.
+/// Computes the expected errors of an experiment; `length_s` is the duration of all runs together, in whole periods.
 ///
 /// # Errors
-/// [`DesignError`] for numbers out of range, a loop that is not stable or does not cross, and lines that do not determine the parameters.
+/// [`DesignError`] for numbers out of range, a loop that is unstable or without a crossover, and lines that do not
+/// determine the parameters.
 pub fn expected(task: &Task, forcing: &ForcingFunction, length_s: f64) -> Result<Expected, DesignError> {
     Loop::of(task)?.expected(forcing, length_s)
 }
 
-/// The inverse by rows and columns of unit diagonal; none if that is singular.
+/// Inverse, after scaling to a unit diagonal; `None` if the matrix is singular.
 pub(super) fn inverse(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = information.nrows();
     let scale: Vec<f64> = (0..n).map(|k| information[(k, k)].sqrt()).collect();
@@ -390,7 +392,7 @@ pub(super) mod tests {
 
     #[test]
     fn crossover_and_margin_move_with_the_parameters() {
-        // Their derivatives against the margins of an operator whose gain is another: d omega/d ln K.
+        // Finite differences of the margins of an operator with another gain: d omega/d ln K.
         let task = task(0.2);
         let all = Loop::of(&task).unwrap();
         let n = task.state.operator.coordinates().len();

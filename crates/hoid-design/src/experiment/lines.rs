@@ -1,18 +1,20 @@
-//! Lines of a forcing function: whole multiples of `2 pi/T`, none of them a harmonic of another.
+//! Lines of a forcing function: integer multiples of `2 pi/T`, none of them a harmonic of another.
 //!
-//! **Places.** A person's response to a line has harmonics, and a nonlinearity puts power on multiples. The multiples that are taken are
-//! such that no ratio of two of them is a whole number: the same as primes have, with more to choose from (R. Pintelon and J. Schoukens,
-//! *System Identification*, 2012, section 5.2). The candidates are spread evenly over the logarithm of frequency.
+//! **Frequencies.** A person's response to a line has harmonics, and a nonlinearity adds power at multiples. The
+//! multiples are chosen so that no ratio of two of them is an integer, as with primes, but with a larger choice (R.
+//! Pintelon and J. Schoukens, *System Identification*, 2012, section 5.2). The candidates are spread evenly over the
+//! logarithm of frequency.
 //!
-//! **Phases.** From several starts, that of M. R. Schroeder (*IEEE Trans. Inf. Theory* 16 (1970) 85-89), `phi_k = -2 pi sum_{j < k} (k - j) p_j` of
-//! the relative powers p, and others that are spread over the circle, the phases are moved one after the other, an eighth of a turn and
-//! less, as long as the largest value of the signal falls; the best is kept.
+//! **Phases.** From several starts, that of M. R. Schroeder (*IEEE Trans. Inf. Theory* 16 (1970) 85-89),
+//! `phi_k = -2 pi sum_{j < k} (k - j) p_j` with the relative powers p, and others spread over the circle, the phases
+//! are changed one after the other, by an eighth of a turn and less, as long as the peak of the signal decreases; the
+//! best result is kept.
 
 use std::f64::consts::TAU;
 
 use hoid_model::forcing::Sinusoid;
 
-/// Multiples within these bounds that have no whole ratio, about evenly spread over the logarithm.
+/// Multiples within these bounds without an integer ratio, about evenly spread over the logarithm.
 pub(super) fn multiples(least: u32, largest: u32, count: usize) -> Vec<u32> {
     let mut taken: Vec<u32> = Vec::new();
     let fits = |taken: &[u32], m: u32| taken.iter().all(|t| !m.is_multiple_of(*t) && !t.is_multiple_of(m));
@@ -20,7 +22,7 @@ pub(super) fn multiples(least: u32, largest: u32, count: usize) -> Vec<u32> {
     for k in 0..count {
         let part = if count > 1 { k as f64 / (count - 1) as f64 } else { 0.0 };
         let wanted = (low + part * (high - low)).exp().round() as u32;
-        // The nearest that is free, of two the larger.
+        // The nearest free multiple; of two, the larger.
         let near = (0..=largest)
             .flat_map(|d| [wanted.checked_add(d), wanted.checked_sub(d)])
             .flatten();
@@ -33,7 +35,7 @@ pub(super) fn multiples(least: u32, largest: u32, count: usize) -> Vec<u32> {
     taken
 }
 
-/// Samples of a period, of the fastest line sixteen.
+/// Samples of one period of each line, sixteen per period of the fastest.
 fn samples(lines: &[Sinusoid], period_s: f64) -> Vec<Vec<(f64, f64)>> {
     let fastest = lines.iter().map(|l| l.omega_rad_s).fold(0.0, f64::max);
     let n = ((16.0 * fastest * period_s / TAU).ceil() as usize).clamp(64, 8192);
@@ -46,7 +48,7 @@ fn samples(lines: &[Sinusoid], period_s: f64) -> Vec<Vec<(f64, f64)>> {
     lines.iter().map(of).collect()
 }
 
-/// Peak over rms of a sum of sines over its period.
+/// Ratio of peak to rms of a sum of sines over its period.
 pub fn crest_factor(lines: &[Sinusoid], period_s: f64) -> f64 {
     let table = samples(lines, period_s);
     peak(&sum(&table, lines)) / rms(lines)
@@ -74,12 +76,12 @@ fn sum(table: &[Vec<(f64, f64)>], lines: &[Sinusoid]) -> Vec<f64> {
 
 /// Steps of the phases, in turns.
 const STEPS: [f64; 6] = [1.0 / 8.0, 1.0 / 16.0, 1.0 / 32.0, 1.0 / 64.0, 1.0 / 128.0, 1.0 / 256.0];
-/// Rounds of a step at most.
+/// Largest number of rounds per step.
 const ROUNDS: usize = 12;
-/// Starts.
+/// Number of starts.
 const STARTS: usize = 24;
 
-/// Gives lines the phases of a low crest factor.
+/// Sets the phases of the lines for a low crest factor.
 pub(super) fn set_phases(lines: &mut [Sinusoid], period_s: f64) {
     let power: f64 = lines.iter().map(|l| l.amplitude_deg.powi(2)).sum();
     let relative: Vec<f64> = lines.iter().map(|l| l.amplitude_deg.powi(2) / power).collect();
@@ -103,7 +105,7 @@ pub(super) fn set_phases(lines: &mut [Sinusoid], period_s: f64) {
     }
 }
 
-/// Moves the phases until the largest value does not fall any more, which is returned.
+/// Changes the phases until the peak no longer decreases, and returns the peak.
 fn flattened(lines: &mut [Sinusoid], table: &[Vec<(f64, f64)>]) -> f64 {
     let mut values = sum(table, lines);
     let mut least = peak(&values);

@@ -1,9 +1,9 @@
-//! Report of an experiment will, before it is done.
+//! Expected results of an experiment before it is done.
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`expected`] | standard errors of a person by the information of the lines of a forcing function |
-//! | [`Designing`] | amplitudes and places of the lines that are most informative, under limits |
+//! | [`expected`] | standard errors of a person from the information of the lines of a forcing function |
+//! | [`Designing`] | most informative amplitudes and frequencies of the lines, under limits |
 //! | [`crest_factor`] | lines without common harmonics (`lines`), and their phases |
 
 mod designing;
@@ -17,44 +17,44 @@ pub use designing::{Designed, Designing, Wanted, periods};
 pub use information::{Enters, Expected, Remnant, Task, expected};
 pub use lines::crest_factor;
 
-/// Why there is nothing to be expected of an experiment.
+/// Errors of the prediction of an experiment.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum DesignError {
-    /// A number without meaning.
+    /// A number out of range.
     #[error("{quantity} is {found}, expected {expected}")]
     OutOfRange {
-        /// What.
+        /// Name of the quantity.
         quantity: &'static str,
-        /// Its definition.
+        /// The value found.
         found: f64,
-        /// Its admissible values.
+        /// The admissible values.
         expected: &'static str,
     },
-    /// A loop of which there is no crossover.
+    /// A loop without a crossover.
     #[error(
         "the gain of the loop does not fall through one between 0.01 and 100 rad/s: give the person another gain, or other units of the element"
     )]
     NoCrossover,
-    /// Lines that leave the person open.
+    /// Lines that do not determine the parameters of the person.
     #[error(
         "{lines} lines do not determine {coordinates} parameters: add lines, each of which gives two numbers, and spread them over the frequencies at which the person works"
     )]
     NotIdentifiable {
-        /// Lines of the forcing function.
+        /// Number of lines.
         lines: usize,
-        /// Parameters of the person.
+        /// Number of parameters of the person.
         coordinates: usize,
     },
     /// A requested quantity that is not a parameter of the person.
     #[error("{name} is nothing that this person has; expected one of {expected}")]
     NotThere {
-        /// The requested item.
+        /// Name of the requested quantity.
         name: String,
-        /// The available items.
+        /// The available quantities.
         expected: String,
     },
-    /// An operator or element without meaning, or a loop that is not stable.
+    /// An invalid operator or element, or an unstable loop.
     #[error(transparent)]
     Model(#[from] ModelError),
 }

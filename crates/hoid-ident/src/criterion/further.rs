@@ -1,7 +1,7 @@
 //! Further inputs: `w_i = (B_i/F_i) q^-nk_i x_i`, each with its own polynomials.
 //!
-//! Theta is that of the first input, then `b_0 .. f_1 ..` of each further one. The columns of psi
-//! are those of the first input with the signals of the other: `(D/(C F_i)) x_i(t - nk_i - j)` and
+//! Theta contains the coefficients of the first input, then `b_0 .. f_1 ..` of each further one. The columns of psi are
+//! those of the first input with the signals of the other input: `(D/(C F_i)) x_i(t - nk_i - j)` and
 //! `-(D/(C F_i)) w_i(t - j)`.
 
 use std::{borrow::Cow, ops::Range};
@@ -15,7 +15,7 @@ use super::{
 use crate::linalg::least_squares::add_scaled;
 
 impl Criterion<'_> {
-    /// B and F of each further input.
+    /// Returns B and F of each further input.
     pub(super) fn further_polynomials<'t>(
         &self,
         theta: &'t [f64],
@@ -30,7 +30,7 @@ impl Criterion<'_> {
         })
     }
 
-    /// The places of each further F in theta.
+    /// Returns the places of the coefficients of each further F in theta.
     pub(super) fn further_poles(&self) -> impl Iterator<Item = Range<usize>> {
         let mut at = self.orders.parameters();
         self.further.iter().map(move |input| {
@@ -40,7 +40,7 @@ impl Criterion<'_> {
         })
     }
 
-    /// s and w of the further inputs over these samples; w leaves v.
+    /// Computes s and w of the further inputs over these samples, and subtracts w from v.
     pub(super) fn further_responses(&self, theta: &[f64], record: usize, samples: Range<usize>, ws: &mut Workspace) {
         let (pad, n) = (ws.pad, samples.end);
         ws.further.resize_with(self.further.len(), FurtherSignals::default);
@@ -65,7 +65,7 @@ impl Criterion<'_> {
         }
     }
 
-    /// The signals whose shifts are the columns of the further inputs.
+    /// Computes the signals whose shifts are the columns of the further inputs.
     pub(super) fn whiten_further(&self, theta: &[f64], ws: &mut Workspace) {
         let parts = Polynomials::split(&self.orders, theta);
         let from = ws.pad + self.first_regressed();
@@ -88,7 +88,7 @@ impl Criterion<'_> {
         }
     }
 
-    /// The columns of psi of the further inputs over these places of the workspace.
+    /// Returns the columns of psi of the further inputs over these places of the workspace.
     pub(super) fn further_columns<'w>(&self, counted: &Range<usize>, ws: &'w Workspace) -> Vec<Column<'w>> {
         let mut columns = Vec::new();
         let mut add = |signal: &'w [f64], shifts: Range<usize>, sign: f64| {

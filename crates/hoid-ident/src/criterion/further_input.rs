@@ -1,4 +1,4 @@
-//! A further input: its orders, its values, its signals.
+//! A further input: its orders, values and signals.
 
 /// Numbers of coefficients of B and F of one input, and its delay in samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
@@ -12,7 +12,7 @@ pub struct InputOrders {
 }
 
 impl InputOrders {
-    /// First sample at which its response needs nothing from before the record: `nk + nb - 1`.
+    /// First sample whose response depends on no input before the record: `nk + nb - 1`.
     pub fn first_regressed_sample(&self) -> usize {
         self.nk.saturating_add(self.nb.saturating_sub(1))
     }
@@ -25,7 +25,7 @@ pub(crate) struct FurtherInput<'a> {
     pub values: Vec<&'a [f64]>,
 }
 
-/// The signals of a further input at one theta, each with the zeros of the workspace in front.
+/// The signals of a further input at one theta, each preceded by the zeros of the workspace.
 #[derive(Debug, Default)]
 pub(super) struct FurtherSignals {
     pub s: Vec<f64>,

@@ -10,7 +10,7 @@
 //! have a known covariance `sigma^2 L L'`: they are `L z` with z of variance sigma^2, and z counts
 //! as further residuals. G then has the rows `[I; G L]` for them.
 //!
-//! A level of u, the constant that is not a response to e, enters as linearly, through `-(D/C) 1`, and is eliminated
+//! A level of u, the constant that is not a response to e, also enters linearly, through `-(D/C) 1`, and is eliminated
 //! with the states. It does not die away: its basis vector is as long as the record.
 
 use hoid_core::filter::{SecondOrder, divide_in_place};
@@ -24,8 +24,8 @@ use crate::{
 /// states.
 #[derive(Debug, Default)]
 pub(crate) struct InitialStateResponses {
-    /// Basis vectors: first [`InitialStateResponses::prior_rows`] of z, then from the first
-    /// residual on; what follows their end is zero.
+    /// Basis vectors: first the [`InitialStateResponses::prior_rows`] of z, then those from the first residual on;
+    /// beyond their end they are zero.
     q: Vec<Vec<f64>>,
     /// `G[:, kept[k]] = sum over l <= k of Q_l r[k][l]`.
     r: Vec<Vec<f64>>,
@@ -39,7 +39,7 @@ pub(crate) struct InitialStateResponses {
     prior_rows: usize,
 }
 
-/// Possible past of a record.
+/// Assumptions about the past of a record.
 pub(crate) struct InitialHistory<'a> {
     pub c: &'a [f64],
     /// The polynomial that whitens v together with C.
@@ -48,18 +48,17 @@ pub(crate) struct InitialHistory<'a> {
     pub f: &'a [&'a [f64]],
     /// Samples from the first value of w to the first residual.
     pub lead: usize,
-    /// The past of the noise when it was stationary; else nothing is known about it.
+    /// The past of stationary noise; `None` if nothing is known about it.
     pub noise: Option<&'a StationaryNoise>,
-    /// Square roots of the weights of the residuals, from the first residual on; none if all count
-    /// the same.
+    /// Square roots of the weights of the residuals, from the first residual on; `None` if all weights are equal.
     pub weights: Option<&'a [f64]>,
-    /// Whether u has a level.
+    /// True if u has a level.
     pub level: bool,
 }
 
 impl InitialStateResponses {
-    /// Responses of `rows` residuals, from the first one on, to the nf initial values of the w of each
-    /// input and the states of the noise model.
+    /// Computes the responses of `rows` residuals, from the first one on, to the nf initial values of the w of each
+    /// input and to the states of the noise model.
     ///
     /// Any free response of 1/F is a combination of its impulse response `h` started at the first
     /// nf samples (that basis stays independent even where f_nf = 0).
@@ -126,7 +125,7 @@ impl InitialStateResponses {
         };
         for (index, column) in columns.into_iter().enumerate() {
             let mut whole = vec![0.0; prior_rows];
-            // Of a state of the noise.
+            // For a state of the noise.
             if let Some(z) = index
                 .checked_sub(free.of_inputs.len())
                 .and_then(|state| whole.get_mut(state))
@@ -139,8 +138,7 @@ impl InitialStateResponses {
         free
     }
 
-    /// Modified Gram-Schmidt, twice for orthogonality to rounding; a column without a part of its
-    /// own is dropped.
+    /// Modified Gram-Schmidt, twice for orthogonality to rounding; a column that depends on the others is dropped.
     fn orthonormalise(&mut self, index: usize, mut column: Vec<f64>) {
         let size = dot(&column, &column).sqrt();
         let mut r = vec![0.0; self.q.len()];
@@ -166,9 +164,9 @@ impl InitialStateResponses {
         self.kept.push(index);
     }
 
-    /// Takes the best initial states into the signals: the w of each input and v from the first
-    /// regressed sample on, eps (weighted, if there are weights) from the first residual. Returns z,
-    /// empty where the past is not random.
+    /// Adds the best initial states to the signals: to the w of each input and to v from the first regressed sample on,
+    /// and to eps (weighted, if there are weights) from the first residual on. Returns z, which is empty if the past is
+    /// not random.
     pub fn eliminate(&self, w: &mut [&mut [f64]], v: &mut [f64], eps: &mut [f64]) -> Vec<f64> {
         let components: Vec<f64> = self.basis().map(|q| dot(q, &eps[..q.len()])).collect();
         for (q, &component) in self.basis().zip(&components) {
@@ -185,7 +183,7 @@ impl InitialStateResponses {
                 states[l] -= self.r[k][l] * states[k];
             }
         }
-        // States of the noise model do not act on w, nor does a level.
+        // States of the noise model and a level have no effect on w.
         for (&index, &x) in self.kept.iter().zip(&states) {
             if Some(index) == self.level {
                 v.iter_mut().for_each(|v| *v -= x);
@@ -199,11 +197,11 @@ impl InitialStateResponses {
         z
     }
 
-    /// True when nothing of the responses is left at the end of a given number of rows.
+    /// True if all responses have died away after a given number of rows.
     pub fn have_died(&self, rows: usize) -> bool {
-        /// A response below this share of its size has died away.
+        /// Share of its size below which a response has died away.
         const DEAD: f64 = 1e-15;
-        /// Samples over which an oscillation shows its size.
+        /// Number of samples that show the amplitude of an oscillation.
         const SWING: usize = 128;
         let dead = |response: &[f64]| {
             response.len() < rows
@@ -211,18 +209,18 @@ impl InitialStateResponses {
                     .iter()
                     .all(|x| x.abs() < DEAD)
         };
-        // A basis vector has the size one, an impulse response starts with one.
+        // A basis vector has unit length, and the first value of an impulse response is one.
         self.h.iter().all(|h| h.len() < rows) && self.basis().all(dead)
     }
 
-    /// The orthonormal basis in the rows of the residuals; a vector starts at the first residual,
-    /// and what follows its end is zero.
+    /// Returns the orthonormal basis in the rows of the residuals; each vector starts at the first residual, and beyond
+    /// its end it is zero.
     pub fn basis(&self) -> impl Iterator<Item = &[f64]> {
         self.q.iter().map(|q| &q[self.prior_rows..])
     }
 }
 
-/// `response(t + lead - delay)` for t = 0 .. rows, cut where the response has ended.
+/// Returns `response(t + lead - delay)` for t = 0 .. rows, truncated where the response ends.
 fn shifted(response: &[f64], delay: usize, lead: usize, rows: usize) -> Vec<f64> {
     let mut column = vec![0.0; delay.saturating_sub(lead).min(rows)];
     let from = lead.saturating_sub(delay).min(response.len());
@@ -231,8 +229,7 @@ fn shifted(response: &[f64], delay: usize, lead: usize, rows: usize) -> Vec<f64>
     column
 }
 
-/// Impulse response of `1/D`, until it has died away (1e-16 of its largest value) or `longest` is
-/// reached.
+/// Impulse response of `1/D`, until it has died away (1e-16 of its largest value) or its length is `longest`.
 fn impulse_response(d: &[f64], longest: usize) -> Vec<f64> {
     const BLOCK: usize = 128;
     let order = d.len();

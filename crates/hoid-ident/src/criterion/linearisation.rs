@@ -1,5 +1,5 @@
-//! Requirements of a search and a fit on the criterion: feasible theta, sum of squares, descent
-//! `psi' eps` and `psi' psi`, also for some polynomials alone, and the residuals themselves.
+//! Evaluation of the criterion for a search and a fit: feasible theta, sum of squares, descent `psi' eps` and
+//! `psi' psi`, also for single polynomials, and the residuals.
 
 use std::ops::Range;
 
@@ -18,15 +18,14 @@ use crate::{
 };
 
 impl Criterion<'_> {
-    /// Sum of squared residuals, without derivatives.
+    /// Returns the sum of squared residuals, without derivatives.
     #[cfg(test)]
     pub fn sum_of_squares(&self, theta: &[f64], workspace: &mut Workspace) -> f64 {
         self.linearise(theta, workspace).sum_of_squares
     }
 
-    /// A and B of least squares for the other coefficients of theta, in one step because the
-    /// residual is affine in them, and the sum of squares there. `None` when the regressors are
-    /// singular or the loss is not finite.
+    /// Computes the least squares A and B for the other coefficients of theta, in one step because the residual is
+    /// affine in them, and the sum of squares there. `None` if the regressors are singular or the loss is not finite.
     pub fn best_linear_part(&self, theta: &[f64], workspace: &mut Workspace) -> Option<(Vec<f64>, f64)> {
         let linear = self.orders.na + self.orders.nb;
         let mut theta = theta.to_vec();
@@ -70,19 +69,18 @@ impl Criterion<'_> {
         whole
     }
 
-    /// Residuals of one record, from [`Criterion::first`] on.
+    /// Returns the residuals of one record, from [`Criterion::first`] on.
     pub fn residuals_of(&self, theta: &[f64], record: usize, workspace: &mut Workspace) -> Vec<f64> {
         let mut residuals = Vec::new();
         self.pass(theta, &[], record, workspace, |_, counted, ws| {
-            // The whole of a short record at once; of a long one no more than it needs.
+            // For a short record the whole memory at once; for a long one only what it needs.
             residuals.reserve_exact(self.data[record].u.len() - self.first - residuals.len());
             residuals.extend_from_slice(&ws.eps[counted]);
         });
         residuals
     }
 
-    /// Columns of psi in one record, from the first residual on, with the initial states projected
-    /// out.
+    /// Returns the columns of psi in one record, from the first residual on, with the initial states projected out.
     pub fn jacobian(&self, theta: &[f64], record: usize, workspace: &mut Workspace) -> Vec<Vec<f64>> {
         let data = self.data[record];
         let states = self.residual_pass(theta, record, data, workspace);
@@ -105,8 +103,7 @@ impl Criterion<'_> {
 }
 
 impl Objective for Criterion<'_> {
-    /// Roots of C and F inside the unit circle; a stationary past needs those of the noise poles
-    /// there too.
+    /// True if all roots of C and F are inside the unit circle, and those of the noise poles too for a stationary past.
     fn is_feasible(&self, theta: &[f64]) -> bool {
         let parts = Polynomials::split(&self.orders, theta);
         theta.iter().all(|v| v.is_finite())

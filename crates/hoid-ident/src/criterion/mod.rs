@@ -30,8 +30,8 @@
 //!
 //! With [`InitialState::Backcast`] the past of w is unknown as before, but that of the noise is
 //! stationary ([`stationary_noise`]): the residuals start nd samples earlier, and the state of the
-//! noise model counts as r further residuals z. Where there is no input, A plays the part of D and
-//! the residuals start with the record.
+//! noise model counts as r further residuals z. Without an input, A takes the place of D and the residuals start with
+//! the record.
 //!
 //! **Several inputs.** `A u = sum_i (B_i/F_i) q^-nk_i e_i + (C/D) eps`: each has its own s, w, B and
 //! F, psi of its coefficients has the two rows of B and F above with its own signals, and the past
@@ -39,22 +39,22 @@
 //!
 //! **Weights** multiply the squared residuals; they serve the robust loss.
 //!
-//! **A long record** passes span by span after its first part ([`pass`]), so that a fit needs little memory in addition
-//! to the record.
+//! **A long record** is processed span by span after its first part ([`pass`]), so that a fit needs little memory in
+//! addition to the record.
 //!
 //! | module | contents |
 //! |---|---|
-//! | `prediction_error` | the criterion: records, orders, which residuals count |
-//! | `initial_state` | what is assumed about the time before a record |
+//! | `prediction_error` | the criterion: records, orders, residuals that count |
+//! | `initial_state` | assumptions about the time before a record |
 //! | `polynomials` | A, B, C, D and F as parts of theta |
 //! | `further_input` | a further input: orders, values, signals |
 //! | `further` | inputs in addition to e |
 //! | `signals`, `whitening` | the signals of a record at one theta |
-//! | `initial_state_responses` | what a record does not report about its past, eliminated exactly |
+//! | `initial_state_responses` | exact elimination of the unknown past of a record |
 //! | `stationary_noise` | the noise before the record, when it was stationary |
 //! | `pass` | a pass over a record; a long one span by span |
 //! | `normal_equations` | products of the residuals and the columns of psi |
-//! | `linearisation` | what a search needs of the criterion |
+//! | `linearisation` | evaluation of the criterion for a search |
 //! | `workspace` | the memory of the signals |
 
 mod further;

@@ -23,7 +23,7 @@ use crate::{
 pub(super) struct Column<'w> {
     pub values: Cow<'w, [f64]>,
     pub sign: f64,
-    /// True when this is the column before it, one sample later.
+    /// True if this is the previous column delayed by one sample.
     pub follows: bool,
 }
 
@@ -44,7 +44,7 @@ impl Criterion<'_> {
         })
     }
 
-    /// Columns of psi, in the order of theta, over these places of the workspace.
+    /// Returns the columns of psi, in the order of theta, over these places of the workspace.
     pub(super) fn columns<'w>(
         &self,
         parts: &Polynomials<'_>,
@@ -108,7 +108,7 @@ impl Criterion<'_> {
         add_products(states, &columns, &weighted(eps), total);
     }
 
-    /// Contribution of the penalty on the stationary past to the descent.
+    /// Adds the contribution of the penalty on the stationary past to the descent.
     pub(super) fn add_penalty(&self, states: &EliminatedStates, total: &mut Linearisation) {
         let Some(noise) = &states.noise else { return };
         let o = &self.orders;
@@ -124,10 +124,10 @@ impl Criterion<'_> {
     }
 }
 
-/// Products of the residuals and the columns of psi, with the initial states projected out.
+/// Adds the products of the residuals and the columns of psi, with the initial states projected out.
 fn add_products(states: &EliminatedStates, columns: &[Column<'_>], eps: &[f64], total: &mut Linearisation) {
     let p = columns.len();
-    // Components of each column in the space of the initial states, one row a column.
+    // Components of each column in the space of the initial states, one row per column.
     let count = states.responses.basis().count();
     let mut inside = Vec::with_capacity(p * count);
     for column in columns {

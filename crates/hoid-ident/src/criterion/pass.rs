@@ -1,15 +1,15 @@
 //! A pass over a record at one theta; a long record is passed span by span.
 //!
-//! Requirements of the normal equations on a record are sums over time, and every signal in them is the output of a
-//! filter that goes forward: the first part of the record (32 768 samples) is passed as any record, the rest in spans
-//! that stay in the memory near the processor, each with the last samples of the span before in front of it. Nothing
-//! then grows with the record, and a sample costs the same in a long one.
+//! The terms of the normal equations are sums over time, and every signal in them is the output of a causal filter: the
+//! first part of the record (32 768 samples) is processed like any record, and the rest in spans that fit into the
+//! processor cache, each preceded by the last samples of the previous span. Memory and time per sample then do not grow
+//! with the length of the record.
 //!
-//! The initial states act on the start alone. Their responses must have died away within the head
+//! The initial states have an effect on the start only. Their responses must have died away within the head
 //! ([`InitialStateResponses::have_died`](crate::criterion::initial_state_responses::InitialStateResponses::have_died));
-//! where a pole is so near the circle that they have not, the record is passed whole. So it is with
-//! weights, of which there is one a sample, with further inputs, and with a stationary past, whose
-//! columns are whitened one by one. The sums differ from those over the whole by rounding alone.
+//! if a pole is so near the unit circle that they have not, the record is processed as a whole. The same holds with
+//! weights, of which there is one per sample, with further inputs, and with a stationary past, whose columns are
+//! whitened one by one. The sums differ from those over the whole by rounding only.
 
 use std::ops::Range;
 
@@ -25,17 +25,17 @@ use super::{
     workspace::Workspace,
 };
 
-/// Samples of a span: its signals fill a quarter of the second cache.
+/// Samples of a span: its signals fill a quarter of the second-level cache.
 const SPAN: usize = 1 << 11;
 
-/// Samples of the first part. A record twice as long counts as long: others, all of some minutes,
-/// pass whole.
+/// Samples of the first part. Only a record of twice this length is processed in spans; others, up to some minutes, as
+/// a whole.
 const HEAD: usize = 1 << 15;
 
 impl Criterion<'_> {
-    /// Passes a record and calls `show` with the eliminated initial states, the places in the
-    /// workspace of the residuals that count, and the workspace; for a long record, span by span,
-    /// once for each span. Returns the eliminated initial states.
+    /// Processes a record and calls `show` with the eliminated initial states, the places in the workspace of the
+    /// residuals that count, and the workspace; for a long record, once for each span. Returns the eliminated initial
+    /// states.
     pub(super) fn pass(
         &self,
         theta: &[f64],
@@ -54,8 +54,8 @@ impl Criterion<'_> {
         states
     }
 
-    /// Passes a record span after span, with what the pass over the head has found (for the other
-    /// spans nothing); `None`, and nothing shown, where the record has to pass whole.
+    /// Processes a record span by span, with the results of the pass over the head (none for the other spans); `None`,
+    /// without a call of `show`, if the record has to be processed as a whole.
     pub(super) fn pass_in_spans(
         &self,
         theta: &[f64],
@@ -67,7 +67,7 @@ impl Criterion<'_> {
     ) -> Option<EliminatedStates> {
         let Data { e, u, .. } = self.data[record];
         let plain = self.weights.is_none() && self.initial != InitialState::Backcast && self.further.is_empty();
-        // Long lags leave the head no residuals.
+        // With long lags the head has no residuals.
         let least = 2 * (self.first + self.orders.nk) + SPAN;
         if !plain || u.len() < 2 * head || head < least {
             return None;
@@ -96,7 +96,7 @@ impl Criterion<'_> {
         Some(states)
     }
 
-    /// The signals of the next span, after their last samples, which are in front.
+    /// Computes the signals of the next span, after the last samples of the previous one at the front.
     fn next_span(
         &self,
         parts: &Polynomials<'_>,
@@ -146,7 +146,7 @@ impl Criterion<'_> {
 }
 
 impl Workspace {
-    /// Takes the last samples of the span of this length to the front.
+    /// Copies the last samples of the span of this length to the front.
     fn carry(&mut self, length: usize) {
         let pad = self.pad;
         let Self {

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use hoid_model::Orders;
 
-/// Polynomials of theta.
+/// The polynomials of theta.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Polynomials<'t> {
     pub a: &'t [f64],
@@ -15,7 +15,7 @@ pub(super) struct Polynomials<'t> {
 }
 
 impl<'t> Polynomials<'t> {
-    /// Theta in the order of [`Orders::parameter_names`]; what follows belongs to further inputs.
+    /// Splits theta in the order of [`Orders::parameter_names`]; the remaining elements belong to further inputs.
     pub fn split(orders: &Orders, theta: &'t [f64]) -> Self {
         let (a, rest) = theta.split_at(orders.na);
         let (b, rest) = rest.split_at(orders.nb);
@@ -41,14 +41,14 @@ pub(crate) enum Block {
 impl Block {
     pub(super) const ALL: [Self; 6] = [Self::A, Self::B, Self::C, Self::D, Self::F, Self::Further];
 
-    /// Its coefficients in theta.
+    /// Returns the place of its coefficients in theta.
     pub fn place(self, o: &Orders) -> Range<usize> {
         let counts = [o.na, o.nb, o.nc, o.nd, o.nf, 0];
         let from = counts[..self as usize].iter().sum();
         from..from + counts[self as usize]
     }
 
-    /// First shift, number of shifts, sign of psi.
+    /// Returns first shift, number of shifts, and sign of psi.
     pub(super) fn shifts(self, o: &Orders) -> (usize, usize, f64) {
         match self {
             Self::A => (1, o.na, -1.0),
@@ -56,7 +56,7 @@ impl Block {
             Self::C => (1, o.nc, 1.0),
             Self::D => (1, o.nd, -1.0),
             Self::F => (1, o.nf, -1.0),
-            // Their columns are made one input after the other.
+            // Their columns are computed for one input after the other.
             Self::Further => (0, 0, 1.0),
         }
     }

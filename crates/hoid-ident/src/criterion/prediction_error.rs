@@ -1,4 +1,4 @@
-//! The criterion: the records, the orders, and which residuals count.
+//! The criterion: records, orders, and the residuals that count.
 
 use hoid_model::{Orders, Record};
 
@@ -10,17 +10,17 @@ use crate::linalg::products::variance;
 pub(crate) struct Data<'a> {
     pub e: &'a [f64],
     pub u: &'a [f64],
-    /// Whether u has a constant that is not a response to e, an unknown as the initial states are.
+    /// True if u has a constant that is not a response to e; it is an unknown like the initial states.
     pub level: bool,
 }
 
 impl<'a> Data<'a> {
-    /// Input and output without a level.
+    /// Returns input and output without a level.
     pub fn new(e: &'a [f64], u: &'a [f64]) -> Self {
         Self { e, u, level: false }
     }
 
-    /// Input and output of each record.
+    /// Returns input and output of each record.
     pub fn of(records: &'a [Record]) -> Vec<Self> {
         records.iter().map(|r| Self::new(r.input(), r.output())).collect()
     }
@@ -35,22 +35,22 @@ pub(crate) struct Criterion<'a> {
     /// First sample whose residual counts, in each record; at least
     /// [`first_residual`](super::first_residual).
     pub first: usize,
-    /// Square roots of the weights of the residuals of each record, from the first residual on;
-    /// none if all count the same.
+    /// Square roots of the weights of the residuals of each record, from the first residual on; `None` if all weights
+    /// are equal.
     pub weights: Option<&'a [Vec<f64>]>,
-    /// Inputs in addition to e, each with its own B, F and nk; their coefficients follow those of
-    /// [`Self::orders`] in theta.
+    /// Inputs in addition to e, each with its own B, F and nk; their coefficients follow those of [`Self::orders`] in
+    /// theta.
     pub further: Vec<FurtherInput<'a>>,
 }
 
-/// Variance of the output around its mean, from sample `first` of each record on.
+/// Variance of the output about its mean, from sample `first` of each record on.
 pub(crate) fn output_variance(data: &[Data<'_>], first: usize) -> f64 {
     let outputs: Vec<&[f64]> = data.iter().map(|d| &d.u[first..]).collect();
     variance(&outputs)
 }
 
 impl<'a> Criterion<'a> {
-    /// The criterion over one record in which all residuals count the same.
+    /// Returns the criterion over one record with equal weights of all residuals.
     pub fn of_record(orders: Orders, data: Data<'a>, initial: InitialState, first: usize) -> Self {
         Self {
             orders,
@@ -88,7 +88,7 @@ impl<'a> Criterion<'a> {
         }
     }
 
-    /// The polynomial whose past is that of the noise: D, and A where there is no input.
+    /// Returns the polynomial whose past is that of the noise: D, or A without an input.
     pub(super) fn noise_poles<'t>(&self, parts: &Polynomials<'t>) -> &'t [f64] {
         if self.orders.nb == 0 && self.orders.nd == 0 {
             parts.a

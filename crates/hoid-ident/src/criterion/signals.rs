@@ -1,5 +1,5 @@
-//! The signals of a record: w, v and eps with the best initial states in them, and those whose
-//! shifts are the columns of psi.
+//! The signals of a record: w, v and eps with the best initial states, and the signals whose shifts are the columns of
+//! psi.
 
 use std::ops::Range;
 
@@ -25,7 +25,7 @@ pub(super) struct EliminatedStates {
 }
 
 impl Criterion<'_> {
-    /// w, v and eps of a record, or of its first part, with the best initial states in them.
+    /// Computes w, v and eps of a record, or of its first part, with the best initial states.
     pub(super) fn residual_pass(
         &self,
         theta: &[f64],
@@ -86,8 +86,7 @@ impl Criterion<'_> {
         states
     }
 
-    /// `w = B s` and `v = A u - w` of these samples, the first of which is at `from` in the
-    /// workspace.
+    /// Computes `w = B s` and `v = A u - w` of these samples, the first of which is at `from` in the workspace.
     pub(super) fn response(
         &self,
         parts: &Polynomials<'_>,
@@ -100,7 +99,7 @@ impl Criterion<'_> {
         let u = &data.u[samples.clone()];
         let (w, v) = (&mut ws.w[from..to], &mut ws.v[from..to]);
         match *parts.b {
-            // The orders of the operator in one pass.
+            // The orders of the operator: B has two coefficients, in one pass.
             [b0, b1] => {
                 let inputs = ws.s[from..to].iter().zip(&ws.s[from - 1..to - 1]).zip(u);
                 for ((w, v), ((s0, s1), u)) in w.iter_mut().zip(&mut *v).zip(inputs) {
@@ -130,7 +129,7 @@ impl Criterion<'_> {
         }
     }
 
-    /// The signals whose shifts are the columns of psi.
+    /// Computes the signals whose shifts are the columns of psi.
     pub(super) fn gradient_pass(&self, theta: &[f64], blocks: &[Block], data: Data<'_>, ws: &mut Workspace) {
         let parts = Polynomials::split(&self.orders, theta);
         let (o, pad) = (&self.orders, ws.pad);
@@ -169,8 +168,8 @@ impl Criterion<'_> {
         }
     }
 
-    /// `(D/C) u`; with a stationary past u, because each shift is cut at the first residual before
-    /// it is whitened.
+    /// Computes `(D/C) u`; with a stationary past u itself, because each shift is truncated at the first residual
+    /// before it is whitened.
     fn filter_output(&self, parts: &Polynomials<'_>, data: Data<'_>, ws: &mut Workspace) {
         if self.orders.na == 0 {
             return;
@@ -186,8 +185,8 @@ impl Criterion<'_> {
         }
     }
 
-    /// `s = (1/F) e(t-nk)`, of which w is a moving sum: `w = B s`. Where the initial states are
-    /// estimated, w may differ from the response that starts at rest by a free response of 1/F.
+    /// Computes `s = (1/F) e(t-nk)`, of which w is a moving sum: `w = B s`. If the initial states are estimated, w may
+    /// differ from the response from rest by a free response of 1/F.
     fn filter_input(&self, parts: &Polynomials<'_>, data: Data<'_>, ws: &mut Workspace) {
         let (pad, n) = (ws.pad, data.u.len());
         if self.orders.nb == 0 {
@@ -198,7 +197,7 @@ impl Criterion<'_> {
         divide(parts.f, &data.e[..pad + n - from], &mut ws.s[from..]);
     }
 
-    /// `(D/C) s`; with a stationary past s.
+    /// Computes `(D/C) s`; with a stationary past s itself.
     fn whiten_input(&self, parts: &Polynomials<'_>, ws: &mut Workspace) {
         if self.orders.nb == 0 {
             return;

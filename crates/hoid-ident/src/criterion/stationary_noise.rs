@@ -1,5 +1,4 @@
-//! The past of stationary noise, for the rule that MATLAB's toolbox and Box and Jenkins call
-//! backcasting.
+//! The past of stationary noise, for the rule that MATLAB's toolbox and Box and Jenkins call backcasting.
 //!
 //! `v = (C/D) eps` has the state of the innovations form with r = max(nc, nd)
 //!
@@ -23,8 +22,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::linalg::least_squares::add_scaled;
 
-/// Doublings of the Lyapunov sum: 2^60 terms are more than any pole that differs from one in double
-/// precision needs.
+/// Doublings of the Lyapunov sum: 2^60 terms suffice for any pole that differs from one in double precision.
 const DOUBLINGS: usize = 60;
 
 /// Covariance of the initial state of a noise model.
@@ -37,8 +35,7 @@ pub(crate) struct StationaryNoise {
 }
 
 impl StationaryNoise {
-    /// The past of `(C/D) eps` with unit variance of eps. `None` when D has a root on or outside
-    /// the unit circle.
+    /// Returns the past of `(C/D) eps` with unit variance of eps. `None` if D has a root on or outside the unit circle.
     pub fn of(c: &[f64], d: &[f64]) -> Option<Self> {
         let r = c.len().max(d.len());
         let coefficient = |p: &[f64], i: usize| p.get(i).copied().unwrap_or(0.0);
@@ -61,7 +58,7 @@ impl StationaryNoise {
         self.gain.len()
     }
 
-    /// Response of the residuals to `z_j`, made of the responses to each `g_i`.
+    /// Response of the residuals to `z_j`, composed of the responses to each `g_i`.
     pub fn response(&self, responses: &[Vec<f64>], j: usize) -> Vec<f64> {
         let longest = responses.iter().map(Vec::len).max().unwrap_or(0);
         let mut column = vec![0.0; longest];
@@ -71,10 +68,10 @@ impl StationaryNoise {
         column
     }
 
-    /// `(1/2) y' dP y` for the coefficients of C and of D, at the best z: what the penalty adds to
+    /// Computes `(1/2) y' dP y` for the coefficients of C and of D at the best z: the contribution of the penalty to
     /// the descent `psi' eps`.
     pub fn descent(&self, z: &[f64], nc: usize, nd: usize) -> (Vec<f64>, Vec<f64>) {
-        // No state, or none with a variance.
+        // No state, or no state with a variance.
         if self.states() == 0 {
             return (Vec::new(), Vec::new());
         }
@@ -90,7 +87,7 @@ impl StationaryNoise {
         )
     }
 
-    /// `L^-T z`; a direction without variance keeps its zero.
+    /// Computes `L^-T z`; a direction without variance remains zero.
     fn solve_transposed(&self, z: &[f64]) -> DVector<f64> {
         let r = z.len();
         let mut y = DVector::zeros(r);
@@ -104,8 +101,8 @@ impl StationaryNoise {
     }
 }
 
-/// `P = Phi P Phi' + k k'` by doubling: `P <- P + A P A'`, `A <- A^2` (B. D. O. Anderson and J. B.
-/// Moore, *Optimal Filtering*, 1979, section 6.7). `None` when the sum does not settle.
+/// Solves `P = Phi P Phi' + k k'` by doubling: `P <- P + A P A'`, `A <- A^2` (B. D. O. Anderson and J. B. Moore,
+/// *Optimal Filtering*, 1979, section 6.7). `None` if the sum does not converge.
 fn lyapunov(transition: &DMatrix<f64>, gain: &DVector<f64>) -> Option<DMatrix<f64>> {
     let mut sum = gain * gain.transpose();
     let mut power = transition.clone();

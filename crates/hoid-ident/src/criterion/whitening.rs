@@ -1,4 +1,4 @@
-//! The whitening filter D/C, also of a signal whose past has gone through it already.
+//! The whitening filter D/C, also for a signal whose past has been filtered already.
 
 use hoid_core::filter::{SecondOrder, divide_from};
 
@@ -22,7 +22,7 @@ pub(super) fn divide_and_whiten([f1, f2]: [f64; 2], d1: f64, x: &[f64], y: &mut 
     }
 }
 
-/// `y = (D/C) x` from index `from` on, zero before: zero state of 1/C, x as it is before.
+/// Computes `y = (D/C) x` from index `from` on with zeros before: zero state of 1/C, x unchanged before.
 pub(super) fn whiten(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize) {
     if from >= x.len() {
         y.fill(0.0);
@@ -32,8 +32,7 @@ pub(super) fn whiten(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize
     whiten_on(c, d, x, y, from);
 }
 
-/// `y = (D/C) x` from index `from` on; anything before is what has gone into the filter and come
-/// out of it so far.
+/// Computes `y = (D/C) x` from index `from` on; the values before it are the previous inputs and outputs of the filter.
 pub(super) fn whiten_on(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize) {
     match *d {
         // The first lag in the same pass as the copy.

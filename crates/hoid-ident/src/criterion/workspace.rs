@@ -1,4 +1,4 @@
-//! The signals of a record at one theta, in memory that is kept from one fit to the next.
+//! The signals of a record at one theta, in memory that is reused by the next fit.
 
 use std::{
     cell::Cell,
@@ -9,8 +9,7 @@ use hoid_model::Orders;
 
 use super::further_input::{FurtherInput, FurtherSignals};
 
-/// Signals of one record at one theta. Each has `pad` zeros in front, so that a shift needs no case
-/// distinction.
+/// Signals of one record at one theta. Each is preceded by `pad` zeros, so that a shift needs no case distinction.
 #[derive(Debug, Default)]
 pub(crate) struct Workspace {
     pub(super) pad: usize,
@@ -20,22 +19,22 @@ pub(crate) struct Workspace {
     pub(super) eps: Vec<f64>,
     pub(super) filtered: [Vec<f64>; 5],
     pub(super) scratch: Vec<f64>,
-    /// Those of further inputs.
+    /// Signals of the further inputs.
     pub(super) further: Vec<FurtherSignals>,
 }
 
 thread_local! {
-    /// The workspace that the last fit on this thread has left.
+    /// The workspace of the last fit on this thread.
     static LEFT: Cell<Option<Workspace>> = const { Cell::new(None) };
 }
 
-/// A workspace for one fit, kept for the next on the same thread: getting fresh pages for each fit
-/// costs a quarter of a study's time. Contents of it is written before it is read.
+/// A workspace for one fit, reused by the next on the same thread: allocating new pages for each fit costs a quarter of
+/// a study's time. Its contents are written before they are read.
 #[derive(Debug, Default)]
 pub(crate) struct Borrowed(Workspace);
 
 impl Workspace {
-    /// The workspace of this thread, or a new one when it is in use.
+    /// Returns the workspace of this thread, or a new one if it is in use.
     pub fn of_thread() -> Borrowed {
         Borrowed(LEFT.take().unwrap_or_default())
     }
@@ -63,13 +62,13 @@ impl Drop for Borrowed {
     }
 }
 
-/// Longest signals that are kept between fits, samples: a record of an hour at 100 Hz would occupy
-/// the thread for ever.
+/// Length in samples of the longest signals that are kept between fits: a record of an hour at 100 Hz would occupy the
+/// memory of the thread permanently.
 const KEPT: usize = 1 << 17;
 
 impl Workspace {
-    /// Makes room for a record, for the signals that these orders have; every pass writes all of a
-    /// signal before it reads it, zeros in front included.
+    /// Allocates memory for a record, for the signals that these orders have; every pass writes a whole signal, its
+    /// leading zeros included, before it reads the signal.
     pub(super) fn make_room(&mut self, o: &Orders, further: &[FurtherInput<'_>], n: usize) {
         let lags = |input: &FurtherInput<'_>| input.orders.nb.max(o.nc + input.orders.nf);
         let own = o.na.max(o.nb).max(o.nd).max(o.nc + o.nf);
@@ -93,8 +92,8 @@ impl Workspace {
     }
 }
 
-/// True for the poles of the operator with a noise model of first order or none, whose signal of F
-/// comes from one pass.
+/// True for the poles of the operator with a noise model of first order or none, whose signal of F is computed in one
+/// pass.
 pub(super) fn passes_once(o: &Orders) -> bool {
     (o.nc, o.nf) == (0, 2) && o.nd <= 1
 }

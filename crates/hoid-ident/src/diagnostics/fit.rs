@@ -1,8 +1,8 @@
 //! The verdict of a fit of polynomials.
 //!
-//! Where the coefficients do not correspond to any operator, the response to e counts as known when
-//! b as a whole differs from zero: `b' P_b^-1 b`, with P_b the covariance of b, beyond the 95 %
-//! point of chi-square with nb degrees of freedom (A. Wald, *Trans. AMS* 54 (1943) 426-482).
+//! If the coefficients do not correspond to any operator, the response to e counts as known if b as a whole differs
+//! from zero: `b' P_b^-1 b`, with P_b the covariance of b, exceeds the 95 % point of chi-square with nb degrees of
+//! freedom (A. Wald, *Trans. AMS* 54 (1943) 426-482).
 
 use hoid_model::{Finding, NotConvertible, Orders, Record, Verdict};
 use nalgebra::{DMatrix, DVector};
@@ -14,16 +14,16 @@ use super::{
 };
 use crate::{Choice, Fit, IdentError};
 
-/// Share of the power of u below which residuals are the rounding of the data.
+/// Share of the power of u below which residuals are rounding of the data.
 const ROUNDING: f64 = 1e-22;
-/// Residuals for each unknown below which the numbers of a fit mean nothing.
+/// Residuals per unknown below which the results of a fit carry no information.
 const FEWEST_RESIDUALS: usize = 5;
-/// Level at which b differs from zero.
+/// Significance level of the test of b against zero.
 const LEVEL: f64 = 0.05;
 
 impl Fit {
-    /// Verdict on the fit, on the records that it was fitted to and with the search that chose its
-    /// orders, where there was one. The kinds of findings are those of the [module](super).
+    /// Returns the verdict on the fit, for the records that it was fitted to and the search that chose its orders, if
+    /// any. The kinds of findings are those of the [module](super).
     ///
     /// # Errors
     /// As [`Fit::residuals`].
@@ -48,13 +48,13 @@ impl Fit {
         Ok(Verdict::of(all))
     }
 
-    /// Residuals as a share of the power of u, if they are the rounding of the data.
+    /// Returns the residuals as a share of the power of u, if they are rounding of the data.
     pub fn rounding(&self) -> Option<f64> {
         let share = self.loss / self.output_variance;
         (share < ROUNDING).then_some(share)
     }
 
-    /// Fewer residuals than the unknowns need.
+    /// Returns a finding if there are too few residuals for the unknowns.
     fn too_few(&self) -> Option<Finding> {
         let unknowns = self.model.theta().len() + self.states;
         (self.covariance.is_some() && self.residuals < FEWEST_RESIDUALS * unknowns).then(|| {
@@ -69,7 +69,7 @@ impl Fit {
         })
     }
 
-    /// Results of the system from e to u, without a record.
+    /// Returns findings about the system from e to u that need no record.
     fn system_findings(&self) -> Vec<Finding> {
         let mut all = Vec::new();
         if !self.model.is_stable() {
@@ -88,7 +88,7 @@ impl Fit {
                 all.extend(pole_findings(&operator, self.model.sample_time()));
                 return all;
             }
-            // Models that are not meant to be an operator.
+            // Models that are not meant to be operators.
             Err(
                 NotConvertible::OtherOrders { .. }
                 | NotConvertible::PolesInBoth { .. }
@@ -108,7 +108,7 @@ impl Fit {
         all
     }
 
-    /// Whether b differs from zero; `None` where its covariance is not known or singular.
+    /// True if b differs from zero; `None` if its covariance is not known or singular.
     fn responds(&self) -> Option<bool> {
         let covariance = self.covariance.as_ref()?;
         let names = self.orders().parameter_names();
@@ -145,7 +145,7 @@ impl Fit {
 
     fn residual_findings(&self, measures: &ResidualMeasures) -> Vec<Finding> {
         if self.instrumented {
-            // Instruments ask nothing of the noise, and residuals of a closed loop follow e.
+            // Instrumental variables assume nothing about the noise, and residuals of a closed loop follow e.
             let note = |finding: Finding| {
                 let words = format!("{}; the instruments do not need it white", finding.message);
                 Finding::note(finding.kind, words)
@@ -157,14 +157,15 @@ impl Fit {
                 .chain(measures.leverage())
                 .collect();
         }
-        // A robust loss has taken the weight of single samples.
+        // A robust loss has reduced the weight of single samples.
         let leverage = measures.leverage().filter(|_| !self.robust);
         let others = [measures.coloured(), measures.structure()];
         others.into_iter().flatten().chain(leverage).collect()
     }
 }
 
-/// A delay at the end of the range that was searched with the other orders of the chosen model.
+/// Returns a finding about a delay at the end of the range that was searched together with the other orders of the
+/// chosen model.
 fn delay_at_end(choice: &Choice) -> Option<Finding> {
     let chosen = choice.fit.orders();
     let same = |o: &Orders| Orders { nk: chosen.nk, ..*o } == chosen;

@@ -17,8 +17,8 @@ use crate::{
 };
 
 impl GreyBoxFit {
-    /// Verdict on the fit, on the records that it was fitted to, in their order. The kinds of
-    /// findings are those of the [module](super).
+    /// Returns the verdict on the fit, for the records that it was fitted to, in their order. The kinds of findings are
+    /// those of the [module](super).
     ///
     /// # Errors
     /// As [`crate::Fit::residuals`].
@@ -46,7 +46,7 @@ impl GreyBoxFit {
     }
 
     fn operator_findings(&self) -> Vec<Finding> {
-        // One operator for all records, or one for each.
+        // One operator for all records, or one for each record.
         let places = &self.layout.positions;
         let several = places.iter().any(|of_record| *of_record != places[0]);
         let records = if several { places.len() } else { 1 };
@@ -87,7 +87,7 @@ impl GreyBoxFit {
         all
     }
 
-    /// Doubts where the operator is not the same throughout the records, or a stretch carries it.
+    /// Returns doubts if the operator is not constant over the records, or a stretch dominates the fit.
     fn constancy_findings(&self, records: &[Record]) -> Option<Vec<Finding>> {
         let layout = &self.layout;
         let initial = self.polynomial_fit(0).initial_state();

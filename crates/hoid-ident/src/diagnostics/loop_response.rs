@@ -1,27 +1,27 @@
-//! Whether the error answers to the output, as it does in a loop.
+//! Test of whether the error responds to the output, as it does in a loop.
 //!
-//! In a loop every change of u comes back in e. For the latest [`LATEST_S`] of u the question is whether they predict e
-//! better than the errors before and the outputs before those do (C. W. J. Granger, *Econometrica* 37 (1969) 424-438).
-//! What two runs have in common, a forcing function, is in both pasts; what is u's own is not.
+//! In a loop every change of u returns in e. The test is whether the latest [`LATEST_S`] of u predict e better than the
+//! earlier errors and outputs do (C. W. J. Granger, *Econometrica* 37 (1969) 424-438). A common component of both
+//! signals, such as a forcing function, is in both pasts; the own component of u is not.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::whitened::{NOISE, orthogonal, thinning};
 
-/// Latest outputs that are asked, s.
+/// Latest outputs that are tested, s.
 const LATEST_S: f64 = 0.25;
 
-/// How e answers to u.
+/// Response of e to u.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoopResponse {
-    /// Probability of so much where it does not.
+    /// Probability of such a share by chance, if e does not respond to u.
     pub p_value: f64,
-    /// Share of the part of e that the past leaves unexplained and that the latest outputs explain.
+    /// Share of the part of e not explained by the past that the latest outputs explain.
     pub share: f64,
 }
 
-/// For samples `from..`. `None` if there is too little, or something is not a number or does not move.
+/// Tests the samples `from..`. `None` if there are too few data, or a value is not a number or a signal is constant.
 pub fn answer(e: &[f64], u: &[f64], from: usize, sample_time_s: f64) -> Option<LoopResponse> {
     let thin = thinning(sample_time_s);
     let latest = (LATEST_S / (thin as f64 * sample_time_s)).round().max(1.0) as usize;

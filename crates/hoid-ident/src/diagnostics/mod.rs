@@ -1,34 +1,34 @@
 //! Findings for and against a result.
 //!
 //! Each rule is one observation with its own kind ([`hoid_model::Finding`]), and the [`hoid_model::Verdict`] follows
-//! from them. The limits are where they are used.
+//! from them. The limits are defined where they are used.
 //!
 //! | kind | observation |
 //! |---|---|
-//! | `not-converged`, `border` | how the search ended |
-//! | `delay-at-bound`, `parameter-at-bound` | the delay lies at the end of its range, another at a bound |
+//! | `not-converged`, `border` | termination of the search |
+//! | `delay-at-bound`, `parameter-at-bound` | the delay is at the end of its range, another parameter at a bound |
 //! | `unstable` | the model from e to u is unstable |
 //! | `gain`, `undetermined-parameter` | standard errors as large as the values |
 //! | `not-convertible` | coefficients that do not correspond to any operator |
-//! | `neuromuscular-lag` | the two poles describe no neuromuscular system |
+//! | `neuromuscular-lag` | the two poles do not describe a neuromuscular system |
 //! | `not-constant` | parameters that change within the records, or from one to the next |
-//! | `residuals-not-white`, `structure`, `leverage` | sizes in the residuals |
-//! | `no-response` | nothing that could not be chance |
-//! | `other-input`, `inputs-together` | what is seen besides the error |
-//! | `exact-fit`, `no-change`, `change-point` | worth knowing; the result remains valid |
+//! | `residuals-not-white`, `structure`, `leverage` | properties of the residuals |
+//! | `no-response` | no response beyond chance |
+//! | `other-input`, `inputs-together` | inputs in addition to the error |
+//! | `exact-fit`, `no-change`, `change-point` | information; the result remains valid |
 //!
 //! | file | contents |
 //! |---|---|
-//! | `residuals` | how far residuals are from white; also for the family |
+//! | `residuals` | deviation of residuals from white noise; also for the family |
 //! | `constancy` | whether parameters change; also for the family |
-//! | `residual_response` | whether a response is left that a model does not have |
-//! | `loop_response` | whether e answers to u, as it does in a loop |
-//! | `no_response` | whether u responds to e at all |
+//! | `residual_response` | test for a response that a model does not have |
+//! | `loop_response` | test of whether e responds to u, as it does in a loop |
+//! | `no_response` | test of whether u responds to e at all |
 //! | `operator` | gains, poles and delay of an operator |
-//! | `operator_step` | what a stretch of data shows against an operator |
-//! | `second_opinion` | fits to records that no single sample can carry |
-//! | `other_inputs` | whether u responds to a recorded target besides e |
-//! | `whitened` | least squares after an autoregression, for those that need one |
+//! | `operator_step` | evidence of a stretch of data against an operator |
+//! | `second_opinion` | fits to records in which no single sample can dominate |
+//! | `other_inputs` | test of whether u responds to a recorded target in addition to e |
+//! | `whitened` | least squares after an autoregression, for the tests that need it |
 //! | `fit`, `grey_box`, `sigmoid` | the verdict of each kind of fit |
 
 pub(crate) mod constancy;

@@ -1,18 +1,18 @@
-//! Whether u responds to e at all.
+//! Test of whether u responds to e at all.
 //!
-//! A search over forms, delays and orders finds a response in any two records; what it found carries little information
-//! about whether there is one. The question is asked beforehand, of all forms at once. Both channels are whitened by an
-//! autoregression each, so that nothing slow counts for many samples. At the frequencies `omega_k` of the record up to
-//! [`HIGHEST_RAD_S`] the whitened output is regressed on a gain, a lead and a lag of e after a typical neuromuscular
-//! system and a delay,
+//! A search over forms, delays and orders finds a response in any two records; its result carries little information on
+//! whether there is one. The test is done beforehand, for all forms at once. Both channels are whitened by an
+//! autoregression each, so that a slow component does not count for many samples. At the frequencies `omega_k` of the
+//! record up to [`HIGHEST_RAD_S`] the whitened output is regressed on a gain, a lead and a lag of e after a typical
+//! neuromuscular system and a delay,
 //!
 //! `U_k = (A_u/A_e) N e^{-j omega tau} (b_1 + b_2 j omega + b_3/(j omega + a)) E_k + R_k`,
 //!
-//! b real, and the share of the power of U that this explains, the largest over delays of [`DELAYS_S`], is T. Records
-//! of the same spectra without a relation have the phases of E drawn at random (J. Theiler et al., *Physica D* 58
-//! (1992) 77-94); T of [`SURROGATES`] of them is what a search of this kind finds in nothing. Where u does not depend
-//! on e, T is one more draw: the probability that it exceeds all is 1/([`SURROGATES`] + 1), whatever the spectra are.
-//! Only what e did before counts, so that an e that answers to u alone is not a response. Several records share b.
+//! b real, and T is the share of the power of U that this explains, maximised over delays of [`DELAYS_S`]. Records with
+//! the same spectra but without a relation have random phases of E (J. Theiler et al., *Physica D* 58 (1992) 77-94); T
+//! of [`SURROGATES`] of them is the distribution of such a search without a response. If u does not depend on e, T is
+//! one more draw: the probability that it exceeds all is 1/([`SURROGATES`] + 1), whatever the spectra are. Only the
+//! past of e counts, so that an e that responds to u is not counted as a response. Several records share b.
 
 use std::f64::consts::{PI, TAU};
 
@@ -26,7 +26,7 @@ use rand_chacha::{
 use super::whitened::{NOISE, thinning};
 use crate::{family::noise::NoiseProducts, frequency::spectrum, linalg::least_squares::solve_symmetric};
 
-/// Highest frequency that is asked, rad/s.
+/// Highest frequency that is tested, rad/s.
 const HIGHEST_RAD_S: f64 = 25.0;
 /// Delays that are tried, s.
 const DELAYS_S: [f64; 8] = [0.05, 0.1, 0.16, 0.23, 0.31, 0.4, 0.52, 0.7];
@@ -34,31 +34,31 @@ const DELAYS_S: [f64; 8] = [0.05, 0.1, 0.16, 0.23, 0.31, 0.4, 0.52, 0.7];
 const LAG_RATE: f64 = 0.3;
 /// Typical neuromuscular system: rad/s, and damping.
 const NEUROMUSCULAR: (f64, f64) = (11.0, 0.4);
-/// Records without a relation that are drawn.
+/// Number of surrogate records without a relation.
 const SURROGATES: usize = 1999;
 /// Least number of frequencies.
 const FEWEST: usize = 12;
 const SEED: u64 = 0x686f_6964;
 const COLUMNS: usize = 3;
 
-/// Whether u responds to e.
+/// Result of the test of whether u responds to e.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Response {
     /// T: share of the power of the whitened output that a response explains.
     pub share: f64,
-    /// Surrogates whose share is at least as large.
+    /// Number of surrogates whose share is at least as large.
     pub reached_by: usize,
-    /// Surrogates that were drawn.
+    /// Number of surrogates.
     pub surrogates: usize,
 }
 
 impl Response {
-    /// Probability of so much where there is no response.
+    /// Probability of such a share if there is no response.
     pub fn p_value(&self) -> f64 {
         (self.reached_by + 1) as f64 / (self.surrogates + 1) as f64
     }
 
-    /// That there is none, where the records do not determine otherwise.
+    /// Returns the finding that there is no response, unless the records show one.
     pub fn finding(&self) -> Option<Finding> {
         (self.reached_by > 0).then(|| {
             Finding::undetermined(
@@ -75,18 +75,18 @@ impl Response {
     }
 }
 
-/// One record at its frequencies.
+/// The spectra of one record.
 struct Spectra {
     /// `E_k` and `U_k`, whitened.
     e: Vec<Complex64>,
     u: Vec<Complex64>,
     /// Columns without the delay and E: `(A_u/A_e) N G_j`.
     columns: Vec<[Complex64; COLUMNS]>,
-    /// For each delay `e^{-j omega tau}`.
+    /// `e^{-j omega tau}` for each delay.
     delays: Vec<Vec<Complex64>>,
 }
 
-/// For records of a person; `None` if there is too little, or something is not a number or does not move.
+/// Tests records of a person; `None` if there are too few data, or a value is not a number or a signal is constant.
 pub fn response(records: &[Record]) -> Option<Response> {
     let all: Option<Vec<Spectra>> = records.iter().map(Spectra::of).collect();
     let all = all?;
@@ -95,7 +95,7 @@ pub fn response(records: &[Record]) -> Option<Response> {
     }
     let power: f64 = all.iter().flat_map(|s| &s.u).map(Complex64::norm_sqr).sum();
     let inverse = inverse_gram(&all)?;
-    // For each frequency and delay the products of columns and output; a surrogate turns them.
+    // Products of columns and output for each frequency and delay; a surrogate changes their phases.
     let products: Vec<[[Complex64; COLUMNS]; DELAYS_S.len()]> = all.iter().flat_map(Spectra::products).collect();
     let mut turns = vec![Complex64::ONE; products.len()];
     let share = |turns: &[Complex64]| -> f64 {
@@ -130,8 +130,8 @@ pub fn response(records: &[Record]) -> Option<Response> {
     })
 }
 
-/// Inverse by rows of `sum Re(x_i* x_j)`, which no delay and no phase of E changes; `None` where columns are not
-/// independent.
+/// Inverse by rows of `sum Re(x_i* x_j)`, which depends on no delay and no phase of E; `None` if columns are linearly
+/// dependent.
 fn inverse_gram(all: &[Spectra]) -> Option<Vec<f64>> {
     let mut gram = [0.0; COLUMNS * COLUMNS];
     for spectra in all {
@@ -190,9 +190,9 @@ impl Spectra {
     }
 }
 
-/// The thinned channel after its own autoregression, and its coefficients.
+/// Returns the decimated channel after its own autoregression, and its coefficients.
 fn whitened(channel: &[f64], thin: usize) -> Option<(Vec<f64>, Vec<f64>)> {
-    // The mean of the removed part contains the faster components.
+    // The mean of the discarded samples contains the faster components.
     let mut thinned: Vec<f64> = (channel.chunks_exact(thin)).map(mean).collect();
     let mean = mean(&thinned);
     thinned.iter_mut().for_each(|v| *v -= mean);
@@ -216,9 +216,9 @@ fn filter(d: &[f64], omega_ts: f64) -> Complex64 {
     })
 }
 
-/// `sum x_t e^{-j omega t}` in these bins.
+/// Computes `sum x_t e^{-j omega t}` in these bins.
 fn coefficients(values: &[f64], bins: std::ops::RangeInclusive<usize>) -> Vec<Complex64> {
-    // Amplitudes of sinusoids there: a record counts by its length here.
+    // Amplitudes of sinusoids there: a record has a weight proportional to its length.
     let scale = 0.5 * values.len() as f64;
     spectrum::coefficients(values)[bins].iter().map(|x| x * scale).collect()
 }

@@ -1,5 +1,5 @@
-//! Findings against an operator: gains that are not distinguished from zero, poles of no person, a
-//! delay at the end of its range.
+//! Findings against an operator: gains that do not differ from zero, implausible poles, a delay at the end of its
+//! range.
 
 use std::f64::consts::PI;
 
@@ -10,13 +10,13 @@ use hoid_model::{
 
 use crate::{Reason, Termination};
 
-/// Standard errors from zero below which a value counts as not determined.
+/// Standard errors from zero below which a value counts as undetermined.
 const LEAST_ERRORS: f64 = 2.0;
-/// Damping beyond which the faster of two real poles is 34 times the slower: a lag.
+/// Damping above which the faster of two real poles is 34 times the slower: a lag.
 const LARGEST_DAMPING: f64 = 3.0;
 
-/// True if a value is less than two of its standard errors from zero. A value without a standard
-/// error was given, not estimated.
+/// True if a value is less than two of its standard errors from zero. A value without a standard error was given, not
+/// estimated.
 pub fn is_open(e: &Estimate) -> bool {
     e.standard_error
         .is_some_and(|error| e.value.abs() < LEAST_ERRORS * error)
@@ -28,8 +28,9 @@ pub fn leads_backwards(o: &OperatorEstimate) -> bool {
     sign(&o.k_e) * sign(&o.k_e_dot) < 0.0
 }
 
-/// Gains and lead that are not determined, and leads that no one has. Each operator has a label, as ` of record 2`,
-/// empty for a single one; where K_e and K_e_dot of all of them are open, nothing is known about the response.
+/// Returns findings about gains and leads that are not determined, and about negative leads. Each operator has a label,
+/// such as ` of record 2`, empty for a single one; if K_e and K_e_dot of all of them are undetermined, nothing is known
+/// about the response.
 pub fn gain_findings(operators: &[(&str, OperatorEstimate)]) -> Vec<Finding> {
     let mut open = Vec::new();
     let mut all_open = !operators.is_empty();
@@ -55,7 +56,7 @@ pub fn gain_findings(operators: &[(&str, OperatorEstimate)]) -> Vec<Finding> {
         .collect()
 }
 
-/// A lead below zero: no one has one; a gain and a lead that represent a lag do.
+/// Returns a finding about a negative lead: no person has one; a gain and a lead that represent a lag do.
 fn negative_lead(negative: &[String]) -> Option<Finding> {
     (!negative.is_empty()).then(|| {
         Finding::doubt(
@@ -69,7 +70,7 @@ fn negative_lead(negative: &[String]) -> Option<Finding> {
     })
 }
 
-/// omega_nm and zeta_nm that are not determined, or no person's.
+/// Returns findings about omega_nm and zeta_nm that are undetermined, or implausible for a person.
 pub fn pole_findings(operator: &OperatorEstimate, sample_time: SampleTime) -> Vec<Finding> {
     let named = [("omega_nm", operator.omega_nm_rad_s), ("zeta_nm", operator.zeta_nm)];
     let open: Vec<String> = named
@@ -81,7 +82,7 @@ pub fn pole_findings(operator: &OperatorEstimate, sample_time: SampleTime) -> Ve
     not_determined(&open).into_iter().chain(lag).collect()
 }
 
-/// Poles that describe a lag: omega_nm (rad/s) beyond what the sampling shows, or a damping that
+/// Returns a finding about poles that describe a lag: omega_nm (rad/s) above what the sampling shows, or a damping that
 /// sets the two poles far apart.
 pub fn neuromuscular_finding(omega_nm_rad_s: f64, zeta_nm: f64, sample_time: SampleTime) -> Option<Finding> {
     let nyquist = PI / sample_time.s();
@@ -114,7 +115,7 @@ fn not_determined(open: &[String]) -> Option<Finding> {
     })
 }
 
-/// A delay in s at the end of the range in which it was searched for.
+/// Returns a finding about a delay in s at the end of its search range.
 pub(super) fn delay_finding(tau_s: f64, (low, high): (f64, f64), of: &str) -> Option<Finding> {
     (high > low && (tau_s <= low || tau_s >= high)).then(|| {
         Finding::doubt(
@@ -127,7 +128,7 @@ pub(super) fn delay_finding(tau_s: f64, (low, high): (f64, f64), of: &str) -> Op
     })
 }
 
-/// How the search ended, where that matters.
+/// Returns a finding about the termination of the search, if it matters.
 pub(super) fn search_finding(termination: Termination) -> Option<Finding> {
     match termination.reason {
         Reason::Border => Some(Finding::doubt(
@@ -200,7 +201,7 @@ mod tests {
             "{}",
             found[0].message
         );
-        // Both channels the other way round: the lead is right.
+        // Both channels with reversed sign: the lead is correct.
         let flipped = OperatorEstimate {
             k_e: e(-0.09, 0.009),
             k_e_dot: e(-0.036, 0.004),

@@ -1,7 +1,7 @@
-//! Evidence of a stretch of data against an operator that was found otherwise: one step towards its own fit.
+//! Evidence of a stretch of data against an operator from other data: one step towards the fit of the stretch.
 //!
-//! The operator stays constant, a noise model `D v = eps` of order [`NOISE`] is fitted to what it leaves of u, and with
-//! `psi = -d eps/d eta` for `eta = [K_e, K_e_dot, omega_nm, zeta_nm, tau_e]`
+//! The operator is held constant, a noise model `D v = eps` of order [`NOISE`] is fitted to the part of u that it does
+//! not explain, and with `psi = -d eps/d eta` for `eta = [K_e, K_e_dot, omega_nm, zeta_nm, tau_e]`
 //!
 //! `delta = (psi' psi)^-1 psi' eps`
 //!
@@ -29,23 +29,23 @@ use crate::{
 
 /// Order of the noise model.
 const NOISE: usize = 4;
-/// Parameters of the operator.
+/// Number of parameters of the operator.
 const OPERATOR: usize = 5;
 
-/// The step in one parameter that fits a record better.
+/// The change of one parameter for which a record is fitted better.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OperatorStep {
     /// Name of the parameter.
     pub name: &'static str,
     /// The step with its standard error, in the unit of the parameter.
     pub by: Estimate,
-    /// Blocks that the standard error rests on.
+    /// Number of blocks from which the standard error is computed.
     pub blocks: usize,
 }
 
 impl OperatorStep {
-    /// Probability of so large a step where there is none, by Student's distribution: the operator has this standard
-    /// error itself, and steps up to `grid` are none.
+    /// Probability of such a step if there is no difference, by Student's distribution: the operator itself has this
+    /// standard error, and steps up to `grid` count as zero.
     pub fn p_value(&self, error_of_operator: f64, grid: f64) -> f64 {
         let Some(own) = self.by.standard_error else { return 1.0 };
         let t = (self.by.value.abs() - grid).max(0.0) / own.hypot(error_of_operator);
@@ -54,8 +54,8 @@ impl OperatorStep {
     }
 }
 
-/// The steps of K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm and tau_e (s). `None` if the record is too short or carries
-/// no information.
+/// Computes the steps of K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm and tau_e (s). `None` if the record is too short
+/// or carries no information.
 pub fn operator_step(operator: &OperatorParameters, record: &Record) -> Option<[OperatorStep; OPERATOR]> {
     let ts = record.sample_time();
     let eta = delayed_parameters(operator);
@@ -116,7 +116,7 @@ pub fn operator_step(operator: &OperatorParameters, record: &Record) -> Option<[
     let whole = each
         .iter()
         .fold(DMatrix::zeros(OPERATOR, OPERATOR), |sum, (_, big)| sum + big);
-    // Units differ by orders of magnitude.
+    // The units differ by orders of magnitude.
     let scale = DVector::from_fn(OPERATOR, |i, _| whole[(i, i)].sqrt().recip());
     let scaled = DMatrix::from_fn(OPERATOR, OPERATOR, |i, j| whole[(i, j)] * scale[i] * scale[j]);
     let inverse = scaled.cholesky()?.inverse();

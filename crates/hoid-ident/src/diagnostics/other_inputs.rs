@@ -1,21 +1,21 @@
-//! Whether u responds to a target that was recorded and is no input of the fit.
+//! Test of whether u responds to a target that was recorded but is not an input of the fit.
 //!
-//! A person who sees the target follows it also without an error: what a fit of one input finds is then neither their
-//! response to the error nor the loop that they close ([`crate::family::SeenChannel`]). Each channel with the name of a
-//! target is tried as a second input, in the forms of a gain and of its derivatives, with the form of the fit; the
-//! doubt is raised where the best of them explains far more than chance.
+//! A person who sees the target follows it even without an error: a fit with one input then finds neither the response
+//! to the error nor the loop that the person closes ([`crate::family::SeenChannel`]). Each channel with the name of a
+//! target is tried as a second input, in the forms of a gain and of its derivatives, in addition to the form of the
+//! fit; a doubt is raised if the best of them explains far more than chance.
 
 use hoid_model::{Finding, Form, Record};
 
 use crate::family::{ChannelRole, FamilyEstimator, FamilyFit, SeenChannel};
 
-/// Names of channels that hold what may be shown.
+/// Names of channels that may hold a displayed target.
 const TARGETS: [&str; 4] = ["r", "f_t", "target", "reference"];
-/// Probability of the response by chance: where target and disturbance have lines of their own, and where the target alone
-/// excites the loop, so that what the form of the fit lacks looks like a response to the target.
+/// Probability of the response by chance: if target and disturbance have their own lines, and if only the target
+/// excites the loop, so that an error of the form of the fit looks like a response to the target.
 const BY_CHANCE: [f64; 2] = [1e-2, 1e-7];
 
-/// A doubt for each target that the person responds to.
+/// Returns a doubt for each target that the person responds to.
 pub fn of_family(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[Record]) -> Vec<Finding> {
     if fit.little_noise || !estimator.channels.is_empty() {
         return Vec::new();
@@ -39,7 +39,7 @@ pub fn of_family(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[Record
             forms: vec![Form::Gain, Form::Derivative, Form::DerivativeLead],
             ..SeenChannel::new(name, ChannelRole::Feedforward)
         };
-        // A channel that cannot be an input, because it does not move, is no evidence against the fit.
+        // A channel that cannot be an input, such as a constant one, is no evidence against the fit.
         let (found, apart) = again.responds_to(records, channel).ok()?;
         (found.p_value < BY_CHANCE[usize::from(!apart)]).then(|| {
             Finding::doubt(

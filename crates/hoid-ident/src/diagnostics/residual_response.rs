@@ -1,48 +1,48 @@
-//! Whether a response to the error is left that a model does not have.
+//! Test for a response to the error that a model does not have.
 //!
-//! For a model that is linear in what it has to estimate, `u = X b + v`, the columns X are known: responses of a basis,
-//! their derivatives by the fixed dynamics, a level. With an autoregression `D v = eps` of order [`NOISE`] the question
-//! is whether further taps on e carry information about eps, Z in place of the impulse response that X cannot have:
-//! means of e over [`TAPS`] spans of [`TAP_S`] one after the other. By the statistic of the Lagrange multiplier (T. S.
-//! Breusch and A. R. Pagan, *Review of Economic Studies* 47 (1980) 239-253; L. Ljung, *System Identification*, 1999,
+//! For a model that is linear in its unknowns, `u = X b + v`, the columns X are known: responses of a basis, their
+//! derivatives by the fixed dynamics, a level. With an autoregression `D v = eps` of order [`NOISE`] the test is
+//! whether further taps on e carry information about eps; they are Z, in place of the impulse response that X cannot
+//! have: means of e over [`TAPS`] consecutive spans of [`TAP_S`]. The statistic is that of the Lagrange multiplier (T.
+//! S. Breusch and A. R. Pagan, *Review of Economic Studies* 47 (1980) 239-253; L. Ljung, *System Identification*, 1999,
 //! section 16.6, for the residuals of a model)
 //!
-//! `s(t) = z(t) eps(t)`, z the remainder of D Z when D X and the lags of v are taken out,
+//! `s(t) = z(t) eps(t)`, z the remainder of D Z after the projection on D X and the lags of v,
 //!
-//! so that what the estimate of b and of D takes away is taken away here too: in a closed loop past e and
-//! past v are correlated. Two variances: that of the model, with
-//! `T = (sum s)' (sigma^2 sum z z')^-1 (sum s)`, chi-square with [`TAPS`] degrees of freedom, and the scatter of the
-//! sums over blocks of 2 s, with Hotelling's `T^2`, which holds whatever the size of the remnant does (H.
-//! Hotelling, *Annals of Mathematical Statistics* 2 (1931) 360-378). The larger p-value counts.
+//! so that the effect of the estimates of b and of D is removed here too: in a closed loop past e and past v are
+//! correlated. There are two variances: that of the model, with `T = (sum s)' (sigma^2 sum z z')^-1 (sum s)`,
+//! chi-square with [`TAPS`] degrees of freedom, and the scatter of the sums over blocks of 2 s, with Hotelling's `T^2`,
+//! which is valid even if the size of the remnant changes (H. Hotelling, *Annals of Mathematical Statistics* 2 (1931)
+//! 360-378). The larger p-value counts.
 //!
-//! Signals are thinned to [`RATE_HZ`] at most. Residuals count in full: the pulses of a person who moves a stick by
-//! pulses are their response to e, and what limits would take off them looks like a response that is missed.
+//! Signals are decimated to [`RATE_HZ`] at most. Residuals are not limited: the pulses of a person who moves a stick in
+//! pulses are the response to e, and the part removed by a limit would look like a missing response.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use super::whitened::{NOISE, Whitened, lags, orthogonal, thinning, whitened};
 
-/// Taps, and their length in s.
+/// Number of taps, and their length in s.
 pub(crate) const TAPS: usize = 6;
 pub(crate) const TAP_S: f64 = 0.15;
-/// Length of a block, s, and fewest of them.
+/// Length of a block in s, and least number of blocks.
 const BLOCK_S: f64 = 2.0;
 const FEWEST: usize = 10;
 
-/// Result of a test of a model.
+/// Result of the test of a model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ResidualResponse {
-    /// Probability of so much where nothing is left.
+    /// Probability of such a statistic if no response is missing.
     pub p_value: f64,
-    /// The two that it is the larger of: by the model, by the scatter of blocks.
+    /// The two p-values, by the model and by the scatter of blocks.
     pub each: [f64; 2],
     /// Share of the variance of eps that the taps explain.
     pub share: f64,
 }
 
-/// Tests whether columns, all as long as e and u, are all that there is of a response of u to e in samples `from..`.
-/// The level need not be among them. `None` if there is too little, or something is not a number.
+/// Tests whether columns, all as long as e and u, explain the whole response of u to e in samples `from..`. The level
+/// need not be among them. `None` if there are too few data, or a value is not a number.
 pub fn residual_response(
     columns: &[Vec<f64>],
     e: &[f64],
@@ -63,7 +63,7 @@ pub fn residual_response(
     let n = rows.len();
     let p = columns.len() + 1;
     let z = DMatrix::from_fn(n, TAPS, |i, j| {
-        // The current error already holds what is new in u, where the controlled element answers at once.
+        // The current error already contains the new part of u if the controlled element responds at once.
         let (next, newest) = (rows[i] + 1, if j == 0 { thin } else { j * tap });
         e[next - (j + 1) * tap..next - newest.min((j + 1) * tap - 1)]
             .iter()
@@ -93,7 +93,7 @@ fn of_scores(z: &DMatrix<f64>, eps: &DVector<f64>, block: usize, known: usize) -
     let sums = z.transpose() * eps;
     let freedom = (eps.len() - known) as f64;
     let variance = eps.norm_squared() / freedom;
-    // Units are those of u and e alone: taps are alike.
+    // Only the units of u and e matter: taps have equal scales.
     let inverse = gram.cholesky()?.inverse();
     let explained = (sums.transpose() * &inverse * &sums)[(0, 0)];
     let of_model = ChiSquared::new(TAPS as f64).ok()?.sf(explained / variance);
@@ -123,8 +123,8 @@ mod tests {
 
     const TS: f64 = 0.02;
 
-    /// e, the column that is known and u: `e(t) = .98 e(t-1) + w - .3 v(t-1)`, `u = e(t-2) + echo e(t-20) + v`, v
-    /// autoregressive, louder where `loud` reports it.
+    /// e, the known column and u: `e(t) = .98 e(t-1) + w - .3 v(t-1)`, `u = e(t-2) + echo e(t-20) + v`, v
+    /// autoregressive, with a larger variance where `loud` is true.
     fn loop_of(seed: u64, echo: f64, loud: impl Fn(usize) -> f64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         let mut seed = seed;
         let n = 3000;
@@ -173,7 +173,7 @@ mod tests {
         for columns in [vec![known.clone(), known.clone()], vec![vec![0.0; e.len()]]] {
             assert!(residual_response(&columns, &e, &u, 100, TS).is_none());
         }
-        // An exact fit has nothing to test.
+        // An exact fit leaves nothing to test.
         assert!(residual_response(std::slice::from_ref(&known), &e, &known, 100, TS).is_none());
         u[2000] = f64::NAN;
         assert!(residual_response(&[known], &e, &u, 100, TS).is_none());

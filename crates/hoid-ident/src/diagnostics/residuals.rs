@@ -1,29 +1,28 @@
-//! How far residuals are from white, as sizes.
+//! Deviation of residuals from white noise, as effect sizes.
 //!
 //! With `S = sum eps^2` over all records,
 //!
-//! - the autocorrelation `sum eps(t) eps(t-k) / S` at lags of 1 to 25: what the noise model misses;
-//! - the correlation `sum eps(t) e(t-k) / sqrt(S sum e^2)` at lags of 0 to 0.6 s: what the operator
-//!   misses. It asks for the past alone, as in a closed loop later errors follow the residuals;
-//! - the leverage `max eps^2 / S`: how much of the fit hangs on one sample.
+//! - the autocorrelation `sum eps(t) eps(t-k) / S` at lags of 1 to 25: the deficiency of the noise model;
+//! - the correlation `sum eps(t) e(t-k) / sqrt(S sum e^2)` at lags of 0 to 0.6 s: the deficiency of the operator. Only
+//!   past errors are used, as in a closed loop later errors follow the residuals;
+//! - the leverage `max eps^2 / S`: the influence of one sample on the fit.
 //!
-//! Limits are sizes and not levels of significance: with the samples of ten runs every model of a
-//! person is refuted by a test, and what matters is how much the model misses. In short records
-//! chance alone gives such sizes; there the limits are what chance does not reach: four standard
-//! errors `1/sqrt(n)` of a correlation of white noise, and 20/n of the sum of squares, which one
-//! of n normal residuals exceeds with the probability 8e-6 n.
+//! Limits are effect sizes and not significance levels: with the samples of ten runs every model of a person is
+//! rejected by a test, and the important question is how much the model misses. In short records chance alone gives
+//! such sizes; there the limits are beyond chance: four standard errors `1/sqrt(n)` of a correlation of white noise,
+//! and 20/n of the sum of squares, which one of n normal residuals exceeds with the probability 8e-6 n.
 
 use hoid_model::{Finding, Record};
 
 use crate::fit::Series;
 
-/// Autocorrelation of the residuals beyond which the noise model is too poor.
+/// Autocorrelation of the residuals above which the noise model is inadequate.
 const LARGEST_AUTOCORRELATION: f64 = 0.1;
-/// Correlation of the residuals with earlier errors beyond which the operator misses something.
+/// Correlation of the residuals with earlier errors above which the operator is inadequate.
 const LARGEST_CROSS_CORRELATION: f64 = 0.1;
 /// The same in standard errors of a correlation of white noise, for short records.
 const CHANCE_CORRELATION: f64 = 4.0;
-/// Part of the sum of squares in one sample beyond which it carries the fit.
+/// Share of one sample in the sum of squares above which it dominates the fit.
 const LARGEST_LEVERAGE: f64 = 0.05;
 /// The same in mean squares, for short records.
 const CHANCE_LEVERAGE: f64 = 20.0;
@@ -33,23 +32,23 @@ const LAGS: usize = 25;
 const LONGEST_LAG_S: f64 = 0.6;
 const LONGEST_LAG: f64 = 600.0;
 
-/// How far the residuals are from white.
+/// Measures of the deviation of residuals from white noise.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct ResidualMeasures {
     /// Number of residuals.
     pub count: usize,
     /// Largest modulus of the autocorrelation over lags 1 to 25.
     pub autocorrelation: f64,
-    /// Largest modulus of the correlation with e at lags of 0 to 0.6 s before; zero without e.
+    /// Largest modulus of the correlation with e at lags of 0 to 0.6 s; zero without e.
     pub cross_correlation: f64,
-    /// Largest part of the sum of squares in one sample.
+    /// Largest share of one sample in the sum of squares.
     pub leverage: f64,
-    /// Where that is: record and sample.
+    /// Record and sample of the largest share.
     pub at: (usize, usize),
 }
 
 impl ResidualMeasures {
-    /// Measures of residuals as series of their records.
+    /// Computes the measures of residuals that are series of their records.
     pub fn of_series(found: &[Series], records: &[Record], sample_time_s: f64) -> Self {
         let pairs: Vec<(&[f64], &[f64])> = found
             .iter()
@@ -59,8 +58,8 @@ impl ResidualMeasures {
         Self::of(&pairs, sample_time_s)
     }
 
-    /// Measures of the residuals of all records, with the error that belongs to each residual (none
-    /// for a model without an input).
+    /// Computes the measures of the residuals of all records, each with the error at the same sample (empty for a model
+    /// without an input).
     pub fn of(records: &[(&[f64], &[f64])], sample_time_s: f64) -> Self {
         let sum_of_squares = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
         let total: f64 = records.iter().map(|(eps, _)| sum_of_squares(eps)).sum();
@@ -100,7 +99,7 @@ impl ResidualMeasures {
         measures
     }
 
-    /// A noise model that is too poor.
+    /// Returns a finding if the noise model is inadequate.
     pub fn coloured(&self) -> Option<Finding> {
         (self.autocorrelation > LARGEST_AUTOCORRELATION.max(self.chance())).then(|| {
             Finding::doubt(
@@ -113,7 +112,7 @@ impl ResidualMeasures {
         })
     }
 
-    /// An operator that misses something.
+    /// Returns a finding if the operator is inadequate.
     pub fn structure(&self) -> Option<Finding> {
         (self.cross_correlation > LARGEST_CROSS_CORRELATION.max(self.chance())).then(|| {
             Finding::doubt(
@@ -127,7 +126,7 @@ impl ResidualMeasures {
         })
     }
 
-    /// One sample that carries the fit.
+    /// Returns a finding if one sample dominates the fit.
     pub fn leverage(&self) -> Option<Finding> {
         (self.leverage > LARGEST_LEVERAGE.max(CHANCE_LEVERAGE / self.count as f64)).then(|| {
             Finding::doubt(
@@ -142,7 +141,7 @@ impl ResidualMeasures {
         })
     }
 
-    /// All findings.
+    /// Returns all findings.
     pub fn findings(&self) -> impl Iterator<Item = Finding> {
         [self.coloured(), self.structure(), self.leverage()]
             .into_iter()
@@ -195,7 +194,7 @@ mod tests {
         let missed: Vec<f64> = (20..3000).map(|t| eps[t] + 0.3 * e[t - 20]).collect();
         let measures = ResidualMeasures::of(&[(&missed, &e[20..])], 0.01);
         assert_eq!(kinds(&measures), ["structure"]);
-        // What lies more than 0.6 s back does not count.
+        // A lag of more than 0.6 s does not count.
         let measures = ResidualMeasures::of(&[(&missed, &e[20..])], 0.1);
         assert!(kinds(&measures).is_empty(), "{measures:?}");
         let mut blow = eps.clone();

@@ -1,13 +1,13 @@
-//! Second fits to the records with something taken out, and their report on the first.
+//! Second fits to the records with a component removed, and their difference to the first.
 //!
-//! | without | where the fit differs, this carries it | finding |
+//! | removed | cause of a difference | finding |
 //! |---|---|---|
-//! | what no neighbour of a sample bears out ([`crate::faults::held`]), in e as in u: what it brings into the filters of a fit is bounded | few samples | `leverage` |
-//! | what is slower than 20 s, of a slow system than ten periods of its slowest pole ([`crate::faults::without_slow`]) | a drift or a step of a sensor, which the person does not follow | `slow` |
+//! | values that the neighbours of a sample do not support ([`crate::faults::held`]), in e as in u: their contribution to the filters of a fit is bounded | few samples | `leverage` |
+//! | components slower than 20 s, for a slow system than ten periods of its slowest pole ([`crate::faults::without_slow`]) | a drift or a step of a sensor, which the person does not follow | `slow` |
 //!
-//! Two fits differ where a parameter, the crossover or the phase margin does by more than three standard
-//! errors: those of the first fit or, where the second knows less, of what it has lost, `sqrt(se'^2 -
-//! se^2)`. Where nothing is taken out the second fit would be the first, and is not made.
+//! Two fits differ if a parameter, the crossover or the phase margin differs by more than three standard errors: those
+//! of the first fit or, if the second has less information, those of the lost information, `sqrt(se'^2 - se^2)`. If
+//! nothing is removed, the second fit would equal the first and is not made.
 
 use std::f64::consts::TAU;
 
@@ -23,7 +23,7 @@ use crate::{
     faults::{PERIOD_S, held, without_slow},
 };
 
-/// Periods of the slowest pole of a system that are slow compared with it.
+/// Periods of the slowest pole of a system above which a component is slow.
 const SLOW_PERIODS: f64 = 10.0;
 /// Standard errors by which two fits differ.
 const DIFFERENT: f64 = 3.0;
@@ -33,18 +33,18 @@ const LEVEL: f64 = 2.0;
 /// Name of a quantity, and its estimates by the first fit and by the other.
 type ComparedEstimate = (String, Estimate, Estimate);
 
-/// Trend removed from the records.
+/// Component that is removed from the records.
 #[derive(Debug, Clone, Copy)]
 enum Without {
     SamplesThatStandOut,
-    /// Than this period, s.
+    /// Components slower than this period, s.
     WhatIsSlow(f64),
 }
 
 impl Without {
     const ALL: [Self; 2] = [Self::SamplesThatStandOut, Self::WhatIsSlow(PERIOD_S)];
 
-    /// The records without it; `None` if they have none of it.
+    /// Returns the records without the component; `None` if they do not contain it.
     fn records(self, records: &[Record]) -> Option<Vec<Record>> {
         match self {
             Self::SamplesThatStandOut => held(records),
@@ -52,7 +52,7 @@ impl Without {
         }
     }
 
-    /// A doubt where fits differ in any of these.
+    /// Returns a doubt if the fits differ in any of these quantities.
     fn finding(self, pairs: impl IntoIterator<Item = ComparedEstimate>) -> Option<Finding> {
         let differ: Vec<String> = pairs
             .into_iter()
@@ -85,7 +85,7 @@ impl Without {
     }
 }
 
-/// The same fit to the records without each of `all`; `again` gives the quantities of both fits.
+/// Fits the records without each of `all` in turn; `again` returns the quantities of both fits.
 fn opinions(
     all: &[Without],
     records: &[Record],
@@ -95,7 +95,7 @@ fn opinions(
     all.iter().filter_map(asked).collect()
 }
 
-/// For a fit of polynomials, by the estimator that made it; with its loop where the controlled element is known.
+/// Second fits for polynomials, by the estimator of the first; with its loop if the controlled element is known.
 pub fn of_polynomials(
     estimator: &Estimator,
     fit: &Fit,
@@ -111,7 +111,7 @@ pub fn of_polynomials(
     })
 }
 
-/// Period that is slow compared with a system: the periods of a person, or ten of its slowest pole.
+/// Period above which a component is slow: that for people, or ten periods of the slowest pole of the system.
 fn slow_period_s(fit: &Fit) -> f64 {
     let poles = fit.roots();
     let poles = poles.iter().filter(|root| matches!(root.polynomial, 'a' | 'f'));
@@ -121,7 +121,7 @@ fn slow_period_s(fit: &Fit) -> f64 {
     periods.fold(PERIOD_S, f64::max)
 }
 
-/// For a grey box: the order of its remnant stays.
+/// Second fits for a grey box, with the order of its remnant unchanged.
 pub fn of_grey_box(
     estimator: &GreyBox,
     fit: &GreyBoxFit,
@@ -140,15 +140,15 @@ pub fn of_grey_box(
     })
 }
 
-/// For an operator of the family: its form and the orders of its noise model stay. A fit at the lines of a recorded
-/// excitation is next to it already, and has no information about what is slow.
+/// Second fits for an operator of the family, with its form and the orders of its noise model unchanged. A fit at the
+/// lines of a recorded excitation is part of it already, and has no information about slow components.
 pub fn of_family(
     estimator: &FamilyEstimator,
     fit: &FamilyFit,
     records: &[Record],
     element: Option<&ContinuousTransferFunction>,
 ) -> Vec<Finding> {
-    // Error bars are those of digits then, which the ends of what is taken out are beyond.
+    // The standard errors are then those of rounding, which the ends of the removed part exceed.
     if fit.noise_free.is_some() {
         return Vec::new();
     }
@@ -162,7 +162,7 @@ pub fn of_family(
         channels: fit.channels_in_use(),
         ..estimator.clone()
     };
-    // What is slow would be taken out of e and u alone, and not out of what is seen besides.
+    // Slow components would be removed from e and u only, and not from the other inputs.
     let asked = match &fit.lines {
         None if again.channels.is_empty() => &Without::ALL[..],
         _ => &Without::ALL[..1],
@@ -170,7 +170,7 @@ pub fn of_family(
     let measures = |of: &FamilyFit| of.loop_measures_in_front(0, element?);
     opinions(asked, records, |others| {
         let other = again.fit_with_response(others, None).ok()?;
-        // For the best form by itself: the other fit has no other.
+        // The best form alone: the other fit has only this one.
         let (one, two) = (fit.weighed.first()?, other.weighed.first()?);
         let parameters = one.operators.iter().zip(&two.operators).flat_map(|(one, two)| {
             let both = one.parameters.iter().zip(&two.parameters);
@@ -186,8 +186,8 @@ pub fn of_family(
     })
 }
 
-/// For an operator whose gains change once, without samples that are prominent. One fit that finds a change where the
-/// other finds none is a difference whatever its size.
+/// Second fits for an operator whose gains change once, without outlying samples. A change that only one of the fits
+/// finds counts as a difference whatever its size.
 pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record]) -> Option<Finding> {
     let without = Without::SamplesThatStandOut;
     let other = SigmoidChange {
@@ -214,7 +214,7 @@ pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record
     without.finding(compared(constant(fit), constant(&other)))
 }
 
-/// Effect of a remaining level of e and u on a fit of polynomials, from a fit without their means: a doubt where a
+/// Effect of a remaining level of e and u on a fit of polynomials, from a fit without their means: a doubt if a
 /// parameter moves by more than `LEVEL` standard errors.
 pub fn of_level(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Finding> {
     let without: Vec<Record> = records.iter().map(|r| r.clone().detrended(Detrend::Mean)).collect();
@@ -237,7 +237,7 @@ pub fn of_level(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<
     })
 }
 
-/// The same model fitted to other records, from where the fit is.
+/// Fits the same model to other records, from the parameters of the fit.
 fn again(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Fit> {
     let other = Estimator {
         start: Some(fit.model().theta().to_vec()),
@@ -246,7 +246,7 @@ fn again(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Fit> {
     other.fit(records).ok()
 }
 
-/// The parameters of two fits: the operator's where there is one in both.
+/// The parameters of two fits: those of the operator if both have one.
 fn compared_parameters(fit: &Fit, other: &Fit) -> Vec<ComparedEstimate> {
     match (fit.operator(), other.operator()) {
         (Ok(one), Ok(two)) => {

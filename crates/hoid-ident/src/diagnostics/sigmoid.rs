@@ -12,8 +12,8 @@ use crate::{
 };
 
 impl SigmoidFit {
-    /// Verdict on the fit, on the records that it was fitted to. Where the records show no change,
-    /// the operator without one is judged.
+    /// Returns the verdict on the fit, for the records that it was fitted to. If the records show no change, the
+    /// operator without a change is judged.
     ///
     /// # Errors
     /// As [`SigmoidFit::residuals`].
@@ -71,7 +71,7 @@ impl SigmoidFit {
                         "the delay {value:.3} s lies at the end of the range in which it was searched for; widen it"
                     ),
                 )),
-                // A pure integration, or an absent lag.
+                // A pure integration, or no lag.
                 Some(Remark::AtBound) if name == "T_I" => all.push(Finding::note(
                     "lag",
                     format!("T_I and K are not determined, K/T_I is: T_I rests at a bound, {value:.3} s"),
@@ -104,8 +104,8 @@ impl SigmoidFit {
     }
 }
 
-/// Parameters of operators of the family that do not differ from zero, and implausible poles. A
-/// gain or a lead that is open is named; where neither end has a response, nothing is known.
+/// Returns findings about parameters of operators of the family that do not differ from zero, and about implausible
+/// poles. An undetermined gain or lead is named; if neither operator has a response, nothing is known.
 fn family_findings(operators: &[(&str, &ChangedOperator)], sample_time: SampleTime) -> Vec<Finding> {
     let mut all = Vec::new();
     let mut open = Vec::new();

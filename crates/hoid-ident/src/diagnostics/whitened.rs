@@ -1,43 +1,43 @@
-//! Least squares after an autoregression: what remains of u when some columns are taken out, white.
+//! Least squares after an autoregression: the white part of u that some columns do not explain.
 //!
-//! Of `u = X b + level + v`, `D v = eps`, noise model of order [`NOISE`] and b in turn, residuals beyond a given number
-//! of standard deviations limited to it where a limit is requested.
+//! For `u = X b + level + v`, `D v = eps`, noise model of order [`NOISE`] and b in turn; if a limit is given, residuals
+//! are limited to this number of standard deviations.
 
 use nalgebra::{DMatrix, DVector};
 
 /// Order of the noise model.
 pub(super) const NOISE: usize = 16;
-/// Rate to which signals are thinned, Hz.
+/// Rate to which signals are decimated, Hz.
 const RATE_HZ: f64 = 50.0;
-/// Standard deviations beyond which a residual is an outlier.
+/// Standard deviations above which a residual is an outlier.
 pub(super) const LIMIT: f64 = 3.5;
 /// Share of the power of u below which v is rounding.
 const EXACT: f64 = 1e-18;
 /// Rounds of noise model and least squares.
 const ROUNDS: usize = 3;
 
-/// Every how many samples one is taken.
+/// Returns the decimation factor.
 pub(super) fn thinning(sample_time_s: f64) -> usize {
     (1.0 / (sample_time_s * RATE_HZ) + 1e-6).floor().max(1.0) as usize
 }
 
 /// A fit of columns and a level.
 pub(super) struct Whitened {
-    /// For the columns, the level last.
+    /// Coefficients of the columns, the level last.
     pub b: DVector<f64>,
     /// The part of u that the columns leave unexplained.
     pub v: DVector<f64>,
     /// `d_1 ..` of its noise model.
     pub d: Vec<f64>,
-    /// Columns after the noise model, the level last; [`NOISE`] rows fewer.
+    /// Columns filtered by the noise model, the level last; [`NOISE`] rows fewer.
     pub x: DMatrix<f64>,
     /// Residuals, limited.
     pub eps: DVector<f64>,
 }
 
 impl Whitened {
-    /// For these samples of columns and u; `None` where something is not a number, or columns are not independent, or
-    /// nothing but rounding is left. Residuals are limited to `limit` standard deviations.
+    /// Fits these samples of columns and u; `None` if a value is not a number, columns are linearly dependent, or only
+    /// rounding is left. Residuals are limited to `limit` standard deviations.
     pub fn of(columns: &[Vec<f64>], u: &[f64], samples: &[usize], limit: f64) -> Option<Self> {
         let (n, p) = (samples.len(), columns.len() + 1);
         let x = DMatrix::from_fn(n, p, |i, j| columns.get(j).map_or(1.0, |c| c[samples[i]]));
@@ -67,7 +67,7 @@ impl Whitened {
     }
 }
 
-/// After `1 + d_1 q^-1 + ..`, from the first sample on that has all lags.
+/// Filters with `1 + d_1 q^-1 + ..`, from the first sample on that has all lags.
 pub(super) fn whitened(m: &DMatrix<f64>, d: &[f64]) -> DMatrix<f64> {
     DMatrix::from_fn(m.nrows() - NOISE, m.ncols(), |i, j| {
         let own = m[(i + NOISE, j)];
@@ -91,7 +91,7 @@ pub(super) fn lags(v: &DVector<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(v.len() - NOISE, NOISE, |i, j| v[i + NOISE - 1 - j])
 }
 
-/// y with what is far from its fit nearer to it.
+/// Returns y with outliers moved towards the fit.
 fn limited(x: &DMatrix<f64>, y: &DVector<f64>, limit: f64) -> Option<DVector<f64>> {
     let fit = x * solution(x, y)?;
     Some(&fit + clipped(&(y - &fit), limit))
@@ -99,11 +99,11 @@ fn limited(x: &DMatrix<f64>, y: &DVector<f64>, limit: f64) -> Option<DVector<f64
 
 fn clipped(eps: &DVector<f64>, limit: f64) -> DVector<f64> {
     let most = limit * (eps.norm_squared() / eps.len() as f64).sqrt();
-    // No limit for residuals that are all zero is not a number; min and max leave it out.
+    // If all residuals are zero, the limit is not a number; min and max ignore it.
     eps.map(|v| v.max(-most).min(most))
 }
 
-/// Least squares by columns of unit length; `None` if they are not independent.
+/// Least squares with columns scaled to unit length; `None` if they are linearly dependent.
 pub(super) fn solution(x: &DMatrix<f64>, y: &DVector<f64>) -> Option<DVector<f64>> {
     let (q, r, scales) = factored(x)?;
     let mut b = r.solve_upper_triangular(&(q.transpose() * y))?;
@@ -126,10 +126,10 @@ fn factored(x: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>, Vec<f64>)> 
     (least > DEPENDENT).then_some((q, r, scales))
 }
 
-/// Diagonal of R below which columns are not independent.
+/// Diagonal element of R below which columns are linearly dependent.
 const DEPENDENT: f64 = 1e-10;
 
-/// Numbers of a fixed stream, uniform with variance 1/12.
+/// Pseudorandom numbers of a fixed stream, uniform with variance 1/12.
 #[cfg(test)]
 pub(super) fn stream(seed: &mut u64) -> f64 {
     *seed = seed

@@ -1,9 +1,9 @@
-//! Do methods agree that rest on different statistics?
+//! Agreement of methods that use different statistics.
 //!
-//! The prediction error fit uses every sample and needs a noise model; the fit at the lines uses the
-//! excited frequencies alone and needs none; refined instrumental variables use every sample of what
-//! follows the excitation. For each pair the difference d of their coordinates, over those that the
-//! data determine, is held against its covariance V: `T = d' V^-1 d`.
+//! The prediction error fit uses every sample and needs a noise model; the fit at the lines uses only the excited
+//! frequencies and needs none; refined instrumental variables use every sample of the part that follows the excitation.
+//! For each pair the difference d of their coordinates, over those that the data determine, is compared with its
+//! covariance V: `T = d' V^-1 d`.
 //!
 //! **V** is a sum of three:
 //!
@@ -17,12 +17,12 @@
 //!    ([`super::sensitivity`]). It becomes a part of the errors of the result, so that it is no
 //!    reason to doubt them.
 //!
-//! **Coordinates that count** are determined by the data and owe less than a quarter to the prior
-//! in each method: a resonance above the lines is the prior in one method and not in the other.
+//! **Coordinates that count** are determined by the data, with a share of the prior below a quarter in each method: a
+//! resonance above the lines is determined by the prior in one method and not in the other.
 //!
 //! The gain is compared as `ln |Y|` in the middle of the band of manual control. Gain and lead time, or gain and lag,
-//! make up for each other along a curve, K T_L nearly constant, and what lies apart on a curve is not apart for it: a
-//! straight line through one of them would report it.
+//! compensate each other along a curve, K T_L nearly constant, so that two points far apart on this curve can be
+//! equivalent: a linear test about one of them would report a difference.
 //!
 //! T is chi-square with as many degrees of freedom. For several pairs the smallest probability counts, times their
 //! number (Bonferroni): a test at 1 % doubts one person in a hundred at most whose operator is of the form.
@@ -32,7 +32,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::linalg::least_squares::{dot, solve_symmetric};
 
-/// A method that is held against others.
+/// A method that is compared with others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum AgreementMethod {
     /// Prediction error.
@@ -44,7 +44,7 @@ pub enum AgreementMethod {
 }
 
 impl AgreementMethod {
-    /// As it is in a sentence.
+    /// Returns its name for use in a sentence.
     pub fn words(self) -> &'static str {
         match self {
             Self::PredictionError => "the prediction error fit",
@@ -53,7 +53,7 @@ impl AgreementMethod {
         }
     }
 
-    /// As a key.
+    /// Returns its name as a key.
     pub fn name(self) -> &'static str {
         match self {
             Self::PredictionError => "prediction_error",
@@ -63,52 +63,52 @@ impl AgreementMethod {
     }
 }
 
-/// Methods side by side.
+/// Comparison of the methods.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Agreement {
-    /// Each coordinate that counts, by all methods.
+    /// Each coordinate that counts, for all methods.
     pub rows: Vec<AgreementRow>,
     /// Each pair of methods.
     pub pairs: Vec<AgreementPair>,
-    /// T of the pair that agrees least.
+    /// T of the pair with the least agreement.
     pub statistic: f64,
-    /// Probability that a pair differs as much where all are right.
+    /// Probability of such a difference of a pair if all methods are right.
     pub p_value: f64,
 }
 
-/// One coordinate of all methods.
+/// One coordinate, for all methods.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AgreementRow {
     /// The coordinate.
     pub coordinate: Coordinate,
     /// Value and standard error of each method.
     pub values: Vec<(AgreementMethod, (f64, f64))>,
-    /// The difference of the first pair, in standard errors of it.
+    /// The difference of the first pair, in its standard errors.
     pub difference_in_errors: f64,
 }
 
 impl AgreementRow {
-    /// Value and standard error of a method.
+    /// Returns value and standard error of a method.
     pub fn of(&self, method: AgreementMethod) -> Option<(f64, f64)> {
         self.values.iter().find(|(m, _)| *m == method).map(|(_, v)| *v)
     }
 }
 
-/// Two methods.
+/// Comparison of two methods.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AgreementPair {
-    /// Which.
+    /// The two methods.
     pub methods: (AgreementMethod, AgreementMethod),
     /// `d' V^-1 d`.
     pub statistic: f64,
-    /// Probability of a statistic as large where both are right.
+    /// Probability of a statistic at least as large if both are right.
     pub p_value: f64,
-    /// The coordinate that differs most, and by how many standard errors of the difference.
+    /// The coordinate with the largest difference, in standard errors of the difference.
     pub most: (Coordinate, f64),
 }
 
 impl Agreement {
-    /// The pair that agrees least.
+    /// Returns the pair with the least agreement.
     pub fn worst(&self) -> Option<&AgreementPair> {
         self.pairs.iter().min_by(|a, b| a.p_value.total_cmp(&b.p_value))
     }
@@ -118,20 +118,20 @@ impl Agreement {
 #[derive(Debug, Clone)]
 pub(super) struct Side {
     pub method: AgreementMethod,
-    /// Its coordinates, the first of them in the place of the gain.
+    /// Its coordinates; the first is the level instead of the gain.
     pub coordinates: Vec<f64>,
     /// Their covariance from all residuals or lines, by rows.
     pub covariance: Vec<f64>,
-    /// The coordinates with the errors that are reported, the gain itself the first.
+    /// The coordinates with the reported standard errors; the first is the gain itself.
     pub reported: Vec<(f64, f64)>,
 }
 
 impl Side {
-    /// An operator with its covariance, and the covariance that is reported.
+    /// Converts an operator with its covariance and the reported covariance.
     pub fn of(method: AgreementMethod, operator: &FamilyOperator, covariance: &[f64], reported: &[f64]) -> Self {
         let p = operator.coordinates().len();
         let gradient = level(operator).1;
-        // The first row is the gradient of the level, the others are those of the unit matrix.
+        // The first row is the gradient of the level, the others are those of the identity matrix.
         let times = |c: &[f64], i: usize, j: usize| -> f64 {
             match i {
                 0 => (0..p).map(|k| gradient[k] * c[k * p + j]).sum(),
@@ -151,25 +151,25 @@ impl Side {
     }
 }
 
-/// Where the gain is compared, rad/s: the middle of the band of manual control.
+/// Frequency at which the gain is compared, rad/s: the middle of the band of manual control.
 const MIDDLE_RAD_S: f64 = 2.4;
 
-/// `ln |Y|` there, and its gradient.
+/// Returns `ln |Y|` at this frequency, and its gradient.
 fn level(operator: &FamilyOperator) -> (f64, Vec<f64>) {
     let response = operator.response_and_gradient(MIDDLE_RAD_S);
     let gradient = response.gradient.iter().map(|g| (g / response.value).re);
     (response.value.norm().ln(), gradient.collect())
 }
 
-/// The coordinates with the level in the place of the gain, the first of all forms.
+/// Returns the coordinates with the level instead of the gain, the first coordinate of all forms.
 pub(super) fn with_level(operator: &FamilyOperator) -> Vec<f64> {
     let mut x = operator.coordinates().to_vec();
     x[0] = level(operator).0;
     x
 }
 
-/// The tests of all pairs over the coordinates that count; `bias` belongs to the prediction error
-/// fit. `None` if there are no coordinates or no two methods with errors.
+/// Tests all pairs over the coordinates that count; `bias` is that of the prediction error fit. `None` if there are no
+/// coordinates, or fewer than two methods with errors.
 pub(super) fn agreement(
     all: &[Coordinate],
     sides: &[Side],
@@ -202,7 +202,7 @@ pub(super) fn agreement(
     })
 }
 
-/// The test of two methods, and the difference of each coordinate in its standard errors.
+/// Tests two methods, and returns the difference of each coordinate in its standard errors.
 fn pair(
     all: &[Coordinate],
     used: &[usize],

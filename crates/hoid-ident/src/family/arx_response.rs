@@ -1,9 +1,9 @@
 //! A frequency response without a form: from an ARX model of high order.
 //!
-//! In a closed loop the direct prediction error method needs a noise model that is rich enough and
-//! no knowledge of the loop (L. Ljung, *System Identification*, 1999, section 13.4). An ARX model
-//! of high order has that, is one linear regression, and its response represents the describing
-//! function where no periodic excitation was recorded: for the starts of all forms.
+//! In a closed loop the direct prediction error method needs a sufficiently rich noise model and no knowledge of the
+//! loop (L. Ljung, *System Identification*, 1999, section 13.4). An ARX model of high order satisfies this, is a single
+//! linear regression, and its response replaces the describing function if no periodic excitation was recorded: for the
+//! starts of all forms.
 
 use hoid_model::{Complex64, Record, Structure};
 
@@ -12,31 +12,31 @@ use crate::{Estimator, Fit, IdentError, ResponsePoint};
 
 /// Order of A.
 const POLES: usize = 16;
-/// Coefficients of A or B below which no other model is tried.
+/// Number of coefficients of A or B below which no other model is tried.
 const FEWEST: usize = 4;
 /// Most coefficients of B.
 const MOST_GAINS: usize = 60;
-/// Their largest number if u is predicted so well that there may be no noise, and the threshold of that: at high rates
-/// a long delay has more samples than that.
+/// Largest number of coefficients of B if u is predicted so well that there may be no noise, and the threshold for
+/// this: at high rates a long delay takes more samples than the default number.
 const MOST_WITHOUT_NOISE: usize = 200;
 const PROMISING: f64 = 1e-3;
 /// Frequencies of the response, rad/s, evenly over their logarithm.
 const BAND_RAD_S: (f64, f64) = (0.5, 20.0);
 const POINTS: usize = 24;
-/// Longest part of the response to an error that B holds, s.
+/// Longest response to an error that B describes, s.
 const RESPONSE_S: f64 = 0.7;
 
 /// A response without a form.
 #[derive(Debug, Clone)]
 pub(super) struct ArxResponse {
-    /// With its variances.
+    /// The points with their variances.
     pub points: Vec<MeasuredResponse>,
-    /// Share of the power of u that the innovations have.
+    /// Share of the innovations in the power of u.
     innovations: f64,
 }
 
 impl ArxResponse {
-    /// For all records together: a smooth record determines fewer coefficients.
+    /// Estimates the response from all records together: a smooth record determines fewer coefficients.
     ///
     /// # Errors
     /// The errors of the regression with the fewest coefficients.
@@ -44,8 +44,8 @@ impl ArxResponse {
         regressed(records, false, MOST_GAINS)
     }
 
-    /// The same where there is hardly any noise, to as many coefficients of B as there may be: u without noise leaves
-    /// those of A open, and B is to be as long as the delay. `None` if there is more.
+    /// The same for almost no noise, with the largest possible number of coefficients of B: a u without noise does not
+    /// determine those of A, and B has to cover the delay. `None` if there is more noise.
     pub fn without_noise(records: &[Record]) -> Option<Self> {
         let found = regressed(records, true, MOST_GAINS).ok()?;
         if found.innovations < NONE {
@@ -73,19 +73,19 @@ impl ArxResponse {
     }
 }
 
-/// Coefficients of B that hold a response.
+/// Number of coefficients of B that cover a response.
 fn gains(records: &[Record]) -> usize {
     (RESPONSE_S / records[0].sample_time().s()).ceil() as usize
 }
 
-/// The regression with half as many coefficients, of A alone or of both, as long as the records do not determine them.
+/// Repeats the regression with half as many coefficients, of A only or of both, until the records determine them.
 fn regressed(records: &[Record], of_a_alone: bool, most_gains: usize) -> Result<ArxResponse, IdentError> {
     let shortest = records.iter().map(Record::len).min().unwrap_or(0);
     let mut orders = Structure::Arx.operator_orders(1);
     orders.na = POLES.min(shortest / 12).max(2);
     orders.nb = gains(records).clamp(4, most_gains).min(shortest / 8).max(2);
     loop {
-        // Where there is no noise, what the means took out shows.
+        // Without noise, the removed means have a visible effect.
         let estimator = Estimator {
             level: of_a_alone,
             ..Estimator::new(Structure::Arx, orders)
@@ -114,7 +114,7 @@ fn measured(point: &ResponsePoint) -> MeasuredResponse {
     MeasuredResponse {
         omega_rad_s: point.omega_rad_s,
         response: Complex64::from_polar(gain, point.phase_deg.value.to_radians()),
-        // Never better known than to a thousandth: an exact fit has no variance.
+        // The relative error is at least a thousandth: an exact fit has no variance.
         variance: gain * gain * (relative * relative + turn * turn).max(1e-6),
     }
 }

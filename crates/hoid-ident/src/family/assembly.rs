@@ -1,5 +1,5 @@
-//! From the searches of the forms that count to the result: operators with their errors, averaged over forms; for the
-//! best form what the methods report about each other; and the verdict.
+//! Assembly of the result from the searches of the forms that count: operators with their errors, averaged over forms;
+//! for the best form the comparison of methods; and the verdict.
 //!
 //! The order matters: both methods are compared with their own errors, and only then does their
 //! difference become a part of the errors of the operator (`Covariances::add_bias`).
@@ -38,49 +38,50 @@ use crate::{
     optimize::minimise,
 };
 
-/// Result of the lines of the excitation for a form.
+/// Result of the fit at the lines of the excitation for a form.
 pub(super) struct AtLines<'d> {
     pub describing: Option<&'d DescribingFunction>,
-    /// The lines of several inputs, where there are such.
+    /// The lines of several inputs, if there are any.
     pub channels: Option<AtChannelLines<'d>>,
     /// Their forms.
     pub in_form: Vec<InForm>,
     pub fit: Option<LineFit>,
-    /// Why there is no fit, where one was wanted.
+    /// The reason why there is no fit although one was requested.
     pub why_none: Option<String>,
 }
 
-/// The search of a form that counts next to the one in front.
+/// The search of a form that counts, other than the best one.
 pub(super) struct OtherForm<'a> {
     pub fit: PredictionFit<'a>,
     pub lines: Option<LineFit>,
     pub weight: f64,
 }
 
-/// The search of the best form, and what its result is made from next to it.
+/// The search of the best form, and the other inputs of its result.
 pub(super) struct Chosen<'p, 'a> {
     pub fit: PredictionFit<'a>,
     pub weight: f64,
     pub lines: AtLines<'p>,
     /// The other forms that count.
     pub others: Vec<OtherForm<'a>>,
-    /// All forms that were compared.
+    /// All forms of the comparison.
     pub forms: Vec<FormFigures>,
     pub prediction: &'p Prediction<'a>,
-    /// The channels in addition to the error, as they were compared.
+    /// Results of the inputs in addition to the error.
     pub channels: Vec<ChannelFit>,
     /// The records, detrended.
     pub records: &'p [Record],
     /// Channel of the recorded excitation.
     pub excitation: Option<&'p str>,
-    /// Variation of a person's gain from one run to the next, as a part of it; zero if there is no noise, of no person.
+    /// Variation of a person's gain from one run to the next, relative to the gain; zero without noise, which is no
+    /// person.
     pub run_to_run: f64,
-    /// Highest order of the noise models that the estimate is held against.
+    /// Highest order of the noise models with which the estimate is compared.
     pub highest_order: usize,
 }
 
 impl<'a> Chosen<'_, 'a> {
-    /// All that is informed of the person.
+    /// Computes the result for the person.
     ///
     /// # Errors
     /// The errors of the model.
@@ -95,8 +96,7 @@ impl<'a> Chosen<'_, 'a> {
         let unseen = self.prediction.little_noise.is_none();
         let mut errors = Errors::of(fit, self.run_to_run, workspace);
         let error_ratio = errors.largest_ratio(fit);
-        // What the estimate owes to its noise model: a part of its errors, and of what methods may
-        // differ by.
+        // The effect of the noise model: part of its errors, and of the admissible difference of methods.
         let others = rivals(self.prediction, fit, self.highest_order, workspace);
         let (instrumental, no_instrumental) = match self.instrumental(separate, workspace) {
             None => (None, None),
@@ -202,7 +202,7 @@ impl<'a> Chosen<'_, 'a> {
         })
     }
 
-    /// The fit with the lines next to it, where there are lines, noise, and one operator of all records.
+    /// The fit that includes the lines, if there are lines, noise, and one operator of all records.
     fn joint(
         &self,
         fit: &PredictionFit<'a>,
@@ -221,14 +221,14 @@ impl<'a> Chosen<'_, 'a> {
         with_lines(self.prediction, fit, (lines?, &data), workspace)
     }
 
-    /// Whether every input has lines of its own.
+    /// True if every input has its own lines.
     fn tells_apart(&self) -> bool {
         let names: Vec<String> = self.channels.iter().map(|channel| channel.name.clone()).collect();
         let lines = self.lines.channels.as_ref().map(|at| at.lines.as_ref());
         tells_apart(lines, &names)
     }
 
-    /// Refined instrumental variables with the recorded excitation, for one operator of all records.
+    /// Estimates one operator of all records by refined instrumental variables with the recorded excitation.
     fn instrumental(&self, separate: usize, workspace: &mut Workspace) -> Option<Result<InstrumentalFit, IdentError>> {
         let channel = self
             .excitation
@@ -246,7 +246,7 @@ impl<'a> Chosen<'_, 'a> {
         Some(found.and_then(|method| method.fit(&auxiliary, workspace)))
     }
 
-    /// Normalises the remaining weights; the figures of all forms, with these weights.
+    /// Normalises the remaining weights; returns the figures of all forms with these weights.
     fn with_weights_of(&self, weighed: &mut [WeighedForm]) -> Vec<FormFigures> {
         let total: f64 = weighed.iter().map(|form| form.weight).sum();
         weighed.iter_mut().for_each(|form| form.weight /= total);
@@ -263,7 +263,7 @@ impl<'a> Chosen<'_, 'a> {
         figures.collect()
     }
 
-    /// Another form with its errors, made as those of the best form.
+    /// Returns another form with its errors, computed like those of the best form.
     fn weighed(
         &self,
         of: &OtherForm<'a>,
@@ -282,8 +282,9 @@ impl<'a> Chosen<'_, 'a> {
     }
 }
 
-/// The bias of the fit is included in its errors: its difference to the fit at the lines, and, for what the lines leave
-/// to the prior or without lines, its differences to fits with other noise models ([`super::sensitivity`]). `unseen` is
+/// Adds the bias of the fit to its errors: its difference to the fit at the lines, and, for coordinates that the lines
+/// do not determine or without lines, its differences to fits with other noise models ([`super::sensitivity`]).
+/// `unseen` is false with little noise, for which these additional variances do not apply.
 /// false if there is little noise, and little of what no noise model shows.
 fn add_bias(
     errors: &mut Errors,
@@ -322,8 +323,8 @@ fn add_bias(
     covariances.widen(fit, &mut errors.profiles);
 }
 
-/// All methods next to each other, over the coordinates whose parameters are determined and owe
-/// little to the prior; `None` for fewer than two with errors.
+/// Compares all methods over the coordinates whose parameters are determined with a small share of the prior; `None`
+/// for fewer than two methods with errors.
 fn agreement_of(
     fit: &PredictionFit<'_>,
     operator: &Estimated,
@@ -384,7 +385,7 @@ fn agreement_of(
     })
 }
 
-/// Box-Jenkins of the same orders and delay from the polynomials of the fit, for one operator.
+/// Fits Box-Jenkins with the same orders and delay, starting from the polynomials of the fit, for one operator.
 fn free_model(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> Option<FreeModel> {
     let layout = fit.layout();
     if layout.elements.iter().any(|(_, record)| record.is_some()) || !layout.channels.is_empty() {
@@ -431,7 +432,7 @@ fn residuals(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> ResidualMeas
     ResidualMeasures::of(&pairs, fit.layout().sample_time.s())
 }
 
-/// A doubt where the person is not the same throughout the records.
+/// Returns a doubt if the person is not constant over the records.
 fn constancy(fit: &PredictionFit<'_>, run_to_run: f64, workspace: &mut Workspace) -> Option<Finding> {
     let (layout, eta, free) = (fit.layout(), fit.eta(), fit.free());
     let blocks = physical_blocks(&fit.criterion, eta, &free, workspace)?;
@@ -472,8 +473,8 @@ fn coherent_share(describing: &DescribingFunction) -> Option<f64> {
     all.filter(|all| !all.is_empty()).map(|all| mean(&all))
 }
 
-/// Whether a form next to the one in front knows the response: one whose parameters make up for each other, the data
-/// leave as open as if they were fewer, and their errors carry no information.
+/// True if a form other than the best one determines the response: a form whose parameters compensate each other is as
+/// undetermined as if it had fewer parameters, and its errors carry no information.
 fn knows_the_response(of: &OperatorInForm) -> bool {
     let errors = response_errors(&of.operator, of.covariance.as_deref());
     errors.is_some_and(|all| all.iter().sum::<f64>() < LARGEST_RESPONSE_ERROR * all.len() as f64)

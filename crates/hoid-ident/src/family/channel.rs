@@ -1,4 +1,4 @@
-//! A further input: as requested, in a form, and its results.
+//! A further input: the request, its form, and the results.
 
 use std::{fmt, str::FromStr};
 
@@ -11,12 +11,12 @@ use crate::ResponsePoint;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ChannelRole {
-    /// A target that they see.
+    /// A target that the person sees.
     #[default]
     Feedforward,
-    /// Motion of the machine that they feel.
+    /// Motion of the machine that the person feels.
     Motion,
-    /// The output of the machine, which they see in addition to the error.
+    /// The output of the machine, which the person sees in addition to the error.
     Output,
 }
 
@@ -26,21 +26,21 @@ hoid_model::named_choice!(ChannelRole, "role of a channel", 3, {
     Output => "output",
 });
 
-/// A further input, as requested.
+/// A requested further input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeenChannel {
     /// Name of the channel in the records.
     pub name: String,
-    /// What it is to the person.
+    /// Its role for the person.
     pub role: ChannelRole,
-    /// How much of its future is shown, s.
+    /// Preview time, s.
     pub preview_s: f64,
-    /// The forms to choose from; no response at all is always one of them unless there is one form alone.
+    /// The candidate forms; if there are several, no response is also a candidate.
     pub forms: Vec<Form>,
 }
 
 impl SeenChannel {
-    /// A channel of which nothing else is known.
+    /// A channel with the default options.
     pub fn new(name: impl Into<String>, role: ChannelRole) -> Self {
         Self {
             name: name.into(),
@@ -52,7 +52,7 @@ impl SeenChannel {
 }
 
 impl fmt::Display for SeenChannel {
-    /// As it is typed: `r=feedforward:0.5`.
+    /// Formats it as typed: `r=feedforward:0.5`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}={}", self.name, self.role)?;
         if self.preview_s > 0.0 {
@@ -68,7 +68,7 @@ impl fmt::Display for SeenChannel {
 impl FromStr for SeenChannel {
     type Err = String;
 
-    /// `NAME`, `NAME=ROLE`, `NAME=ROLE:PREVIEW`, each with `/FORM` behind it.
+    /// `NAME`, `NAME=ROLE`, `NAME=ROLE:PREVIEW`, each optionally followed by `/FORM`.
     fn from_str(text: &str) -> Result<Self, String> {
         let expected = || "NAME=ROLE, as r=feedforward, r=feedforward:0.5 or r=feedforward/derivative".to_owned();
         let (text, form) = match text.split_once('/') {
@@ -104,42 +104,43 @@ impl FromStr for SeenChannel {
 pub struct ChannelFit {
     /// Name of the channel.
     pub name: String,
-    /// What it is to the person.
+    /// Its role for the person.
     pub role: ChannelRole,
-    /// How much of its future is shown, s.
+    /// Preview time, s.
     pub preview_s: f64,
-    /// The forms that were compared, and the response that is none.
+    /// The forms that were compared, including no response.
     pub forms: Vec<ChannelForm>,
-    /// Probability of so large a likelihood ratio of the best form without a response, for all forms that were tried.
+    /// Probability of such a likelihood ratio of the best form without a response, corrected for all forms that were
+    /// tried.
     pub p_value: f64,
-    /// The response; `None` where none was found.
+    /// The response; `None` if none was found.
     pub response: Option<ChannelResponse>,
 }
 
-/// A form of a channel, and what it leaves.
+/// A form of a channel, with its criteria.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ChannelForm {
-    /// The form; `None` is no response.
+    /// The form; `None` means no response.
     pub form: Option<Form>,
-    /// Loss of the prediction error fit, where there is one.
+    /// Loss of the prediction error fit, if there is one.
     pub loss: Option<f64>,
-    /// Akaike's criterion in units of the inflation, less that of the best.
+    /// Akaike's criterion in units of the inflation, relative to the best form.
     pub criterion: Option<f64>,
 }
 
 /// The response to a channel.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ChannelResponse {
-    /// The operator; its delay is that to the end of what is shown.
+    /// The operator; its delay is relative to the end of the preview.
     pub operator: FamilyOperator,
     /// Covariance of its coordinates by rows.
     pub covariance: Option<Vec<f64>>,
-    /// Its parameters; the delay `tau_f` is that to what happens now, and negative where the person anticipates.
+    /// Its parameters; the delay `tau_f` is relative to the current value, and negative if the person anticipates.
     pub parameters: Vec<Parameter>,
 }
 
 impl ChannelFit {
-    /// Gain and phase of the response to the channel at frequencies in rad/s; `None` where there is none.
+    /// Gain and phase of the response to the channel at frequencies in rad/s; `None` if there is none.
     pub fn frequency_response(
         &self,
         omega_rad_s: &[f64],
@@ -168,14 +169,14 @@ impl ChannelFit {
         Some(omega_rad_s.iter().map(point).collect())
     }
 
-    /// What is shown, in whole samples, s.
+    /// Preview time in whole samples, s.
     pub(super) fn lead_s(&self, sample_time: SampleTime) -> f64 {
         lead(self.preview_s, sample_time) as f64 * sample_time.s()
     }
 }
 
 impl ChannelFit {
-    /// What was compared, its response not yet known.
+    /// Result of the comparison, without the response.
     pub(super) fn compared(asked: &SeenChannel, forms: Vec<ChannelForm>, p_value: f64) -> Self {
         Self {
             name: asked.name.clone(),
@@ -188,7 +189,7 @@ impl ChannelFit {
     }
 }
 
-/// Samples of the future that are shown.
+/// Preview in samples.
 pub(super) fn lead(preview_s: f64, sample_time: SampleTime) -> usize {
     (preview_s / sample_time.s()).round() as usize
 }
@@ -196,7 +197,7 @@ pub(super) fn lead(preview_s: f64, sample_time: SampleTime) -> usize {
 /// A further input in one form, for a prediction.
 #[derive(Debug, Clone)]
 pub(super) struct Channel<'a> {
-    /// Which of the channels that were asked for.
+    /// Index among the requested channels.
     pub index: usize,
     pub form: Form,
     /// Bounds and start of its own coordinates.

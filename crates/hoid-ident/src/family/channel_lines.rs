@@ -1,17 +1,18 @@
-//! Several inputs at the lines of what excites the loop: their responses without a noise model.
+//! Several inputs at the lines of the excitations: their responses without a noise model.
 //!
-//! Where a target r and a disturbance d have lines of their own, the coefficients of a run over that of the exciting
-//! signal, `u_k = U_k/X_k` and `x_ik = X_ik/X_k`, are the same in all runs except for the remnant. Their means obey
+//! If a target r and a disturbance d have separate lines, the ratios of the coefficients of a run to that of the
+//! exciting signal, `u_k = U_k/X_k` and `x_ik = X_ik/X_k`, are the same in all runs except for the remnant. Their means
+//! satisfy
 //!
 //! `mean u = sum_i Y_i(j omega) mean x_i + n`
 //!
-//! at each line: those of d say what the person does about the error, those of r that and what they do about r besides
-//! (M. M. van Paassen and M. Mulder, *Identification of Human Operator Control Behaviour in Multiple-Loop Tracking Tasks*,
-//! IFAC MMS 1998). Forms are fitted to all lines together, so that nothing is interpolated, by least squares with
+//! at each line: those of d determine the response to the error, those of r the sum of this and the response to r (M.
+//! M. van Paassen and M. Mulder, *Identification of Human Operator Control Behaviour in Multiple-Loop Tracking Tasks*,
 //!
 //! `var n = |u_k - sum_i Y_i x_ik|^2` over the runs, and at the bins next to the lines, as [`super::lines`] weighs them.
 //!
-//! The remnant in e, which makes the ratio of two noisy numbers, is averaged over the runs before it is divided by.
+//! The remnant in e, because of which this would be a ratio of two noisy numbers, is averaged over the runs before the
+//! division.
 
 use std::sync::Arc;
 
@@ -39,9 +40,9 @@ use crate::{
 
 /// Starts from which the search runs to its end.
 const SEARCHES: usize = 4;
-/// Bins between the lines from which the remnant at a line is taken.
+/// Number of neighbouring bins from which the remnant at a line is estimated.
 const NEIGHBOURS: usize = 8;
-/// Rounds in which the variances are brought up to date.
+/// Rounds in which the variances are updated.
 const ROUNDS: usize = 2;
 
 /// The coefficients of u and of all inputs, the error first.
@@ -52,7 +53,7 @@ struct Coefficients {
 }
 
 impl Coefficients {
-    /// What the responses leave of u.
+    /// The part of u that the responses do not explain.
     fn left(&self, responses: &[Complex64]) -> Complex64 {
         self.inputs
             .iter()
@@ -61,32 +62,32 @@ impl Coefficients {
     }
 }
 
-/// A line of one exciting signal in all runs that have it.
+/// A line of one exciting signal in all runs that contain it.
 #[derive(Debug, Clone)]
 struct Line {
     exciter: usize,
     omega_rad_s: f64,
-    /// Over the coefficient of the exciting signal, of each run.
+    /// Coefficients divided by that of the exciting signal, for each run.
     runs: Vec<Coefficients>,
-    /// The same for the bins next to the line.
+    /// The same for the neighbouring bins.
     neighbours: Vec<Vec<Coefficients>>,
-    /// Of the means over the runs.
+    /// Variance of the means over the runs.
     variance: f64,
 }
 
-/// The lines of all that excites the loop.
+/// The lines of all excitations of the loop.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ChannelLines {
     lines: Vec<Line>,
-    /// Most runs that one line has.
+    /// Largest number of runs of a line.
     pub runs: usize,
     /// Names of the signals with lines.
     pub exciters: Vec<String>,
 }
 
 impl ChannelLines {
-    /// The lines of these records: of the channels, and of the excitation that is named or has a common name. `None` where
-    /// nothing has lines of its own.
+    /// Finds the lines of these records: of the channels, and of the excitation that is given or has a common name.
+    /// `None` if no signal has its own lines.
     pub fn of(
         records: &[Record],
         channels: &[String],
@@ -214,7 +215,7 @@ impl ChannelLines {
         }
     }
 
-    /// Variances of the means over the runs, where the inputs have these responses.
+    /// Computes the variances of the means over the runs for inputs with these responses.
     fn weigh(&mut self, responses: impl Fn(f64) -> Vec<Complex64>) {
         let of = |line: &Line| {
             let h = responses(line.omega_rad_s);
@@ -249,23 +250,23 @@ impl ChannelLines {
 pub(super) struct ChannelCriterion {
     lines: Arc<ChannelLines>,
     layout: FamilyLayout,
-    /// Which of the further inputs each channel of the layout is.
+    /// Index of the further input for each channel of the layout.
     places: Vec<usize>,
-    /// How far ahead each of them is taken, s.
+    /// Preview of each of them, s.
     leads_s: Vec<f64>,
     limits: Vec<(f64, f64)>,
     penalty: Vec<Penalty>,
-    /// By how much variances are larger than those of the lines.
+    /// Factor by which variances exceed those of the lines.
     excess: f64,
 }
 
-/// The operator and its channels through the lines.
+/// The best operator and channels at the lines.
 #[derive(Debug, Clone)]
 pub(super) struct ChannelMinimum {
-    /// Coordinates of the operator, then those of the channels of their own.
+    /// Coordinates of the operator, followed by those of the channels.
     pub coordinates: Vec<f64>,
     pub chi_squared: f64,
-    /// Two a line.
+    /// Number of equations, two per line.
     pub equations: usize,
     pub minimum: Minimum,
     /// The covariance of the coordinates; zero at a bound.
@@ -273,12 +274,12 @@ pub(super) struct ChannelMinimum {
 }
 
 impl ChannelMinimum {
-    /// Equations that are left.
+    /// Degrees of freedom: equations minus free coordinates.
     pub fn degrees_of_freedom(&self) -> usize {
         self.equations.saturating_sub(self.coordinates.len())
     }
 
-    /// chi^2 of each of them, at least one.
+    /// chi^2 per degree of freedom, at least one.
     pub fn excess(&self) -> f64 {
         match self.degrees_of_freedom() {
             0 => 1.0,
@@ -292,17 +293,17 @@ impl ChannelMinimum {
     }
 }
 
-/// A channel with its form, as a fit at the lines has it.
+/// A channel with its form, for a fit at the lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct InForm {
-    /// Which of the further inputs.
+    /// Index of the further input.
     pub index: usize,
     pub form: Form,
     pub lead_s: f64,
     pub delay_range_s: (f64, f64),
 }
 
-/// What all fits at the lines have in common.
+/// Common data of all fits at the lines.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct AtChannelLines<'l> {
     pub lines: &'l Arc<ChannelLines>,
@@ -314,7 +315,7 @@ pub(super) struct AtChannelLines<'l> {
 }
 
 impl AtChannelLines<'_> {
-    /// The criterion of these forms, with its prior.
+    /// Returns the criterion of these forms, with the prior.
     pub fn criterion(&self, form: Form, channels: &[InForm]) -> ChannelCriterion {
         let (sample_time, _) = self.sampling;
         let limits = coordinates::limits(form, self.neuromuscular, self.delay_range_s, sample_time);
@@ -341,7 +342,8 @@ impl AtChannelLines<'_> {
         }
     }
 
-    /// The lines with their variances: first those about these responses, then those about the best fit of these forms.
+    /// Returns the lines with their variances: first those about these responses, then those about the best fit of
+    /// these forms.
     pub fn weighed(
         &self,
         (form, channels): (Form, &[InForm]),
@@ -363,7 +365,7 @@ impl AtChannelLines<'_> {
         Arc::new(lines)
     }
 
-    /// The responses of a fit of these forms to the error and to this number of further inputs.
+    /// Responses of a fit of these forms to the error and to this number of further inputs.
     fn responses(
         &self,
         (form, channels): (Form, &[InForm]),
@@ -385,7 +387,7 @@ impl AtChannelLines<'_> {
         all
     }
 
-    /// The best search from the best points of a grid.
+    /// Returns the best result of searches from the best points of a grid.
     pub fn fit(&self, form: Form, channels: &[InForm]) -> Option<ChannelMinimum> {
         let criterion = self.criterion(form, channels);
         let mut starts: Vec<(f64, Vec<f64>)> = (criterion.grid().into_iter())
@@ -405,7 +407,7 @@ impl AtChannelLines<'_> {
     }
 }
 
-/// Places of the coordinates that a channel has for itself.
+/// Places of the coordinates that belong to a channel only.
 pub(super) fn own_places(form: Form, neuromuscular: bool) -> Vec<usize> {
     let all = form.coordinates(neuromuscular);
     let own = |i: &usize| !matches!(all[*i], Coordinate::LogOmega | Coordinate::LogZeta);
@@ -413,17 +415,17 @@ pub(super) fn own_places(form: Form, neuromuscular: bool) -> Vec<usize> {
 }
 
 impl ChannelCriterion {
-    /// Most runs that one line has.
+    /// Largest number of runs of a line.
     pub fn runs(&self) -> usize {
         self.lines.runs
     }
 
-    /// The prior of the operator.
+    /// Returns the prior of the operator.
     pub fn penalty(&self) -> &[Penalty] {
         &self.penalty
     }
 
-    /// The operator of the error at x.
+    /// Returns the operator for the error at x.
     ///
     /// # Errors
     /// Those of the operator.
@@ -431,14 +433,14 @@ impl ChannelCriterion {
         self.layout.operator(x, 0)
     }
 
-    /// The same without a prior, and with variances that are larger by this factor.
+    /// Returns the same without a prior, with variances larger by this factor.
     pub fn of_lines_alone(mut self, excess: f64) -> Self {
         self.penalty.clear();
         self.excess = excess;
         self
     }
 
-    /// Points from which searches start.
+    /// Starting points of the searches.
     fn grid(&self) -> Vec<Vec<f64>> {
         let (form, muscles) = (self.layout.form, self.layout.neuromuscular);
         let of_operator = &self.limits[..self.layout.operator_elements()];
@@ -461,7 +463,7 @@ impl ChannelCriterion {
         grid
     }
 
-    /// Operators at x: that of the error, then those of the channels.
+    /// Returns the operators at x: that of the error, followed by those of the channels.
     fn operators(&self, x: &[f64]) -> Result<Vec<FamilyOperator>, ModelError> {
         let mut all = vec![self.layout.operator(x, 0)?];
         for channel in &self.layout.channels {
@@ -470,7 +472,7 @@ impl ChannelCriterion {
         Ok(all)
     }
 
-    /// Of each operator, at one line: the sum of its input over the runs, turned by what is shown and held.
+    /// For each operator at one line: the sum of its input over the runs, with the phase of preview and hold.
     fn inputs(&self, line: &Line) -> (Complex64, Vec<Complex64>) {
         let n = line.runs.len() as f64;
         let omega = line.omega_rad_s;
@@ -482,7 +484,8 @@ impl ChannelCriterion {
         (u, std::iter::once(mean(0)).chain(of_channels).collect())
     }
 
-    /// Sets the gains that are best for the other coordinates, in which the model is linear; the criterion there.
+    /// Sets the gains that are best for the other coordinates, which is a linear problem, and returns the criterion
+    /// there.
     fn best_gains(&self, x: &mut [f64]) -> Option<f64> {
         let places: Vec<usize> = std::iter::once(0)
             .chain(self.layout.channels.iter().map(|c| c.place))
@@ -587,8 +590,8 @@ impl Objective for ChannelCriterion {
     }
 }
 
-/// Whether every further input has lines of its own, and something else has lines too: then no form is needed
-/// to tell the responses apart.
+/// True if every further input has its own lines and another signal has lines too: then no form is necessary to
+/// distinguish the responses.
 pub(super) fn tells_apart(lines: Option<&ChannelLines>, channels: &[String]) -> bool {
     lines.is_some_and(|lines| {
         let has = |name: &String| lines.exciters.contains(name);

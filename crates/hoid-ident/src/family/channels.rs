@@ -1,21 +1,22 @@
-//! Further inputs of a person, in addition to the error: a target with its future, the output of the machine, its motion.
+//! Further inputs of a person in addition to the error: a target with preview, the output of the machine, its motion.
 //!
 //! `u = Y e + sum_i Y_i x_i + (C/D) eps`: a human is a multichannel controller (D. T. McRuer and H. R. Jex, *IEEE
 //! Trans. Human Factors in Electronics* 8 (1967) 231-249, section II; M. Mulder et al., *IEEE Trans. Human-Machine
 //! Systems* 48 (2018) 457-469). Each channel has its own form, gains and delay, and the neuromuscular system of the
 //! operator, through which all of them move the hand. All are fitted together by prediction error: in a closed loop the
-//! response to e of a person who also sees the target is not `U/E`, at its lines or anywhere.
+//! response to e of a person who also sees the target is not `U/E`, at its lines or elsewhere.
 //!
 //! **Starts.** An ARX model of high order with all inputs is one linear regression and consistent in a closed loop
 //! (L. Ljung, *System Identification*, 1999, sections 13.4 and 13.5). Each form is fitted to its responses; searches from
 //! elsewhere end in other minima.
 //!
-//! **Forms** of a channel are compared at the lines of what excites the loop ([`super::channel_lines`]), where there are
-//! lines, else by prediction errors, in units of the inflation kappa; no response at all is among them: that one is given up where the likelihood ratio of the best form is beyond what chance gives in one of a hundred
-//! records without a response, divided by the number of forms that were tried (Bonferroni).
+//! **Forms** of a channel are compared at the lines of the excitations of the loop ([`super::channel_lines`]), if there
+//! are lines, otherwise by prediction errors, in units of the inflation kappa. No response at all is one of the
+//! candidates: it is rejected if the likelihood ratio of the best form exceeds the value that chance gives in one of a
+//! hundred records without a response, divided by the number of forms that were tried (Bonferroni).
 //!
-//! **A future that is shown** makes delays that are negative: x is taken from as many samples ahead as are shown, and what
-//! is fitted is the delay to that.
+//! **A preview** makes delays negative: x is advanced by the samples of the preview, and the fitted delay is relative
+//! to that.
 
 use std::sync::Arc;
 
@@ -52,12 +53,12 @@ use crate::{
 const BY_CHANCE: f64 = 0.01;
 /// Cost of a parameter of a form, in units of chi^2.
 const EACH_MORE: f64 = 4.0;
-/// Part of an input that the others must leave of it.
+/// Least part of an input that the others must not explain.
 const LEAST_OWN_PART: f64 = 1e-9;
-/// Order of A of the regression, and the fewest coefficients before it is given up.
+/// Order of A of the regression, and the least number of coefficients before it is abandoned.
 const POLES: usize = 16;
 const FEWEST: usize = 4;
-/// Most coefficients of a B, and the time that it covers, s.
+/// Largest number of coefficients of a B, and the time that it covers in s.
 const MOST_GAINS: usize = 60;
 const RESPONSE_S: f64 = 0.7;
 /// Part of its diagonal that is added to the normal matrix.
@@ -65,23 +66,24 @@ const RIDGE: f64 = 1e-7;
 /// Frequencies of the responses, rad/s, evenly over their logarithm.
 const BAND_RAD_S: (f64, f64) = (0.5, 20.0);
 const POINTS: usize = 24;
-/// Longest delay of a channel, s, behind what is shown first.
+/// Longest delay of a channel relative to the end of the preview, s.
 const LONGEST_DELAY_S: f64 = 0.8;
 
-/// Probability of a likelihood ratio as large for so many more parameters, in the best of so many forms.
+/// Probability of a likelihood ratio at least as large for this number of additional parameters, in the best of this
+/// number of forms.
 fn by_chance(ratio: f64, more: usize, forms: usize) -> f64 {
     let chance = ChiSquared::new(more as f64).map_or(1.0, |chi| chi.sf(ratio.max(0.0)));
     (chance * forms as f64).min(1.0)
 }
 
-/// The channels of the records: their values without what was taken out of e and u.
+/// The channels of the records, with the trend removed as from e and u.
 #[derive(Debug)]
 pub(super) struct Seen<'s> {
     all: &'s [SeenChannel],
-    /// Of each channel, of each record.
+    /// Values of each channel in each record.
     values: Vec<Vec<Vec<f64>>>,
     leads: Vec<usize>,
-    /// The records as they were, of whole periods, with what was taken out of e and u.
+    /// The original records of whole periods, with the trend that was removed from e and u.
     whole: Vec<Record>,
 }
 
@@ -96,7 +98,7 @@ pub(super) struct Compared<'a> {
 }
 
 impl<'s> Seen<'s> {
-    /// The channels, and the records as far as all of them have samples.
+    /// Returns the channels, and the records truncated to the samples that all of them have.
     ///
     /// # Errors
     /// [`IdentError::BadOption`] for a channel that a record lacks, that is constant, or that is a sum of other inputs.
@@ -170,12 +172,13 @@ impl<'s> Seen<'s> {
         Ok((cut, found))
     }
 
-    /// Whether there is none.
+    /// True if there are no channels.
     pub fn is_empty(&self) -> bool {
         self.all.is_empty()
     }
 
-    /// Inputs that are constant, or combinations of those before them: `r = e + y` of the three signals of one loop.
+    /// Checks for inputs that are constant, or combinations of previous ones: `r = e + y` of the three signals of one
+    /// loop.
     fn check(&self, records: &[Record]) -> Result<(), IdentError> {
         let refuse = |found: String, expected: String| {
             Err(IdentError::BadOption {
@@ -199,7 +202,7 @@ impl<'s> Seen<'s> {
                     ),
                 );
             }
-            // Twice: the second time takes out the rounding of the first.
+            // Twice: the second time removes the rounding error of the first.
             let mut left = own;
             for _ in 0..2 {
                 for known in &basis {
@@ -226,7 +229,7 @@ impl<'s> Seen<'s> {
         Ok(())
     }
 
-    /// First sample that all channels leave without anything from before the record, noise left out.
+    /// First sample for which no channel needs samples before the record, without the noise model.
     pub fn first_regressed_sample(&self, neuromuscular: bool, sampling: (SampleTime, Intersample)) -> usize {
         let (sample_time, intersample) = sampling;
         let muscles = if neuromuscular { 2 } else { 0 };
@@ -243,12 +246,12 @@ impl<'s> Seen<'s> {
         self.all.iter().map(|channel| channel.name.clone()).collect()
     }
 
-    /// The lines of what excites the loop; `None` where there are none.
+    /// Returns the lines of the excitations of the loop; `None` if there are none.
     pub fn lines(&self, excitation: Option<&str>, period_s: Option<f64>) -> Option<Arc<ChannelLines>> {
         ChannelLines::of(&self.whole, &self.names(), (excitation, period_s)).map(Arc::new)
     }
 
-    /// Each channel in a form.
+    /// Returns a channel in a form.
     fn in_form(&self, index: usize, form: Form, (sample_time, intersample): (SampleTime, Intersample)) -> InForm {
         let lead_s = self.leads[index] as f64 * sample_time.s();
         InForm {
@@ -259,7 +262,7 @@ impl<'s> Seen<'s> {
         }
     }
 
-    /// The lines with their variances, from the responses without a form.
+    /// Returns the lines with their variances, from the responses without a form.
     pub fn weighed(
         &self,
         at: &AtChannelLines<'_>,
@@ -286,11 +289,11 @@ impl<'s> Seen<'s> {
         })
     }
 
-    /// The forms of the channels at the lines, whichever of these forms the operator has: what was compared, and those
-    /// with a response, in their forms.
+    /// Chooses the forms of the channels at the lines, for any of these forms of the operator: the comparison, and the
+    /// channels with a response in their forms.
     ///
     /// # Errors
-    /// [`IdentError::NoFiniteLoss`] where nothing could be fitted.
+    /// [`IdentError::NoFiniteLoss`] if nothing could be fitted.
     pub fn choose_at_lines<'a>(
         &self,
         at: &AtChannelLines<'_>,
@@ -320,7 +323,7 @@ impl<'s> Seen<'s> {
             let fits: Vec<(Form, Option<(Form, ChannelMinimum)>)> =
                 begun[k].iter().map(|c| (c.form, best_of(&with(c.form)))).collect();
             let found = fits.iter().filter_map(|(form, fit)| Some((*form, fit.as_ref()?)));
-            // One more parameter has to explain more than chance does in one of twenty records.
+            // An additional parameter has to explain more than chance does in one of twenty records.
             let excess =
                 (fits.iter().filter_map(|(_, fit)| Some(fit.as_ref()?.1.excess()))).fold(f64::INFINITY, f64::min);
             let cost = |fit: &ChannelMinimum| fit.chi_squared / excess + EACH_MORE * fit.coordinates.len() as f64;
@@ -371,10 +374,10 @@ impl<'s> Seen<'s> {
         })
     }
 
-    /// The responses to e and to each channel, by one regression, without a form.
+    /// Estimates the responses to e and to each channel by one regression, without a form.
     ///
     /// # Errors
-    /// [`IdentError::SingularRegressors`] where the records do not tell the inputs apart.
+    /// [`IdentError::SingularRegressors`] if the records do not distinguish the inputs.
     pub fn responses(&self, records: &[Record]) -> Result<Vec<Vec<MeasuredResponse>>, IdentError> {
         let ts = records[0].sample_time().s();
         let shortest = records.iter().map(Record::len).min().unwrap_or(0);
@@ -408,7 +411,7 @@ impl<'s> Seen<'s> {
         for (values, lead) in self.values.iter().zip(&self.leads) {
             further.push(FurtherInput {
                 orders: InputOrders {
-                    // The delay to the end of what is shown comes on top.
+                    // The delay relative to the end of the preview is longer by the preview.
                     nb: (nb + lead).min(2 * MOST_GAINS),
                     nf: 0,
                     nk: 0,
@@ -440,7 +443,7 @@ impl<'s> Seen<'s> {
         (0..p).for_each(|i| at.gram[i * p + i] *= 1.0 + RIDGE);
         let theta = solve_symmetric(&at.gram, &at.descent)?;
         let squares = (at.sum_of_squares - dot(&theta, &at.descent)).max(0.0);
-        // Never better known than the rounding of such a regression.
+        // The variance is at least that of the rounding error of such a regression.
         let variance = squares.max(1e-12 * at.sum_of_squares) / (n - p) as f64;
         let mut inverse = vec![0.0; p * p];
         for i in 0..p {
@@ -486,10 +489,10 @@ impl<'s> Seen<'s> {
         Some(all)
     }
 
-    /// Every channel with the form that lies nearest to its response.
+    /// Returns each channel with the form that is nearest to its response.
     ///
     /// # Errors
-    /// [`IdentError::NoFiniteLoss`] where no form could be fitted to a response.
+    /// [`IdentError::NoFiniteLoss`] if no form could be fitted to a response.
     pub fn begun(
         &self,
         responses: &[Vec<MeasuredResponse>],
@@ -532,11 +535,11 @@ impl<'s> Seen<'s> {
         Ok(all)
     }
 
-    /// The forms of the channels by prediction error, with this form of the operator from these coordinates: leaves in
-    /// the prediction those that have a response, and returns what was compared.
+    /// Chooses the forms of the channels by prediction error, for this form of the operator from these coordinates:
+    /// only those with a response remain in the prediction. Returns the comparison.
     ///
     /// # Errors
-    /// [`IdentError::NoFiniteLoss`] where nothing could be fitted.
+    /// [`IdentError::NoFiniteLoss`] if nothing could be fitted.
     pub fn choose<'a>(
         &self,
         prediction: &mut Prediction<'a>,
@@ -607,10 +610,10 @@ impl<'s> Seen<'s> {
     }
 }
 
-/// Puts the responses of the final fit into what was compared.
+/// Inserts the responses of the final fit into the comparison.
 ///
 /// # Errors
-/// Those of the operator.
+/// The errors of the operator.
 pub(super) fn with_responses(
     mut compared: Vec<ChannelFit>,
     prediction: &Prediction<'_>,
@@ -649,7 +652,7 @@ pub(super) fn with_responses(
                     name: "tau_f".to_owned(),
                     value: delay(parameter.value),
                     interval: parameter.interval.map(|(low, high)| (delay(low), delay(high))),
-                    // Zero is a delay as any other.
+                    // Zero is an ordinary value of this delay.
                     determined: parameter.standard_error.is_some(),
                     ..parameter
                 }
@@ -667,10 +670,10 @@ pub(super) fn with_responses(
 }
 
 impl FamilyFit {
-    /// A record with u without the responses to the further inputs, from rest.
+    /// Returns a record whose u is without the responses to the further inputs, computed from rest.
     ///
     /// # Errors
-    /// [`IdentError`] for a record without one of them.
+    /// [`IdentError`] if a record lacks one of them.
     pub fn without_channels(&self, record: &Record, detrend: Detrend) -> Result<Record, IdentError> {
         let (channels, intersample) = (self.channels.as_slice(), self.intersample);
         let asked: Vec<SeenChannel> = (channels.iter())
@@ -843,7 +846,7 @@ mod tests {
         let together =
             |fit: &crate::family::FamilyFit| fit.verdict.findings().iter().any(|f| f.kind == "inputs-together");
         assert!(!together(&fit));
-        // Where the target alone moves the loop, that is reported.
+        // If the target alone excites the loop, the reason is reported.
         let alone = disturbed(&operator, Some(&target), (0, 0.0), 3);
         let alone = estimator().fit(std::slice::from_ref(&alone)).unwrap();
         assert!(
@@ -851,7 +854,7 @@ mod tests {
             "{:?}",
             alone.channels[0]
         );
-        // With one input the response to e is another one, and that is reported.
+        // With one input the response to e differs, and this is reported.
         let one = FamilyEstimator {
             channels: Vec::new(),
             forms: vec![Form::Gain],

@@ -1,4 +1,4 @@
-//! Forms that the data do not refute, and the best of them.
+//! Forms that the data do not reject, and the best of them.
 //!
 //! Each form has Akaike's criterion, `chi^2 + 2 p` at the lines of an excitation, or `n ln V/kappa + 2 p` of the
 //! prediction error, kappa the inflation of variances; with little noise Schwarz's ([`super::comparison`]). Estimates
@@ -8,7 +8,7 @@
 
 use hoid_model::Form;
 
-/// Criterion for a form.
+/// Criteria of a form.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FormFigures {
     /// The form.
@@ -18,27 +18,27 @@ pub struct FormFigures {
     /// Akaike's criterion: `chi^2 + 2 p` at the lines, or `n ln V/kappa + 2 p`; with little noise Schwarz's, `ln n` in
     /// place of 2.
     pub criterion: Option<f64>,
-    /// Weight in averages over forms; zero for a form that the data cannot determine, or refute.
+    /// Weight in averages over forms; zero for a form that the data do not determine, or reject.
     pub weight: f64,
-    /// chi^2 at the lines of held-out runs, each by the fit to the others, summed over runs.
+    /// chi^2 at the lines of held-out runs, each for the fit to the other runs, summed over runs.
     pub held_out: Option<f64>,
     /// chi^2 at the lines.
     pub chi_squared: Option<f64>,
     /// Its degrees of freedom.
     pub degrees_of_freedom: Option<usize>,
-    /// True when the prediction error search converged off the border of the search range.
+    /// True if the prediction error search converged inside the search range.
     pub converged: bool,
 }
 
-/// Difference of Akaike's criterion that is not evidence.
+/// Difference of Akaike's criterion that counts as no evidence.
 const NO_EVIDENCE: f64 = 2.0;
-/// Weight below which a form is left out: its part in a mean is less than its error.
+/// Weight below which a form is left out: its contribution to a mean is less than the error of the mean.
 const LEAST_WEIGHT: f64 = 0.02;
 /// Largest number of forms that are averaged.
 const MOST_FORMS: usize = 4;
 
-/// The best form and the weight of each, from their criteria, simplest form first; `None` for a form that does not
-/// count. No form for no criterion.
+/// Returns the best form and the weight of each, from their criteria, simplest form first; a criterion of `None`
+/// excludes a form. `None` if no form has a criterion.
 pub(super) fn weigh(criteria: &[Option<f64>]) -> Option<(usize, Vec<f64>)> {
     let least = criteria.iter().flatten().copied().min_by(f64::total_cmp)?;
     let front = criteria

@@ -2,12 +2,11 @@
 //!
 //! `g_c = sum psi eps` and `G_c = sum psi psi'` over cluster c.
 //!
-//! **Clusters** are the records where there are five or more. Fewer are cut into blocks of equal
-//! length, some eight in all, none shorter than four seconds: longer than the memory of residuals
-//! and of the loop. Single variances of so few blocks scatter by themselves; blocks give one number,
-//! the inflation kappa of all variances (`covariances`), at least one. What differs from one run to
-//! the next cannot be seen in one run: the variation of people's gain is added as it was seen in
-//! others (`covariances`).
+//! **Clusters** are the records if there are five or more. Fewer are cut into blocks of equal length, about eight in
+//! all, none shorter than four seconds: longer than the memory of residuals and of the loop. Single variances of so few
+//! blocks scatter themselves; blocks give one number, the inflation kappa of all variances (`covariances`), at least
+//! one. The variation from one run to the next cannot be determined from one run: the variation of people's gain is
+//! added with the value observed in other data (`covariances`).
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -19,14 +18,14 @@ use crate::{
     linalg::least_squares::dot,
 };
 
-/// Records from which on each of them is a cluster.
+/// Number of records from which on each record is a cluster.
 const FEWEST_RECORDS: usize = 5;
 /// Blocks into which fewer records are cut.
 const BLOCKS: usize = 8;
 /// Shortest block, s.
 const SHORTEST_BLOCK_S: f64 = 4.0;
 
-/// Degrees of freedom of errors from the scatter of n clusters.
+/// Degrees of freedom of standard errors from the scatter of n clusters.
 pub(super) fn freedom(clusters: usize) -> f64 {
     clusters.saturating_sub(1).max(1) as f64
 }
@@ -36,10 +35,10 @@ pub(super) fn quantile(clusters: usize) -> f64 {
     StudentsT::new(0.0, 1.0, freedom(clusters)).map_or(1.96, |t| t.inverse_cdf(0.975))
 }
 
-/// Definition of the clusters.
+/// Type of the clusters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum ClusterKind {
-    /// Each record is one.
+    /// Each record is a cluster.
     Runs,
     /// Blocks of records.
     Blocks,

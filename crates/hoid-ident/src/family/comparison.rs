@@ -1,9 +1,10 @@
-//! Reliability of the forms that were tried: what [`super::choice`] weighs them by.
+//! Comparison of the forms that were tried: the basis of their weights in [`super::choice`].
 //!
-//! Where an excitation was recorded, forms are compared at its lines; else by their prediction
-//! errors, all in units of one inflation kappa, so that a form does not look well by its own large
-//! variance. Where there is little noise ([`super::low_noise`]) there is a true form to be found, and a parameter costs Schwarz's `ln n` (G.
-//! Schwarz, *Annals of Statistics* 6 (1978) 461-464) in place of Akaike's 2. A form whose parameters the data leave open counts only where all are so.
+//! If an excitation was recorded, forms are compared at its lines; otherwise by their prediction errors, all in units
+//! of one inflation kappa, so that a large variance of its own is no advantage for a form. With little noise
+//! ([`super::low_noise`]) there is a true form to be found, and a parameter costs Schwarz's `ln n` (G. Schwarz, *Annals
+//! of Statistics* 6 (1978) 461-464) instead of Akaike's 2. A form with parameters that the data do not determine counts
+//! only if all forms have such parameters.
 
 use hoid_model::{FamilyOperator, Form, operator_family::Coordinate};
 use hoid_numerics::statistics::upper_median;
@@ -18,34 +19,34 @@ use super::{
 };
 use crate::IdentError;
 
-/// Difference of criteria at which two forms count as equal.
+/// Difference of criteria up to which two forms count as equal.
 const THE_SAME: f64 = 0.05;
-/// Sums of squares over another, without noise, that are no worse.
+/// Ratio of sums of squares, without noise, up to which a form counts as equally good.
 const NO_BETTER: f64 = 1.1;
-/// Standard errors from zero of a gain that is known.
+/// Standard errors from zero of a gain that counts as known.
 const LEAST_ERRORS: f64 = 2.0;
 
-/// A form with the findings of it.
+/// A form with its fits.
 pub(super) struct Tried<'a> {
     pub form: Form,
     pub lines: Option<LineFit>,
     pub fit: Result<PredictionFit<'a>, IdentError>,
 }
 
-/// Reliability of all forms, and which of them is in front.
+/// Criteria of all forms, and the best form.
 pub(super) struct Comparison {
-    /// Place of the best form; `None` if none could be fitted.
+    /// Index of the best form; `None` if none could be fitted.
     pub front: Option<usize>,
-    /// For each form, in their order.
+    /// Criteria of each form, in the order of the forms.
     pub figures: Vec<FormFigures>,
 }
 
 impl Comparison {
-    /// The forms are ordered from the simplest.
+    /// Compares the forms, which are ordered from the simplest.
     pub fn of(tried: &[Tried<'_>], prediction: &Prediction<'_>) -> Self {
         let criteria = criteria(tried, prediction);
         let mut counting = criteria.clone();
-        // A form that lacks a lag, where there is one, takes the neuromuscular poles for it.
+        // A form that lacks an existing lag uses the neuromuscular poles for it.
         retain(&mut counting, |i| !has_lost_its_muscles(&tried[i]));
         retain(&mut counting, |i| tried[i].fit.as_ref().is_ok_and(|fit| !is_open(fit)));
         if prediction.noise_free().is_some() {
@@ -63,8 +64,8 @@ impl Comparison {
     }
 }
 
-/// A lead with a droop is the quadratic numerator over s with real zeros: where both end at the same place they are
-/// one form with two names, and count once.
+/// A lead with a droop is the quadratic numerator over s with real zeros: if both converge to the same operator, they
+/// are one form with two names, and count once.
 fn count_once(counting: &mut [Option<f64>], tried: &[Tried<'_>]) {
     let place = |form: Form| tried.iter().position(|t| t.form == form);
     if let (Some(quadratic), Some(droop)) = (place(Form::QuadraticIntegral), place(Form::LeadDroop))
@@ -75,8 +76,8 @@ fn count_once(counting: &mut [Option<f64>], tried: &[Tried<'_>]) {
     }
 }
 
-/// Without noise a form that is not right leaves a multiple of one that is: of those that fit equally well, the simplest
-/// are left. Sums of squares below `equal` are one.
+/// Without noise, a form that is not right leaves a multiple of the residual of one that is: of the forms with an equal
+/// fit, only the simplest ones are kept. Sums of squares below `equal` count as equal.
 fn simplest_alone(counting: &mut [Option<f64>], tried: &[Tried<'_>], equal: f64) {
     let fit = |i: usize| tried[i].fit.as_ref().ok();
     let squares = |i: usize| fit(i).map_or(f64::INFINITY, |fit| (fit.loss * fit.residuals as f64).max(equal));
@@ -88,7 +89,7 @@ fn simplest_alone(counting: &mut [Option<f64>], tried: &[Tried<'_>], equal: f64)
     retain(counting, |i| Some(size(i)) == fewest);
 }
 
-/// Leaves those that are good, where any of those that count is.
+/// Keeps only the forms that satisfy the condition, if any form that counts satisfies it.
 fn retain(counting: &mut [Option<f64>], is_good: impl Fn(usize) -> bool) {
     let good: Vec<bool> = (0..counting.len())
         .map(|i| counting[i].is_some() && is_good(i))
@@ -102,8 +103,8 @@ fn retain(counting: &mut [Option<f64>], is_good: impl Fn(usize) -> bool) {
     }
 }
 
-/// True if a combination of parameters is open, or the gain is not distinguished from zero: the other parameters of the
-/// form are then shares of nothing, and a form with fewer of them states the same.
+/// True if a combination of parameters is undetermined, or the gain does not differ from zero: the other parameters of
+/// the form then have no meaning, and a form with fewer of them is equivalent.
 fn is_open(fit: &PredictionFit<'_>) -> bool {
     let p = fit.parameters();
     let known = |covariances: Covariances| {
@@ -129,14 +130,14 @@ fn has_lost_its_muscles(tried: &Tried<'_>) -> bool {
     of_fit.is_some_and(|operator| lags(&operator)) || tried.lines.as_ref().is_some_and(|l| lags(&l.operator))
 }
 
-/// One kappa for all forms, so that their criteria can be compared: the median.
+/// Returns one kappa for all forms, the median, so that their criteria are comparable.
 fn common_inflation(tried: &[Tried<'_>]) -> f64 {
     let fits = tried.iter().filter_map(|t| t.fit.as_ref().ok());
     let mut all: Vec<f64> = fits.map(|fit| fit.inflation).collect();
     upper_median(&mut all).unwrap_or(1.0)
 }
 
-/// The criterion of each form; `None` for one that could not be fitted.
+/// Returns the criterion of each form; `None` if it could not be fitted.
 fn criteria(tried: &[Tried<'_>], prediction: &Prediction<'_>) -> Vec<Option<f64>> {
     let little_noise = prediction.little_noise.is_some();
     let inflation = if little_noise {

@@ -1,21 +1,21 @@
-//! Within what the coordinates of an operator are searched for.
+//! Search ranges of the coordinates of an operator.
 
 use hoid_model::{
     SampleTime,
     operator_family::{Coordinate, Form},
 };
 
-/// Longest lead time, s: a longer one is a pure derivative to any record of people.
+/// Longest lead time, s: for records of people a longer one is equivalent to a pure derivative.
 const LONGEST_LEAD_S: f64 = 30.0;
-/// Bounds of `1/T_I`, 1/s: a pure integration below, no lag at all above.
+/// Bounds of `1/T_I`, 1/s: a pure integration at the lower bound, no lag at the upper.
 pub(super) const LAG_RATE: (f64, f64) = (1e-3, 30.0);
 /// Largest droop, rad/s.
 const LARGEST_DROOP: f64 = 10.0;
-/// Bounds of the damping ratio: nearly undamped below, two separate lags above.
+/// Bounds of the damping ratio: nearly undamped at the lower bound, two separate lags at the upper.
 const DAMPING: (f64, f64) = (0.02, 5.0);
-/// Lowest neuromuscular frequency, rad/s: below, it is not a muscle that is seen.
+/// Lowest neuromuscular frequency, rad/s: a lower one does not describe a muscle.
 const LOWEST_FREQUENCY: f64 = 2.0;
-/// Largest omega_nm as a part of pi/Ts.
+/// Largest omega_nm relative to pi/Ts.
 const HIGHEST_FREQUENCY: f64 = 0.95;
 
 /// Lower and upper bound of each coordinate.
@@ -38,19 +38,19 @@ pub(crate) fn limits(
     form.coordinates(neuromuscular).iter().map(of).collect()
 }
 
-/// How near to each other the points are from which searches start.
+/// Density of the grid of starting points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Grid {
-    /// For people: the prior holds their neuromuscular system near to the default.
+    /// For people: the prior keeps their neuromuscular system near the default.
     Default,
-    /// For a response that is known exactly, of whom it may be.
+    /// For a response that is known exactly, of any operator.
     Dense,
 }
 
-/// Values of a coordinate from which searches start.
+/// Starting values of a coordinate.
 fn start_values(coordinate: Coordinate, (low, high): (f64, f64), grid: Grid) -> Vec<f64> {
     let values: &[f64] = match coordinate {
-        // The gain is solved for.
+        // The gain is computed from the other coordinates.
         Coordinate::Gain => &[1.0],
         Coordinate::Lead => &[0.15, 0.5, 1.2, 3.0],
         Coordinate::LagRate => &[0.03, 0.2, 1.0],

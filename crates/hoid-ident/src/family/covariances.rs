@@ -1,4 +1,4 @@
-//! Error bars that hold where the model does not: from the scores of runs, or of blocks of them.
+//! Error bars that are valid even if the model is not: from the scores of runs, or of blocks of runs.
 //!
 //! With `g_c = sum psi eps` and `G_c = sum psi psi'` over cluster c, the estimate without it is, in
 //! one Gauss-Newton step from the whole,
@@ -11,8 +11,8 @@
 //! It holds whatever the residuals are within a cluster, and is not too small with few of them.
 //! Its quantiles are Student's with n - 1 degrees of freedom.
 //!
-//! **The prior** P is a measurement that no cluster holds: what it leaves open is added,
-//! `kappa sigma^2 H^-1 P H^-1`, H = G + P.
+//! **The prior** P is a measurement that no cluster contains; its contribution is added, `kappa sigma^2 H^-1 P H^-1`, H
+//! = G + P.
 
 use hoid_model::{Complex64, FamilyOperator, uncertainty::variance_along};
 use hoid_numerics::statistics::mean;
@@ -29,41 +29,39 @@ use crate::{
     optimize::Linearisation,
 };
 
-/// Frequencies at which two responses are compared.
+/// Number of frequencies at which two responses are compared.
 const POINTS: usize = 24;
-/// Frequencies at which the response is judged, rad/s.
+/// Frequencies at which the response is compared, rad/s.
 pub(super) const BAND_RAD_S: [f64; 5] = [0.7, 1.3, 2.4, 4.3, 8.0];
 
-/// Covariances of eta: by clusters with the prior's part, and by the model.
+/// Covariances of eta: from clusters, with the contribution of the prior, and from the model.
 #[derive(Debug, Clone)]
 pub(super) struct Covariances {
     pub clustered: Vec<f64>,
     pub model_based: Vec<f64>,
-    /// Variances that single elements have in addition. They are not a part of the covariance: the
-    /// response is known better than they are, since the elements err together.
+    /// Additional variances of single elements. They are not part of the covariance: the response is known better than
+    /// single elements, since the errors of the elements are correlated.
     pub extra_variance: Vec<f64>,
 }
 
 impl Covariances {
-    /// The covariance of the coordinates of a record's operator, out of one of eta.
+    /// Extracts the covariance of the coordinates of a record's operator from that of eta.
     pub fn of_operator(of_eta: &[f64], layout: &FamilyLayout, record: usize) -> Vec<f64> {
         let (p, places) = (layout.limits().len(), &layout.positions(record)[..layout.coordinates()]);
         let pairs = places.iter().flat_map(|&i| places.iter().map(move |&j| i * p + j));
         pairs.map(|at| of_eta[at]).collect()
     }
 
-    /// Adds the bias that another estimate shows: `d d'`, d the difference to it.
+    /// Adds the bias relative to another estimate: `d d'`, d the difference to it.
     ///
-    /// The prediction error fit is biased where its noise model is wrong, by an amount that no
-    /// scatter shows; an estimate that does not rest on that noise model reports it. The
-    /// errors are then built from the mean squared error, variance plus squared bias, with d for the bias: all of
-    /// it, and not the `d d'/3` of a truth that may lie anywhere between the two, since the bias is
-    /// on one side. Elements at a bound stay as they are.
+    /// The prediction error fit is biased if its noise model is wrong, by an amount that no scatter shows; an estimate
+    /// without that noise model shows it. The errors are then computed from the mean squared error, variance plus
+    /// squared bias, with d for the bias: all of it, and not the `d d'/3` of a true value that is anywhere between the
+    /// two, since the bias is on one side. Elements at a bound remain unchanged.
     ///
-    /// Errors are to first order, and the other estimate may be far along a ridge of the criterion,
-    /// as a gain and a lag that grow together are: `J d`, J the gradient of the response, is then no
-    /// difference of responses. There the [difference](responding) that explains that of the
-    /// responses is in place of d.
+    /// Errors are to first order, and the other estimate may be far along a ridge of the criterion, as with a gain and
+    /// a lag that increase together: `J d`, J the gradient of the response, is then not the difference of the
+    /// responses. In this case d is replaced by the [difference](responding) that explains that of the responses.
     pub fn add_bias(&mut self, fit: &PredictionFit<'_>, other: &[f64]) {
         let p = fit.parameters();
         let mut difference = vec![0.0; p];
@@ -81,7 +79,7 @@ impl Covariances {
         }
     }
 
-    /// Adds `weight d^2` to the variances of single elements, of those that it counts for.
+    /// Adds `weight d^2` to the variances of the single elements to which it applies.
     pub fn add_extra_variance(
         &mut self,
         fit: &PredictionFit<'_>,
@@ -96,8 +94,8 @@ impl Covariances {
         }
     }
 
-    /// Intervals by profile likelihood include kappa alone: if variances are larger, their ends are
-    /// moved out in the ratio of the standard errors.
+    /// Intervals by profile likelihood include only kappa: if variances are larger, the ends are moved outwards in the
+    /// ratio of the standard errors.
     pub fn widen(&self, fit: &PredictionFit<'_>, profiles: &mut [Option<(f64, f64)>]) {
         let p = fit.parameters();
         for (i, profile) in profiles.iter_mut().enumerate() {
@@ -125,8 +123,8 @@ pub(super) fn response_errors(
     }))
 }
 
-/// What the elements of the operator and of its channels, off their bounds, differ by from another estimate, as far as
-/// it has them.
+/// Differences of the elements of the operator and of its channels that are off their bounds to another estimate, as
+/// far as it contains them.
 fn differences(fit: &PredictionFit<'_>, other: &[f64]) -> Vec<(usize, f64)> {
     let elements = fit.layout().noise_begins();
     let free = fit.free().into_iter().filter(|place| *place < elements);
@@ -134,14 +132,13 @@ fn differences(fit: &PredictionFit<'_>, other: &[f64]) -> Vec<(usize, f64)> {
         .collect()
 }
 
-/// Amount by which `J d` may exceed the difference of two responses before it does not correspond
-/// to any.
+/// Factor by which `J d` may exceed the difference of two responses before it is replaced.
 const MOST_OVERSTATED: f64 = 2.0;
-/// Part of its diagonal that makes `J' J` regular.
+/// Relative part of its diagonal that is added to `J' J` to make it regular.
 const RIDGE: f64 = 1e-9;
 
-/// The least squares solution of `J d = H - H_other` over the band of manual control and an octave next to it, relative
-/// to |H|; `None` if the differences of the elements explain it, or elements belong to single records.
+/// Least squares solution of `J d = H - H_other` over the band of manual control and an adjacent octave on each side,
+/// relative to |H|; `None` if the differences of the elements explain it, or elements belong to single records.
 fn responding(fit: &PredictionFit<'_>, other: &[f64], differences: &[(usize, f64)]) -> Option<Vec<(usize, f64)>> {
     let layout = fit.layout();
     let places = &layout.positions(0)[..layout.coordinates()];
@@ -162,7 +159,7 @@ fn responding(fit: &PredictionFit<'_>, other: &[f64], differences: &[(usize, f64
     )
 }
 
-/// The same of two operators, for these coordinates and their differences.
+/// The same for two operators, with these coordinates and their differences.
 fn explaining(here: &FamilyOperator, there: &FamilyOperator, coordinates: &[usize], d: &[f64]) -> Option<Vec<f64>> {
     let q = coordinates.len();
     let (mut total, mut linear) = (Linearisation::empty(q), 0.0);
@@ -184,10 +181,10 @@ fn explaining(here: &FamilyOperator, there: &FamilyOperator, coordinates: &[usiz
     solve_symmetric(&total.gram, &total.descent)
 }
 
-/// Inverse of `G + P` by rows, over all elements that were searched for.
+/// Inverse of `G + P` by rows, over all elements of the search.
 ///
-/// Where one rests at its bound, as `1/T_I = 0`, the others would look better known than they are
-/// if it were held there: the truth may lie off the bound, and a lead and a gain move with it.
+/// If an element is at its bound, such as `1/T_I = 0`, holding it there would make the errors of the others too small:
+/// the true value may be off the bound, and a lead and a gain depend on it.
 fn inverse(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
     let p = fit.parameters();
     let sought = fit.sought();
@@ -206,7 +203,7 @@ pub(super) fn is_regular(fit: &PredictionFit<'_>) -> bool {
     inverse(fit).is_some()
 }
 
-/// The covariances of a fit; `None` where its information is singular.
+/// Returns the covariances of a fit; `None` if its information is singular.
 pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
     let p = fit.parameters();
     let inverse = inverse(fit)?;
@@ -214,19 +211,19 @@ pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
     let scale = fit.innovation_variance * fit.inflation;
     let mut clustered: Vec<f64> = match fit.clusters.kind {
         ClusterKind::Runs => {
-            // H^-1 P H^-1: the prior is weighed as the inflated data are.
+            // H^-1 P H^-1: the prior has the same weight as the inflated data.
             let mut open = vec![0.0; p * p];
             add_open_part(&mut open, 1.0, &fit.criterion.penalty, fit.eta(), &inverse);
             match over_clusters(fit) {
                 Some(by_runs) => by_runs.iter().zip(&open).map(|(j, open)| j + scale * open).collect(),
-                // One run alone determines a combination: its scatter is not known.
+                // A combination that only one run determines: its scatter is not known.
                 None => inverse.iter().map(|g| scale * g).collect(),
             }
         }
         // H^-1 G H^-1 + H^-1 P H^-1 = H^-1, all of it inflated.
         ClusterKind::Blocks => inverse.iter().map(|g| scale * g).collect(),
     };
-    // H^-1 L H^-1 of lines whose weight is w, L their part of H. The scatter of runs has none of it.
+    // H^-1 L H^-1 for lines with the weight w, L their part of H. The scatter of runs does not contain it.
     let counted = if fit.clusters.kind == ClusterKind::Runs {
         0.0
     } else {
@@ -259,7 +256,7 @@ fn add_lines_part(covariance: &mut [f64], factor: f64, fit: &PredictionFit<'_>, 
         .for_each(|(c, part)| *c += factor * part);
 }
 
-/// The jackknife over clusters.
+/// Computes the jackknife covariance over clusters.
 fn over_clusters(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
     let (parts, sought) = (&fit.clusters.parts, fit.sought());
     let steps: Option<Vec<Vec<f64>>> = (parts.iter())
@@ -268,11 +265,11 @@ fn over_clusters(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
     jackknife(&steps?)
 }
 
-/// kappa: clustered over model-based variance of the frequency response, gain and phase, the mean
+/// Computes kappa: the ratio of clustered to model-based variance of the frequency response, gain and phase, averaged
 /// over the band of manual control; at least one. `None` for fewer than two clusters.
 ///
-/// The ratio for single coordinates would rest on the chance of a few clusters, and on those that
-/// the data hardly determine; the response is what they do determine.
+/// The ratio for single coordinates would depend on the chance of a few clusters, and on coordinates that the data
+/// hardly determine; the response is what they do determine.
 pub(super) fn inflation(fit: &PredictionFit<'_>) -> Option<f64> {
     let p = fit.parameters();
     let (clustered, inverse) = (over_clusters(fit)?, inverse(fit)?);

@@ -1,7 +1,7 @@
 //! Findings for and against a fit of the family.
 //!
-//! Each rule is one observation with its own kind ([`hoid_model::Finding`]); the limits are stated
-//! where they are used; those on residuals are shared with all fits.
+//! Each rule is one observation with its own kind ([`hoid_model::Finding`]); the limits are defined where they are
+//! used; those of residuals are common to all fits.
 
 use hoid_model::Finding;
 
@@ -16,23 +16,22 @@ use super::{
 };
 use crate::{Termination, diagnostics::residuals::ResidualMeasures};
 
-/// chi^2 per degree of freedom at the lines beyond which the describing function is missed.
+/// chi^2 per degree of freedom at the lines above which the operator misses the describing function.
 const LARGEST_REDUCED_CHI_SQUARED: f64 = 3.0;
-/// Level below which methods do not agree, and below which a free model refutes the form.
+/// Significance level of the tests of agreement between methods and of the form against a free model.
 const LEVEL: f64 = 0.01;
-/// Loss above that of a free model beyond which a refuted form is reported to be so.
+/// Excess of the loss over that of a free model above which a rejected form is reported.
 const LARGEST_EXCESS_LOSS: f64 = 0.01;
-/// Relative error of the response, at its best, beyond which nothing is known about the person.
+/// Smallest relative error of the response over frequency above which nothing is known about the person.
 pub(super) const LARGEST_RESPONSE_ERROR: f64 = 0.5;
-/// Damping ratio above which the two neuromuscular poles are lags of their own, far apart: no muscle
-/// is so damped.
+/// Damping ratio above which the two neuromuscular poles are separate lags, far apart: no muscle has such a damping.
 pub(super) const MOST_DAMPED: f64 = 1.5;
-/// Weight from which on a form is settled.
+/// Weight above which a form counts as settled.
 const SETTLED_WEIGHT: f64 = 0.95;
-/// Ratio of clustered to model-based standard errors that is worth a note.
+/// Ratio of clustered to model-based standard errors above which a note is made.
 const NOTED_ERROR_RATIO: f64 = 1.5;
 
-/// Standard errors from which on what a prior moves a parameter by is reported.
+/// Shift of a parameter by the prior, in standard errors, above which it is reported.
 const NOTED_PULL: f64 = 0.5;
 
 /// Inputs of the diagnostics.
@@ -42,9 +41,9 @@ pub(super) struct DiagnosticInputs<'a> {
     pub parameters: &'a [Parameter],
     pub prior: &'a OperatorPrior,
     pub residuals: ResidualMeasures,
-    /// Share of the power of u that is left, where it is not noise.
+    /// Share of the power of u that is left, if it is not noise.
     pub noise_free: Option<f64>,
-    /// A doubt where the person is not the same throughout.
+    /// A doubt if the person is not constant.
     pub not_constant: Option<Finding>,
     pub lines: Option<&'a LineFit>,
     pub no_lines: Option<&'a str>,
@@ -59,13 +58,13 @@ pub(super) struct DiagnosticInputs<'a> {
     pub has_covariance: bool,
     /// Smallest relative standard error of the response over the band of manual control.
     pub response_error: Option<f64>,
-    /// Whether the inputs are separated by their excitation, and not by their assumed forms.
+    /// True if the inputs are distinguished by their excitations, and not by their supposed forms.
     pub apart: bool,
-    /// The forms that the data leave, the one in front first.
+    /// The forms that the data do not reject, the best one first.
     pub weighed: &'a [WeighedForm],
 }
 
-/// All findings.
+/// Returns all findings.
 pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
     let mut all = Vec::new();
     if !judged.termination.converged() {
@@ -99,7 +98,7 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
     determined(judged, &mut all);
     all.extend(unsettled(judged.weighed));
     if let Some(share) = judged.noise_free {
-        // What is left are the digits of the data, which no test of residuals and no other method is made for.
+        // The residuals are rounding of the data, for which no residual test and no other method is meant.
         all.push(Finding::note(
             "no-noise",
             format!(
@@ -129,7 +128,7 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
     all
 }
 
-/// Forms that the data do not distinguish.
+/// Returns a finding about forms that the data do not distinguish.
 fn unsettled(weighed: &[WeighedForm]) -> Option<Finding> {
     let front = weighed.first().filter(|front| front.weight < SETTLED_WEIGHT)?;
     let mut all: Vec<&WeighedForm> = weighed.iter().filter(|w| w.weight >= 1.0 - SETTLED_WEIGHT).collect();
@@ -145,7 +144,7 @@ fn unsettled(weighed: &[WeighedForm]) -> Option<Finding> {
     ))
 }
 
-/// True if it rests at the end of the search range: it has no error of its own.
+/// True if the parameter is at the end of the search range: it has no standard error.
 fn at_bound(parameter: &Parameter) -> bool {
     parameter.standard_error.is_none()
 }
@@ -200,7 +199,7 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
             true => "tau_e is determined by the prior alone".to_owned(),
             false => "tau_e is not determined".to_owned(),
         };
-        // As with other parameters: it has no digits, and the report next to it is valid.
+        // As with other parameters: without a standard error it has no digits.
         all.push(Finding::note("delay", words));
     }
     if let Some((t_i, (low, high))) = find("T_I").and_then(|t| Some((t, t.interval?)))

@@ -1,4 +1,4 @@
-//! The operator of a record with its errors, out of eta and the prior knowledge of it.
+//! The operator of a record with its errors, from eta and its prior.
 
 use hoid_model::{FamilyOperator, NotConvertible, PolynomialModel, Structure, operator_family::Coordinate};
 
@@ -17,15 +17,15 @@ use crate::{
     grey_box::parametrisation::Parametrisation,
 };
 
-/// How well eta is known.
+/// Errors of eta.
 pub(super) struct Errors {
     /// `None` if the information is singular.
     pub covariances: Option<Covariances>,
-    /// Intervals by profile likelihood, where there are such.
+    /// Intervals by profile likelihood, if there are any.
     pub profiles: Vec<Option<(f64, f64)>>,
     /// Quantile of Student's distribution for 95 %.
     quantile: f64,
-    /// Variation of the gain of the person beyond the runs, as a part of it.
+    /// Variation of the person's gain that these runs do not show, relative to the gain.
     pub run_to_run: f64,
 }
 
@@ -33,7 +33,7 @@ impl Errors {
     pub fn of(fit: &PredictionFit<'_>, run_to_run: f64, workspace: &mut Workspace) -> Self {
         let covariances = covariances::covariances(fit);
         let quantile = quantile(fit.clusters.parts.len());
-        // The scatter between runs holds what they vary by; blocks of few runs cannot show it.
+        // The scatter between runs includes their variation; blocks of few runs cannot show it.
         let gain = fit.layout().elements.iter().find(|(c, _)| *c == Coordinate::Gain);
         let runs = match gain {
             Some((_, Some(_))) => 1,
@@ -65,8 +65,8 @@ impl Errors {
     }
 }
 
-/// Intervals by profile likelihood of the elements whose interval reaches the end of the search
-/// range: there the criterion is not a parabola.
+/// Intervals by profile likelihood for elements whose interval reaches the end of the search range: there the criterion
+/// is not a parabola.
 fn profiles(
     fit: &PredictionFit<'_>,
     covariances: Option<&Covariances>,
@@ -95,7 +95,7 @@ fn profiles(
     profiles
 }
 
-/// The operator of a record with its errors, its coordinates taken out of eta.
+/// The operator of a record with its errors, extracted from eta.
 pub(super) struct Estimated {
     pub operator: FamilyOperator,
     pub covariance: Option<Vec<f64>>,
@@ -142,7 +142,7 @@ impl Estimated {
     }
 }
 
-/// Variance after the data over that before, of an element of eta.
+/// Ratio of the variance of an element of eta after the data to that before.
 fn prior_share(fit: &PredictionFit<'_>, model_based: Option<&[f64]>, places: &[usize], place: usize) -> f64 {
     let Some(penalty) = fit.criterion.penalty.iter().find(|p| p.place == place) else {
         return 0.0;
@@ -150,11 +150,11 @@ fn prior_share(fit: &PredictionFit<'_>, model_based: Option<&[f64]>, places: &[u
     let Some((i, c)) = places.iter().position(|&q| q == place).zip(model_based) else {
         return 1.0;
     };
-    // The weight is kappa sigma^2/s^2, the covariance sigma^2 H^-1: both inflated by kappa.
+    // The weight is kappa sigma^2/s^2, the covariance sigma^2 H^-1: both are inflated by kappa.
     let precision = penalty.curvature(fit.eta()) / fit.innovation_variance;
     let variance = c[i * places.len() + i];
     let ((low, high), x) = (fit.criterion.limits[place], fit.eta()[place]);
-    // At a bound nothing is known about it but the bound.
+    // At a bound, nothing but the bound is known about it.
     if variance > 0.0 && low < x && x < high {
         (variance * precision).min(1.0)
     } else {
@@ -162,7 +162,7 @@ fn prior_share(fit: &PredictionFit<'_>, model_based: Option<&[f64]>, places: &[u
     }
 }
 
-/// The operator of a record, as one and as polynomials, with its parameters averaged over the forms.
+/// Returns the operator of a record, also as polynomials, with its parameters averaged over the forms.
 pub(super) fn operator_of(
     fit: &PredictionFit<'_>,
     errors: &Errors,
@@ -181,7 +181,7 @@ pub(super) fn operator_of(
     let layout = fit.layout();
     let p = fit.parameters();
     let mut mapped = fit.criterion.model_of(fit.eta(), record)?;
-    // From e to u: without the coefficients of channels in addition to it.
+    // From e to u: without the coefficients of further channels.
     mapped.theta.truncate(mapped.orders.parameters());
     let of_theta =
         (errors.covariances.as_ref()).map(|c| mapped.covariance_of_theta(&c.clustered, p, layout.positions(record)));
@@ -219,7 +219,7 @@ pub(super) fn operator_of(
     })
 }
 
-/// Average over the forms of the parameter with the same name.
+/// Average of the parameters with the same name over the forms.
 fn averaged(own: &Parameter, weighed: &[WeighedForm], record: usize, clusters: usize) -> Option<Parameter> {
     let each = weighed.iter().filter_map(|form| {
         let mut all = form.of(record)?.parameters.iter();
@@ -228,7 +228,7 @@ fn averaged(own: &Parameter, weighed: &[WeighedForm], record: usize, clusters: u
     Parameter::averaged(&each.collect::<Vec<_>>(), clusters)
 }
 
-/// The operators of a fit, by its form alone.
+/// Returns the operators of a fit, from its form only.
 pub(super) fn in_form(
     fit: &PredictionFit<'_>,
     errors: &Errors,

@@ -1,5 +1,5 @@
-//! From records of a person to their operator: the searches of each form.
-//! The steps are those of the [module](super).
+//! Estimation of a person's operator from records: the searches of each form. The steps are those of the
+//! [module](super).
 
 use std::sync::Arc;
 
@@ -31,18 +31,18 @@ use crate::{
     informative_data, progress,
 };
 
-/// Most pairs (nc, nd) that are compared where there is an nc.
+/// Largest number of pairs (nc, nd) that are compared if nc is searched.
 const MOST_NOISE_PAIRS: usize = 60;
 
-/// Why nothing is fitted to the lines where there is little noise.
+/// The reason why nothing is fitted to the lines if there is little noise.
 const TOO_LITTLE_NOISE: &str = "there is less noise than leakage";
 
-/// Where the searches of a form start.
+/// Starts of the searches of a form.
 struct Start {
     form: Form,
     /// The fit at the lines.
     lines: Option<LineFit>,
-    /// Coordinates to start from.
+    /// Starting coordinates.
     coordinates: Vec<Vec<f64>>,
 }
 
@@ -54,9 +54,9 @@ struct Begun<'a> {
     /// The further inputs, with the forms that were compared.
     channels: Vec<ChannelFit>,
     channel_lines: Option<Arc<ChannelLines>>,
-    /// The channels with a response, at the lines.
+    /// The channels with a response at the lines.
     in_form: Vec<InForm>,
-    /// Why no line has a say.
+    /// The reason why no line is used.
     no_lines: Option<String>,
 }
 
@@ -64,8 +64,8 @@ impl FamilyEstimator {
     /// Fits all records together.
     ///
     /// # Errors
-    /// [`IdentError`] for records or options without meaning, and where no form could be fitted.
-    /// Findings that make a result doubtful is part of it ([`FamilyFit::verdict`]).
+    /// [`IdentError`] for invalid records or options, and if no form could be fitted. Findings that make a result
+    /// doubtful are part of it ([`FamilyFit::verdict`]).
     pub fn fit(&self, records: &[Record]) -> Result<FamilyFit, IdentError> {
         let described = self.excitation.as_ref().map(|channel| {
             let options = DescriptionOptions {
@@ -78,9 +78,8 @@ impl FamilyEstimator {
         self.fit_with_response(records, described)
     }
 
-    /// As [`FamilyEstimator::fit`], with a describing function that was made elsewhere, or the
-    /// reason why there is none: of other spans of the same runs, or with an offset that is not a
-    /// whole number of samples.
+    /// As [`FamilyEstimator::fit`], with a describing function computed elsewhere, or the reason why there is none: for
+    /// example one from other spans of the same runs, or with an offset that is not an integer number of samples.
     ///
     /// # Errors
     /// As [`FamilyEstimator::fit`].
@@ -90,7 +89,7 @@ impl FamilyEstimator {
         describing: Option<Result<DescribingFunction, IdentError>>,
     ) -> Result<FamilyFit, IdentError> {
         let (records, seen) = self.prepared(records)?;
-        // The ratio of u and e at a line is a sum of responses where more is seen than e.
+        // With inputs in addition to e, the ratio of u and e at a line is a sum of responses.
         let (describing, no_lines) = match describing.filter(|_| seen.is_empty()) {
             None => (None, None),
             Some(Ok(found)) => (Some(found), None),
@@ -163,8 +162,8 @@ impl FamilyEstimator {
         chosen.result(&mut workspace)
     }
 
-    /// Whether u responds to a channel besides the error, by the forms of this estimator; and whether target
-    /// and error are excited on lines of their own.
+    /// Returns whether u responds to a channel in addition to the error, by the forms of this estimator, and whether
+    /// target and error are excited at separate lines.
     ///
     /// # Errors
     /// As [`FamilyEstimator::fit`].
@@ -182,14 +181,14 @@ impl FamilyEstimator {
         Ok((found, apart))
     }
 
-    /// The records without what is taken out of e and u, and what is seen besides.
+    /// Returns the records with the trend of e and u removed, and the further inputs.
     fn prepared(&self, records: &[Record]) -> Result<(Vec<Record>, Seen<'_>), IdentError> {
         informative_data::common_sample_time(records)?;
         let records: Vec<Record> = records.iter().map(|r| r.clone().detrended(self.detrend)).collect();
         Seen::of(records, &self.channels, self.detrend)
     }
 
-    /// What fits at the lines of several inputs have in common.
+    /// Returns the common data of fits at the lines of several inputs.
     fn at_lines<'l>(&'l self, lines: &'l Arc<ChannelLines>, prediction: &Prediction<'_>) -> AtChannelLines<'l> {
         AtChannelLines {
             lines,
@@ -201,8 +200,7 @@ impl FamilyEstimator {
         }
     }
 
-    /// Starts of the searches of all forms: their starts, the orders of the noise, the further inputs that have
-    /// a response.
+    /// Prepares the searches of all forms: starts, orders of the noise model, and the further inputs with a response.
     fn begin<'a>(
         &self,
         records: &'a [Record],
@@ -221,7 +219,7 @@ impl FamilyEstimator {
         let lines = describing.map(LineData::new);
         let mut begun = Vec::new();
         let mut channel_lines = None;
-        // It gives starts alone: the lines do as well.
+        // It is used only for starts: the lines serve as well.
         let response = if seen.is_empty() {
             match ArxResponse::of(records) {
                 Err(error) if lines.is_none() => return Err(error),
@@ -266,7 +264,7 @@ impl FamilyEstimator {
         let mut no_lines = None;
         let noise = match little_noise {
             Some(found) => {
-                // They hold the leakage of the record and of its aliases more than such noise.
+                // The lines contain more leakage of the record and of its aliases than such noise.
                 starts.iter_mut().for_each(|start| start.lines = None);
                 no_lines = lines.map(|_| TOO_LITTLE_NOISE.to_owned());
                 prediction = found;
@@ -309,7 +307,7 @@ impl FamilyEstimator {
         Ok(forms)
     }
 
-    /// The records over this course of the error, with what all forms have in common.
+    /// Returns the records for this intersample behaviour of the error, with the common settings of all forms.
     fn prediction<'a>(
         &self,
         intersample: Intersample,
@@ -343,8 +341,8 @@ impl FamilyEstimator {
         })
     }
 
-    /// Where there is little noise: the records over the course of the error that they show, with a level where one was
-    /// taken out, and the starts where output errors end. `None` if there is more.
+    /// For little noise: returns the records with the intersample behaviour of the error that they show, with a level
+    /// if one was removed, and starts at the ends of output error searches. `None` if there is more noise.
     fn with_little_noise<'a>(
         &self,
         smooth: &Prediction<'_>,
@@ -459,7 +457,7 @@ impl FamilyEstimator {
         Ok(())
     }
 
-    /// The fit at the lines, and coordinates to start from.
+    /// Returns the fit at the lines, and starting coordinates.
     fn start(
         &self,
         form: Form,
@@ -494,7 +492,7 @@ impl FamilyEstimator {
         Ok(start)
     }
 
-    /// The start that leaves least, whitened by an autoregression of this order.
+    /// Returns the start with the smallest residual after whitening by an autoregression of this order.
     fn least_left(
         &self,
         prediction: &Prediction<'_>,
@@ -519,7 +517,7 @@ impl FamilyEstimator {
         least.map(|(_, i)| i).ok_or(IdentError::NoFiniteLoss)
     }
 
-    /// The orders of the noise model, by Akaike's criterion, for the form that leaves least.
+    /// Returns the orders of the noise model, by Akaike's criterion, for the form with the smallest residual.
     fn noise_orders(
         &self,
         prediction: &Prediction<'_>,
@@ -570,7 +568,7 @@ impl FamilyEstimator {
         least.map(|(_, orders)| orders).ok_or(IdentError::NoFiniteLoss)
     }
 
-    /// The best search from the starts of a form.
+    /// Returns the best result of searches from the starts of a form.
     fn best_of<'a>(
         &self,
         prediction: &Prediction<'a>,

@@ -1,4 +1,4 @@
-//! The operator by refined instrumental variables: the recorded excitation is the instrument.
+//! The operator by refined instrumental variables, with the recorded excitation as the instrument.
 //!
 //! RIV-BJ ([`crate::iv`]) for `u = Y e + v`, `D v = eps`, with Y an operator of the family in place of
 //! free polynomials. In its nonlinear form (T. Söderström and P. Stoica, *Instrumental Variable
@@ -12,23 +12,23 @@
 //! Newton's step is `(Z' Psi + P)^-1 g`, `Psi = D dY/dx e`, halved until `g' (Z'Z + P)^-1 g` falls; a coordinate that
 //! it drives out of the search range goes to its bound.
 //!
-//! **The auxiliary operator** is that of the fit at the lines, and where its instruments lead to no zero that of the
-//! prediction error fit, or the middle of both. RIV-BJ as it is usually written takes the last estimate: where the
-//! lines end below the neuromuscular resonance, estimates from two sets of instruments answer each other without end,
-//! each the other's auxiliary operator (with four in ten virtual people). Any auxiliary operator gives a consistent
-//! estimate, and the instruments of one that is held are the optimal ones except for its own error.
+//! **The auxiliary operator** is that of the fit at the lines or, if its instruments lead to no zero, that of the
+//! prediction error fit, or the mean of both. The common form of RIV-BJ uses the last estimate: if the lines end below
+//! the neuromuscular resonance, estimates from two sets of instruments alternate without end, each the other's
+//! auxiliary operator (with four in ten virtual people). Any auxiliary operator gives a consistent estimate, and the
+//! instruments of a fixed one are optimal except for its own error.
 //!
-//! Free polynomials have more to lose: their poles are not known, as the lag lies below the lines and
-//! the resonance above, and run to the unit circle. Here the prior keeps them.
+//! Free polynomials are less robust: their poles are not known, as the lag is below the lines and the resonance above,
+//! and move to the unit circle. Here the prior keeps them in place.
 //!
-//! **What it rests on.** A noise that the excitation does not reach leaves x unbiased whatever D
-//! is. It shares the instrument with the fit at the lines, but neither weights nor periods, and the
-//! samples with the prediction error fit, but nothing of e that follows the remnant.
+//! **Assumptions.** If the excitation does not reach the noise, x is unbiased whatever D is. The method shares the
+//! instrument with the fit at the lines, but neither weights nor periods, and the samples with the prediction error
+//! fit, but no part of e that follows the remnant.
 //!
-//! **Errors.** x less its truth is `A^-1 Z' eps`, `A = Z' Psi + P`, to first order: the covariance is
-//! `kappa sigma^2 A^-1 Z'Z A^-T` with the kappa of the prediction error fit, and the part of the prior. Where most of e
-//! is the person's own remnant, instruments are weak and the first order is short: with virtual people, one in 24 had
-//! gain and lead five standard errors off.
+//! **Errors.** x minus the true value is `A^-1 Z' eps`, `A = Z' Psi + P`, to first order: the covariance is
+//! `kappa sigma^2 A^-1 Z'Z A^-T` with the kappa of the prediction error fit, plus the contribution of the prior. If
+//! most of e is the person's own remnant, instruments are weak and the first order is inaccurate: with virtual people,
+//! one in 24 had a gain and lead off by five standard errors.
 
 use std::ops::Range;
 
@@ -48,11 +48,11 @@ use crate::{
     optimize::Linearisation,
 };
 
-/// Steps for given instruments.
+/// Number of steps for given instruments.
 const STEPS: usize = 25;
-/// A step shorter than this share of the standard errors is the last.
+/// A step shorter than this share of the standard errors ends the iteration.
 const SETTLED: f64 = 0.01;
-/// Halvings of a step.
+/// Largest number of halvings of a step.
 const HALVINGS: usize = 6;
 
 /// The operator by refined instrumental variables.
@@ -60,19 +60,18 @@ const HALVINGS: usize = 6;
 pub struct InstrumentalFit {
     /// The operator.
     pub operator: FamilyOperator,
-    /// Covariance of its coordinates by rows: by runs or blocks, with the part of the prior.
+    /// Covariance of its coordinates by rows: from runs or blocks, with the contribution of the prior.
     pub covariance: Option<Vec<f64>>,
     /// Order of the autoregression D.
     pub noise_order: usize,
     /// How the iteration ended.
     pub termination: Termination,
-    /// Variance after the data over that before, for each coordinate: 0 without a prior, 1 at a
-    /// bound.
+    /// Ratio of the variance after the data to that before, for each coordinate: 0 without a prior, 1 at a bound.
     pub prior_shares: Vec<f64>,
 }
 
 impl InstrumentalFit {
-    /// The parameters by name, their errors to first order.
+    /// Returns the parameters by name, with their errors to first order.
     pub fn parameters(&self) -> Vec<(&'static str, Estimate)> {
         let all = self.operator.named_estimates(self.covariance.as_deref());
         all.into_iter()
@@ -97,10 +96,10 @@ struct Zero {
     steps: usize,
 }
 
-/// Data of the iteration at each of its points.
+/// Data that all iterations use.
 pub(super) struct Instrumental<'p, 'a> {
     prediction: &'p Prediction<'a>,
-    /// For the prediction error fit: its prior, weighed as there, its limits, its clusters.
+    /// The prediction error fit, with its weighted prior, its limits and its clusters.
     fit: &'p PredictionFit<'a>,
     inputs: Vec<NoiseFreeInput>,
     order: usize,
@@ -124,7 +123,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         })
     }
 
-    /// The fit with the first of these auxiliary operators, in coordinates, that leads to a zero.
+    /// Returns the fit with the first of these auxiliary operators, given as coordinates, that leads to a zero.
     ///
     /// # Errors
     /// [`IdentError::NoFiniteLoss`].
@@ -165,7 +164,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         &self.fit.criterion.limits[..self.fit.layout().coordinates()]
     }
 
-    /// D for the part of u that the operator leaves unexplained.
+    /// Estimates D for the part of u that the operator does not explain.
     fn noise(&self, x: &[f64], workspace: &mut Workspace) -> Result<Vec<f64>, IdentError> {
         let layout = self.fit.layout();
         let left = self
@@ -181,7 +180,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
             .criterion((layout.form, layout.neuromuscular), (0, self.order))
     }
 
-    /// `eps` and `Psi` of one record with these signals.
+    /// Computes `eps` and `Psi` of one record with these signals.
     fn of_record(
         &self,
         eta: &[f64],
@@ -213,7 +212,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         Ok((eps, psi))
     }
 
-    /// Z and D of an auxiliary operator.
+    /// Computes Z and D of an auxiliary operator.
     fn held(&self, x: &[f64], workspace: &mut Workspace) -> Result<Held, IdentError> {
         let d = self.noise(x, workspace)?;
         let (eta, p, first) = ([x, &d].concat(), x.len(), self.prediction.first);
@@ -244,7 +243,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         Ok(Held { z, d, products })
     }
 
-    /// `eps` and `Psi` of all records; `None` if there is no model.
+    /// Computes `eps` and `Psi` of all records; `None` if there is no model.
     fn equation(&self, x: &[f64], d: &[f64], workspace: &mut Workspace) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
         let eta = [x, d].concat();
         let (mut eps, mut psi) = (Vec::new(), vec![Vec::new(); x.len()]);
@@ -256,7 +255,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         eps.iter().all(|e| e.is_finite()).then_some((eps, psi))
     }
 
-    /// The prior's part of g and P.
+    /// Contribution of the prior to g and P.
     fn prior(&self, x: &[f64]) -> Linearisation {
         let mut total = Linearisation::empty(x.len());
         for penalty in &self.fit.criterion.penalty {
@@ -265,7 +264,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         total
     }
 
-    /// The zero of g for given instruments, from x.
+    /// Finds the zero of g for given instruments, starting at x.
     fn zero(&self, x: &[f64], held: &Held, workspace: &mut Workspace) -> Result<Zero, IdentError> {
         let (limits, p) = (self.limits(), x.len());
         let mut x = x.to_vec();
@@ -317,7 +316,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
                 }
             };
             let Some((there, next)) = next else {
-                // No step leads nearer: there is no zero in this direction.
+                // No step decreases the distance: there is no zero in this direction.
                 return Ok(Zero {
                     x,
                     covariance,
@@ -329,8 +328,8 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         }
     }
 
-    /// Newton's step and the coordinates that are free in it. One that would cross its bound is
-    /// moved to it, and the others take that into account; one that rests there stays.
+    /// Computes Newton's step and its free coordinates. A coordinate that would cross its bound is moved to the bound,
+    /// and the others take that into account; one that is at its bound stays there.
     fn step(&self, x: &[f64], a: &DMatrix<f64>, score: &[f64]) -> Option<(Vec<usize>, Vec<f64>)> {
         let limits = self.limits();
         let mut free: Vec<usize> = (0..x.len()).filter(|&i| limits[i].0 < limits[i].1).collect();
@@ -356,12 +355,12 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         }
     }
 
-    /// `kappa sigma^2 A^-1 Z'Z A^-T`, and the part of the prior; zero at bounds.
+    /// Computes `kappa sigma^2 A^-1 Z'Z A^-T` plus the contribution of the prior; zero at bounds.
     fn covariance(&self, x: &[f64], a: &DMatrix<f64>, products: &[f64], variance: f64) -> Option<Vec<f64>> {
         let p = x.len();
         let scale = variance * self.fit.inflation;
         let inner = |i: usize| self.limits()[i].0 < x[i] && x[i] < self.limits()[i].1;
-        // At a bound an element does not move: its row of A is that of the unit matrix.
+        // At a bound an element does not move: its row of A is that of the identity matrix.
         let held = DMatrix::from_fn(p, p, |i, j| match (inner(i) && inner(j), i == j) {
             (true, _) => a[(i, j)],
             (false, same) => f64::from(u8::from(same)),

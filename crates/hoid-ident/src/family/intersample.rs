@@ -1,10 +1,10 @@
-//! Intersample behaviour of the error, which no sample shows and the delay depends on.
+//! Intersample behaviour of the error, which the samples do not show and on which the delay depends.
 //!
 //! | name | the error | response of the samples to the operator's | tau_e |
 //! |---|---|---|---|
-//! | `zoh` | is held: a simulation or a display of the same rate | `sin(x)/x e^{-jx}` | as simulated |
-//! | `foh` | runs straight: logged from what is faster or continuous | `(sin(x)/x)^2` | Ts/2 longer |
-//! | `auto` | is smooth, and the delay is that of a held one | `(sin(x)/x)^2 e^{-jx}` | as after a hold |
+//! | `zoh` | is held: a simulation or a display with the same rate | `sin(x)/x e^{-jx}` | as simulated |
+//! | `foh` | is piecewise linear: logged from a faster or continuous signal | `(sin(x)/x)^2` | Ts/2 longer |
+//! | `auto` | is smooth, and the delay is that for a held error | `(sin(x)/x)^2 e^{-jx}` | as after a hold |
 //!
 //! with `x = omega Ts/2` (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, 1997, sections 3.2 and 3.4).
 //! `foh` and `auto` are one model with two names of its delay, so that no data decide between them. `zoh` differs from
@@ -17,12 +17,12 @@ use hoid_model::{Complex64, FamilyOperator, ModelError, SampleTime, named_choice
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Intersample {
-    /// Smooth, with the delay of a held one; held or straight where data without noise show it.
+    /// Smooth, with the delay for a held error; held or linear if data without noise show it.
     #[default]
     Auto,
     /// Held until the next sample.
     Zoh,
-    /// Straight from sample to sample.
+    /// Linear from sample to sample.
     Foh,
 }
 
@@ -33,7 +33,7 @@ named_choice!(Intersample, "course between samples", 3, {
 });
 
 impl Intersample {
-    /// Response of the intersample behaviour of the error to a sinusoid.
+    /// Returns the response of the intersample behaviour to a sinusoid.
     pub(super) fn response(self, omega_rad_s: f64, sample_time: SampleTime) -> Complex64 {
         let half = 0.5 * omega_rad_s * sample_time.s();
         let sinc = if half.abs() < 1e-8 { 1.0 } else { half.sin() / half };
@@ -44,7 +44,7 @@ impl Intersample {
         }
     }
 
-    /// The shortest delay in s that has a model: a straight line needs the sample after it.
+    /// Returns the shortest delay in s for which there is a model: linear interpolation needs the next sample.
     pub(super) fn shortest_delay_s(self, sample_time: SampleTime) -> f64 {
         match self {
             Self::Auto | Self::Zoh => 0.0,
@@ -52,7 +52,7 @@ impl Intersample {
         }
     }
 
-    /// Number of coefficients of B for a form of this order and degree of its numerator.
+    /// Returns the number of coefficients of B for a form of this order and degree of its numerator.
     pub(super) fn gains(self, order: usize, degree: usize) -> usize {
         match self {
             Self::Auto | Self::Foh => order + 2,
@@ -61,8 +61,8 @@ impl Intersample {
         }
     }
 
-    /// The discrete model; `sample` is that in which the delay lies (of a smooth error, the delay and half a sample), where
-    /// the caller has chosen one.
+    /// Returns the discrete model; `sample` is the sample that contains the delay (for a smooth error, the delay plus
+    /// half a sample), if the caller has chosen one.
     pub(super) fn discrete(
         self,
         operator: &FamilyOperator,
@@ -115,7 +115,7 @@ mod tests {
                     let found = polynomial::value(&model.b, backward) / polynomial::value(&f, backward)
                         * backward.powi(model.nk as i32);
                     let expected = operator.response(omega) * course.response(omega, ts);
-                    // A hold leaves aliases as omega Ts, straight lines as its square.
+                    // Aliases of a hold are proportional to omega Ts, those of linear interpolation to its square.
                     let aliases = match course {
                         Intersample::Zoh => 0.2 * omega * ts.s(),
                         Intersample::Auto | Intersample::Foh => 2.0 * (omega * ts.s()).powi(2),

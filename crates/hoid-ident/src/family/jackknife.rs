@@ -1,16 +1,15 @@
-//! Covariances from the estimates without each of several parts, and from a prior.
+//! Covariances from the estimates without each of several parts of the data, and from a prior.
 //!
 //! **The jackknife** over n estimates `x_(i)`, each without one part of the data, is
-//! `(n-1)/n sum (x_(i) - mean)(x_(i) - mean)'` (B. Efron and C. Stein, *Annals of Statistics* 9
-//! (1981) 586-596). It is the same for their differences to any one point.
+//! `(n-1)/n sum (x_(i) - mean)(x_(i) - mean)'` (B. Efron and C. Stein, *Annals of Statistics* 9 (1981) 586-596). It is
+//! the same for their differences to any fixed point.
 //!
-//! **A prior** is a measurement that no part of the data holds. With P its curvature and H that of
-//! the whole criterion, what it leaves open is `H^-1 P H^-1`, in units of the variance of the
-//! residuals.
+//! **A prior** is a measurement that no part of the data contains. With P its curvature and H that of the whole
+//! criterion, its contribution is `H^-1 P H^-1`, in units of the variance of the residuals.
 
 use crate::grey_box::objective::Penalty;
 
-/// The jackknife by rows; `None` for fewer than two estimates.
+/// Returns the jackknife covariance by rows; `None` for fewer than two estimates.
 pub(super) fn jackknife(others: &[Vec<f64>]) -> Option<Vec<f64>> {
     if others.len() < 2 {
         return None;

@@ -1,10 +1,10 @@
-//! The prediction error fit with the lines of the excitation as measurements of the response next to it.
+//! The prediction error fit with the lines of the excitation as additional measurements of the response.
 //!
-//! In a closed loop the prediction error fit is biased by as much as its noise model is wrong; the fit at the lines is
-//! not, and has larger errors. With H_P and H_L their responses, V_P and V_L the variances of these, the difference
-//! `d = (H_L - H_P)/H_P` has the variance `V_L - V_P` if nothing is wrong, for what is efficient is not correlated with
-//! it (J. A. Hausman, *Econometrica* 46 (1978) 1251-1271). If a bias of variance `tau^2` is in it besides, the part of
-//! d to go by is the one that leaves the least mean square,
+//! In a closed loop an error of the noise model biases the prediction error fit; the fit at the lines has no such bias,
+//! but larger errors. With H_P and H_L their responses, V_P and V_L the variances of these, the difference
+//! `d = (H_L - H_P)/H_P` has the variance `V_L - V_P` if there is no bias, because an efficient estimate is not
+//! correlated with it (J. A. Hausman, *Econometrica* 46 (1978) 1251-1271). If d also contains a bias of variance
+//! `tau^2`, the share of d that minimises the mean square error is
 //!
 //! `s = tau^2/(tau^2 + V_L - V_P)`, `tau^2 = max(0, D - (V_L - V_P))`, so that `s = max(0, 1 - 1/q)`,
 //! `q = mean of |d|^2/(V_L - V_P)`
@@ -12,13 +12,13 @@
 //! over the band of manual control (E. J. Green and W. E. Strawderman, *J. American Statistical Association* 86 (1991)
 //! 1001-1006: an unbiased estimate that shrinks towards a biased one by as much as they agree).
 //!
-//! To go by a part of the difference of coordinates will not do: a gain, a lead and a lag make up for each other along
-//! a curve. So the lines become a part of the criterion,
+//! A share of the difference of the coordinates is not suitable: a gain, a lead and a lag compensate each other along a
+//! curve. Therefore the lines become a part of the criterion,
 //!
 //! `sum eps^2 + kappa sigma^2 w chi^2`, `w = s/(1 - s) V_L/V_P`:
 //!
-//! with one coordinate, its minimum is at the share s of the way. What the lines do not determine is left to the
-//! samples.
+//! with one coordinate, its minimum is at the share s of the difference. Parameters that the lines do not determine are
+//! determined by the samples.
 
 use std::{borrow::Cow, sync::Arc};
 
@@ -37,14 +37,14 @@ use super::{
 };
 use crate::{criterion::Workspace, grey_box::objective::AdditionalTerm, optimize::Objective};
 
-/// Part of V_L that `V_L - V_P` is at least: both are estimates.
+/// Lower bound of `V_L - V_P` relative to V_L: both are estimates.
 const LEAST_DIFFERENCE: f64 = 0.25;
-/// Runs from which on their scatter reports the variances of the lines: what one run differs by may be chance.
+/// Number of runs from which on their scatter gives the variances of the lines: the deviation of one run may be chance.
 const FEWEST_RUNS: usize = 3;
-/// Largest part of the way to the lines.
+/// Largest share of the difference to the lines.
 const LARGEST_SHARE: f64 = 0.9;
 
-/// The lines that are used with the samples.
+/// The lines that are used together with the samples.
 pub(super) enum Lines<'d> {
     /// The response to the error.
     Response(LineData<'d>),
@@ -60,7 +60,7 @@ impl Lines<'_> {
         }
     }
 
-    /// chi^2 over the elements of eta before the noise, all variances larger by this factor.
+    /// Computes chi^2 over the elements of eta before the noise, with all variances larger by this factor.
     fn criterion(
         &self,
         layout: &FamilyLayout,
@@ -91,7 +91,7 @@ impl Lines<'_> {
     }
 }
 
-/// The fit with the lines next to it; `None` where both agree, or it has no end.
+/// Returns the fit that includes the lines; `None` if both agree, or it does not converge.
 pub(super) fn with_lines<'a>(
     prediction: &Prediction<'a>,
     fit: &PredictionFit<'a>,
@@ -102,7 +102,7 @@ pub(super) fn with_lines<'a>(
         return None;
     }
     let layout = fit.layout();
-    // Lines that no operator of the form passes through are off by more than their variances.
+    // If no operator of the form fits the lines, their errors exceed their variances.
     let excess = lines.reduced_chi_squared().unwrap_or(1.0).max(1.0);
     let weight = weight(fit, lines, excess)?;
     let mut criterion = fit.criterion.clone();
@@ -117,7 +117,7 @@ pub(super) fn with_lines<'a>(
     Some(found)
 }
 
-/// w; `None` if it is zero, or a variance is not known.
+/// Returns w; `None` if it is zero, or a variance is not known.
 fn weight(fit: &PredictionFit<'_>, lines: &LineFit, excess: f64) -> Option<f64> {
     let operator = fit.layout().operator(fit.eta(), 0).ok()?;
     let own = Covariances::of_operator(&covariances(fit)?.clustered, fit.layout(), 0);

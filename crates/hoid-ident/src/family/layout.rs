@@ -1,9 +1,8 @@
-//! Where the coordinates of an operator and the coefficients of its noise model are in eta.
+//! Places of the coordinates of an operator and of the coefficients of its noise model in eta.
 //!
-//! `eta = [coordinates.., of channels.., c_1 .. c_nc, d_1 .. d_nd]`: those of the operator first, then
-//! those of what is seen besides the error, then those of the noise `v = (C/D) eps`. A coordinate that
-//! each record has for itself stands once for each of them; channels and noise are common to all. The
-//! neuromuscular part of a channel is that of the operator.
+//! `eta = [coordinates.., of channels.., c_1 .. c_nc, d_1 .. d_nd]`: the coordinates of the operator, those of further
+//! inputs, and those of the noise `v = (C/D) eps`. A coordinate that is individual to each record occurs once for each
+//! of them; channels and noise are common to all. The neuromuscular part of a channel is that of the operator.
 
 use std::ops::Range;
 
@@ -32,20 +31,20 @@ pub(super) struct FamilyLayout {
     /// Place in eta of each slot, for each record.
     positions: Vec<Vec<usize>>,
     limits: Vec<(f64, f64)>,
-    /// Coordinate and record of each element of the operator in eta; no record where it is common.
+    /// Coordinate and record of each element of the operator in eta; the record is `None` for a common element.
     pub elements: Vec<(Coordinate, Option<usize>)>,
-    /// What is seen besides the error.
+    /// The further inputs.
     pub channels: Vec<ChannelInLayout>,
 }
 
-/// The response to a channel in addition to the error.
+/// The response to a further input.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ChannelInLayout {
     pub form: Form,
-    /// Bounds and start of its own coordinates: those without the neuromuscular part.
+    /// Bounds and start of its own coordinates: all except those of the neuromuscular part.
     pub limits: Vec<(f64, f64)>,
     pub start: Vec<f64>,
-    /// Place of the first of them in eta.
+    /// Place of its first coordinate in eta.
     pub place: usize,
 }
 
@@ -88,7 +87,7 @@ impl FamilyLayout {
         layout
     }
 
-    /// The same with channels in addition to the error.
+    /// Returns the same layout with further inputs.
     pub fn with_channels(mut self, channels: &[ChannelInLayout]) -> Self {
         let noise = self.limits.split_off(self.elements.len());
         for positions in &mut self.positions {
@@ -114,7 +113,7 @@ impl FamilyLayout {
         self
     }
 
-    /// Place in eta of each coordinate of a channel.
+    /// Returns the place in eta of each coordinate of a channel.
     pub fn places_of(&self, channel: &ChannelInLayout, record: usize) -> Vec<usize> {
         let of_operator = self.form.coordinates(self.neuromuscular);
         let mut own = channel.place..;
@@ -129,7 +128,7 @@ impl FamilyLayout {
         all.filter_map(place).collect()
     }
 
-    /// The operator of a channel in a record.
+    /// Returns the operator of a channel in a record.
     pub fn channel(&self, eta: &[f64], channel: &ChannelInLayout, record: usize) -> Result<FamilyOperator, ModelError> {
         let x: Vec<f64> = (self.places_of(channel, record).iter())
             .map(|&place| eta[place])
@@ -158,7 +157,7 @@ impl FamilyLayout {
         own.iter().map(|&place| eta[place]).collect()
     }
 
-    /// An eta with the same operator for all records.
+    /// Returns an eta with the same operator for all records.
     pub fn spread(&self, coordinates: &[f64], noise: &[f64]) -> Vec<f64> {
         let all = self.form.coordinates(self.neuromuscular);
         let value = |(coordinate, _): &(Coordinate, Option<usize>)| {
@@ -175,7 +174,7 @@ impl FamilyLayout {
         FamilyOperator::new(self.form, self.neuromuscular, &self.coordinates_of(eta, record))
     }
 
-    /// Longest nk that eta can take.
+    /// Returns the longest possible nk.
     pub fn longest_nk(&self) -> Result<usize, ModelError> {
         let longest = self.delays().into_iter().map(|i| self.limits[i].1).fold(0.0, f64::max);
         Ok(whole_samples(longest, self.sample_time)? + 1)
@@ -259,7 +258,7 @@ impl Parametrisation for FamilyLayout {
         let mut theta = found.b.clone();
         theta.extend_from_slice(noise);
         theta.extend_from_slice(&found.f);
-        // Each slot: its derivatives, and from where they stand in theta.
+        // Each slot: its derivatives, and the place of the first of them in theta.
         let mut slopes: Vec<Vec<(usize, f64)>> = Vec::new();
         let (nb, behind) = (found.b.len(), found.b.len() + noise.len());
         for i in 0..self.coordinates() {

@@ -1,4 +1,4 @@
-//! The operator at the lines of the excitation, with its errors by the jackknife over runs.
+//! The operator fitted to the lines of the excitation, with its errors from the jackknife over runs.
 
 use hoid_model::{FamilyOperator, Form, uncertainty::Estimate};
 
@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{IdentError, SearchOptions, Termination, grey_box::objective::Penalty};
 
-/// Runs from which on the covariance is that of the jackknife over them.
+/// Number of runs from which on the covariance is that of the jackknife over them.
 const FEWEST_RUNS: usize = 5;
 
 /// A fit of one form at the lines.
@@ -18,29 +18,28 @@ const FEWEST_RUNS: usize = 5;
 pub struct LineFit {
     /// The operator.
     pub operator: FamilyOperator,
-    /// Covariance of its coordinates by rows: by the jackknife over five or more runs, else from
-    /// the variances of the lines; with the part that the prior leaves open.
+    /// Covariance of its coordinates by rows: from the jackknife over five or more runs, otherwise from the variances
+    /// of the lines; with the contribution of the prior.
     pub covariance: Option<Vec<f64>>,
-    /// Variance after the lines over that before, for each coordinate: 0 without a prior, 1 at a
-    /// bound.
+    /// Ratio of the variance after the lines to that before, for each coordinate: 0 without a prior, 1 at a bound.
     pub prior_shares: Vec<f64>,
     /// chi^2 of the lines.
     pub chi_squared: f64,
-    /// Real equations (two a line) less free parameters.
+    /// Number of real equations (two per line) minus the number of free parameters.
     pub degrees_of_freedom: usize,
-    /// chi^2 of each run against the fit without it; none for fewer than three runs.
+    /// chi^2 of each run for the fit without it; `None` for fewer than three runs.
     pub held_out: Option<Vec<f64>>,
     /// How the search ended.
     pub termination: Termination,
     /// Covariance from the variances of the lines.
     pub(super) by_lines: Option<Vec<f64>>,
-    /// Coordinates of channels in addition to the error, of their own.
+    /// Coordinates of the further inputs.
     #[serde(default)]
     pub(super) of_channels: Vec<f64>,
 }
 
 impl LineFit {
-    /// chi^2 per degree of freedom; `None` if there is none.
+    /// chi^2 per degree of freedom; `None` for zero degrees of freedom.
     pub fn reduced_chi_squared(&self) -> Option<f64> {
         (self.degrees_of_freedom > 0).then(|| self.chi_squared / self.degrees_of_freedom as f64)
     }
@@ -50,7 +49,7 @@ impl LineFit {
         self.held_out.as_ref().map(|runs| runs.iter().sum())
     }
 
-    /// The operator of a fit with several inputs.
+    /// Converts the operator of a fit with several inputs.
     pub(super) fn of_channels(operator: FamilyOperator, found: &ChannelMinimum, penalty: &[Penalty]) -> Self {
         let (p, q) = (operator.coordinates().len(), found.coordinates.len());
         let by_lines = found.covariance.as_ref().map(|c| -> Vec<f64> {
@@ -79,12 +78,12 @@ impl LineFit {
         }
     }
 
-    /// The coordinates of the operator and of its channels, as they stand in eta.
+    /// Returns the coordinates of the operator and of its channels, in the order of eta.
     pub(super) fn elements(&self) -> Vec<f64> {
         [self.operator.coordinates(), &self.of_channels].concat()
     }
 
-    /// The parameters by name, their errors to first order; without one where they are infinite.
+    /// Returns the parameters by name, with their errors to first order; without an error for infinite values.
     pub fn parameters(&self) -> Vec<(&'static str, Estimate)> {
         let all = self.operator.named_estimates(self.covariance.as_deref());
         all.into_iter()
@@ -108,7 +107,7 @@ pub(super) fn line_fit(
     let runs = lines.runs();
     let (mut others, mut held_out) = (Vec::new(), Vec::new());
     if runs >= 3 {
-        // The fits without one run serve twice: as held-out predictions, and as replications of the jackknife.
+        // The fits without one run are used twice: as held-out predictions, and as replications of the jackknife.
         for run in 0..runs {
             let points = lines.without(run);
             let Some(without) = criterion.with_points(&points).fit_from(&found.coordinates, search) else {
@@ -125,7 +124,7 @@ pub(super) fn line_fit(
         .flatten();
     let by_lines = criterion.covariance(&found);
     let covariance = by_lines.clone().map(|by_lines| match by_runs {
-        // The prior is the same in all replications, so that their scatter lacks its part.
+        // The prior is the same in all replications, so that their scatter lacks its contribution.
         Some(mut covariance) => {
             add_open_part(&mut covariance, 1.0, &criterion.penalty, &found.coordinates, &by_lines);
             covariance
@@ -149,8 +148,7 @@ pub(super) fn line_fit(
     Ok((fit, found))
 }
 
-/// The forms in the order in which they are preferred where they do equally well: fewer
-/// coordinates first, the family before its rivals.
+/// Sorts the forms by preference for equal fits: fewer coordinates first, the family before its rivals.
 pub(super) fn by_simplicity(forms: &mut [Form]) {
     forms.sort_by_key(|form| (form.coordinates(false).len(), *form));
 }

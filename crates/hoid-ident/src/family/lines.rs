@@ -1,12 +1,11 @@
-//! The describing function at the lines of a periodic excitation, with variances that few runs can
-//! carry.
+//! The describing function at the lines of a periodic excitation, with variances that are reliable for few runs.
 //!
-//! The scatter of n runs gives the variance of a line with 2(n - 1) degrees of freedom, and the
-//! smallest of few such variances would decide the fit. The relative variances `r_j = v_j/|H_j|^2`
-//! are drawn towards those of the remnant next to the line, which rest on many bins:
-//! `r_j <- (nu r_j + nu_0 c b_j)/(nu + nu_0)`, `nu = 2(n - 1)`, b_j from the remnant and c the
-//! median of `r_j/b_j`, what runs differ by beyond their remnant (moderated variances; G. K. Smyth,
-//! *Statistical Applications in Genetics and Molecular Biology* 3 (2004), article 3).
+//! The scatter of n runs gives the variance of a line with 2(n - 1) degrees of freedom, and the smallest of few such
+//! variances would dominate the fit. The relative variances `r_j = v_j/|H_j|^2` are shrunk towards those of the remnant
+//! next to the line, which are computed from many bins:
+//! `r_j <- (nu r_j + nu_0 c b_j)/(nu + nu_0)`, `nu = 2(n - 1)`, b_j from the remnant and c the median of `r_j/b_j`, the
+//! difference of runs in excess of their remnant (moderated variances; G. K. Smyth, *Statistical Applications in
+//! Genetics and Molecular Biology* 3 (2004), article 3).
 
 use hoid_model::Complex64;
 use hoid_numerics::statistics::upper_median;
@@ -14,12 +13,12 @@ use hoid_numerics::statistics::upper_median;
 use super::response_fit::MeasuredResponse;
 use crate::frequency::DescribingFunction;
 
-/// Degrees of freedom nu_0 of what a variance is drawn towards.
+/// Degrees of freedom nu_0 of the variance towards which another is shrunk.
 const PRIOR_FREEDOM: f64 = 8.0;
-/// Runs from which on their scatter determines c.
+/// Number of runs from which on their scatter determines c.
 pub(super) const FEWEST_RUNS: usize = 3;
 
-/// A variance by the scatter of so many runs, drawn towards that of the remnant next to the line.
+/// Variance from the scatter of this number of runs, shrunk towards that of the remnant next to the line.
 pub(super) fn moderated(runs: usize, of_runs: Option<f64>, beside: f64, excess: f64) -> f64 {
     let nu = 2.0 * (runs as f64 - 1.0);
     match of_runs {
@@ -44,7 +43,7 @@ impl<'d> LineData<'d> {
             .filter_map(|i| Some(lines[i].standard_error?.powi(2) / beside(i)))
             .filter(|r| r.is_finite())
             .collect();
-        // Runs that differ by less than their remnant do so by chance.
+        // A scatter of runs below their remnant is due to chance.
         let excess = match upper_median(&mut ratios) {
             Some(median) if runs >= FEWEST_RUNS => median.max(1.0),
             _ => 1.0,
@@ -66,7 +65,7 @@ impl<'d> LineData<'d> {
         self.describing.runs.len()
     }
 
-    /// The points of all runs but one; their variances are those of a given number of runs.
+    /// Returns the points of all runs except one; their variances are those of the remaining number of runs.
     pub fn without(&self, run: usize) -> Vec<MeasuredResponse> {
         let n = self.runs() as f64;
         let fewer = |(point, line): (&MeasuredResponse, &crate::frequency::Line)| MeasuredResponse {
@@ -77,14 +76,14 @@ impl<'d> LineData<'d> {
         self.points.iter().zip(&self.describing.lines).map(fewer).collect()
     }
 
-    /// chi^2 of one run against the sampled response of an operator that was fitted without it.
+    /// Returns chi^2 of one run for the sampled response of an operator that was fitted without it.
     pub fn chi_squared_of_run(&self, run: usize, sampled: impl Fn(f64) -> Complex64) -> f64 {
         let n = self.runs() as f64;
         let of = |(point, line): (&MeasuredResponse, &crate::frequency::Line)| {
             let (a, b) = line.ratio.0[run];
             let whole: Complex64 = line.ratio.0.iter().map(|(_, b)| b).sum();
             let model = sampled(point.omega_rad_s);
-            // An error of n times the variance of the mean.
+            // An error with n times the variance of the mean.
             2.0 * ((a - model * b) * n / whole).norm_sqr() / (n * point.variance)
         };
         self.points.iter().zip(&self.describing.lines).map(of).sum()

@@ -1,14 +1,13 @@
-//! The whole of an open loop with its controlled element: every crossing with its error, and whether the closed loop
-//! is stable.
+//! Open loop with its controlled element: all crossings with their errors, and the stability of the closed loop.
 //!
-//! `L = Y Y_c`, Y the sampled response of what was estimated, Y_c exact. With the covariance of real and imaginary part
-//! of `dL/L = dY/Y` at a frequency, a crossing of `|L| = 1` and the phase there move as [`super::open_loop`] states,
-//! and one of the negative real axis by `d omega = -Im(dL/L)/Im(d ln L/d omega)`, so that the gain margin moves by
+//! `L = Y Y_c`, Y the sampled response of the estimate, Y_c exact. With the covariance of real and imaginary part of
+//! `dL/L = dY/Y` at a frequency, a crossing of `|L| = 1` and the phase there change as in [`super::open_loop`], and a
+//! crossing of the negative real axis by `d omega = -Im(dL/L)/Im(d ln L/d omega)`, so that the gain margin changes by
 //! `-(20/ln 10) (Re(dL/L) + Re(d ln L/d omega) d omega)` dB.
 //!
-//! A closed loop that is not stable becomes stable only when L moves over -1 at some frequency. How many standard errors
-//! away that is, is the least of `(1 + L)' C_L^-1 (1 + L)` over frequency, chi-squared with two degrees of freedom
-//! where the loop is at the limit of stability.
+//! An unstable closed loop becomes stable only if L passes through -1 at some frequency. Its distance from this, in
+//! standard errors, is the minimum of `(1 + L)' C_L^-1 (1 + L)` over frequency, chi-squared with two degrees of freedom
+//! for a loop at the limit of stability.
 
 use std::f64::consts::LN_10;
 
@@ -20,26 +19,26 @@ use hoid_model::{
 
 use super::open_loop::{Crossover, followed_margin_deg};
 
-/// Where crossings are searched for, rad/s.
+/// Range in which crossings are searched for, rad/s.
 const RANGE_RAD_S: (f64, f64) = (0.05, 60.0);
-/// Largest phase margin that is trusted of a person, deg.
+/// Largest plausible phase margin of a person, deg.
 const FARTHEST_MARGIN_DEG: f64 = 120.0;
-/// Quantile of 95 % of chi-squared with two degrees of freedom.
+/// 95 % quantile of chi-squared with two degrees of freedom.
 const CHI_SQUARED: f64 = 5.991_464_547_107_979;
-/// Points at which the distance from -1 is searched for.
+/// Number of points at which the distance from -1 is computed.
 const POINTS: usize = 400;
 
-/// Known properties of an operator at a frequency: its sampled response, and the covariance of real and imaginary part
-/// of its relative change.
+/// An operator at a frequency: its sampled response, and the covariance of the real and imaginary part of its relative
+/// error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KnownResponse {
     /// Y.
     pub value: Complex64,
-    /// Covariance of `dY/Y`; `None` if none is known.
+    /// Covariance of `dY/Y`; `None` if not known.
     pub relative: Option<[[f64; 2]; 2]>,
 }
 
-/// Everything that an open loop shows without being asked for one crossing.
+/// All crossings of an open loop, and the stability of the closed loop.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoopShape {
     /// All frequencies in rad/s at which `|L| = 1`, the lowest first, each with its phase margin in deg.
@@ -50,12 +49,12 @@ pub struct LoopShape {
     pub unstable_poles: Option<usize>,
     /// Least chi-squared of a loop at the limit of stability; `None` without a covariance.
     distance: Option<f64>,
-    /// Phase margin in deg at the lowest crossover, followed from low frequencies.
+    /// Phase margin in deg at the lowest crossover, with the phase followed from low frequencies.
     followed_deg: Option<f64>,
 }
 
 impl LoopShape {
-    /// For an operator and its controlled element.
+    /// Computes the crossings of an operator with its controlled element.
     pub fn of(
         operator: impl Fn(f64) -> KnownResponse,
         element: &ContinuousTransferFunction,
@@ -118,9 +117,9 @@ impl LoopShape {
         self.unstable_poles.map(|count| count == 0)
     }
 
-    /// Evidence of the loop against the assumed operator: a record that stays bounded was made in a stable loop, which
-    /// has a crossover and no phase margin below zero, and a person's has none above 120 deg. `reach_deg` is half of
-    /// the 95 % interval of the margin at the lowest crossover. `None` if nothing is against it.
+    /// Returns evidence against the operator: a record that remains bounded was made in a stable loop, which has a
+    /// crossover and a positive phase margin, and the margin of a person is at most 120 deg. `reach_deg` is half of the
+    /// 95 % interval of the margin at the lowest crossover. `None` if there is no such evidence.
     pub fn doubt(&self, reach_deg: f64) -> Option<Finding> {
         let remedy = "check the controlled element, the signs and units of e and u and the time between them";
         let (Some((crossover, _)), Some(margin)) = (self.crossovers.first(), self.followed_deg) else {
@@ -161,7 +160,7 @@ impl LoopShape {
         })
     }
 
-    /// Every crossover with its margin.
+    /// Formats every crossover with its margin.
     fn as_text(&self) -> String {
         let each = self.crossovers.iter();
         let each =
@@ -170,7 +169,7 @@ impl LoopShape {
     }
 }
 
-/// Least chi-squared of a change of the operator that brings L to -1 somewhere.
+/// Least chi-squared of a change of the operator for which L passes through -1.
 fn distance_from_the_limit(
     operator: &impl Fn(f64) -> KnownResponse,
     element: &ContinuousTransferFunction,
@@ -181,10 +180,10 @@ fn distance_from_the_limit(
         let omega = at(i);
         let known = operator(omega);
         let [[a, b], [_, c]] = known.relative?;
-        // (1 + L)/L: the relative change of Y that brings it there.
+        // (1 + L)/L: the necessary relative change of Y.
         let open_loop = known.value * element.response(omega);
         let d = (Complex64::new(1.0, 0.0) + open_loop) / open_loop;
-        // One parameter alone moves along a line.
+        // With a single parameter the covariance has rank one.
         let (a, c) = (a + 1e-9 * (a + c), c + 1e-9 * (a + c));
         let distance = (c * d.re * d.re - 2.0 * b * d.re * d.im + a * d.im * d.im) / (a * c - b * b);
         distance.is_finite().then_some(distance)
@@ -231,10 +230,10 @@ mod tests {
             "{}",
             doubt.message
         );
-        // Large errors: it may be stable.
+        // With large errors the loop may be stable.
         let note = shape(resonant, Some(0.3)).doubt(1.0).unwrap();
         assert_eq!(note.severity, hoid_model::Severity::Note);
-        // Without errors the values count.
+        // Without errors the values are used.
         assert_eq!(
             shape(resonant, None).doubt(1.0).unwrap().severity,
             hoid_model::Severity::Doubt
@@ -276,7 +275,7 @@ mod tests {
             assert_eq!(found.doubt(0.0).unwrap().kind, "no-crossover");
             assert_eq!(found.gain_margin, None);
         }
-        // The sign turned over.
+        // Reversed sign.
         let found = shape(|w| Complex64::from_polar(-1.0, -0.15 * w), Some(1e-6));
         assert_eq!(found.doubt(1.0).unwrap().kind, "unstable-loop");
     }

@@ -1,15 +1,15 @@
-//! Recordings with little noise, or none: simulations, and what anyone tries first.
+//! Recordings with little noise, or none: simulations, and first trials of users.
 //!
-//! The frequency response from which searches start is off by more than such noise, so that an autoregression of what
-//! it leaves of u would model the operator in place of the noise. Where a form leaves little, all of them are searched
-//! by output error first, `u = c + Y e + v` with v taken for white and without a prior (L. Ljung, *System
-//! Identification*, 1999, section 8.4: it is consistent in a closed loop where v vanishes): its end is near the truth,
-//! and from there the noise is modelled. Without any noise it is the truth, to the digits of the data, also of what the
-//! error does between its samples ([`Intersample`]).
+//! The error of the frequency response from which searches start exceeds such noise, so that an autoregression of the
+//! residual part of u would model the operator instead of the noise. If a form leaves little, all of them are fitted
+//! first by output error, `u = c + Y e + v` with v assumed white and without a prior (L. Ljung, *System
+//! Identification*, 1999, section 8.4: it is consistent in a closed loop if v vanishes): the result is near the true
+//! operator, and the noise model is fitted from there. Without any noise it is the true operator, to the precision of
+//! the data, including the intersample behaviour of the error ([`Intersample`]).
 //!
-//! **Level.** The means that were taken out of e and u are those of a steady state, and a record is none: the effect of
-//! the time before its first sample stays in u as a constant. Where a mean was taken out, c is an unknown of each
-//! record, eliminated with the initial states ([`crate::criterion::Data::level`]).
+//! **Level.** The means that were removed from e and u are those of a steady state, and a record is none: the effect of
+//! the time before its first sample remains in u as a constant. If a mean was removed, c is an unknown of each record,
+//! eliminated with the initial states ([`crate::criterion::Data::level`]).
 
 use hoid_model::Form;
 
@@ -20,28 +20,28 @@ use super::{
 };
 use crate::{SearchOptions, criterion::Workspace, optimize::Objective};
 
-/// Share of the power of u that a start may leave where an output error is searched.
+/// Share of the power of u that a start may leave if an output error search follows.
 const LARGEST_AT_START: f64 = 0.05;
-/// Share that the best of them may leave where the noise is little: of a person's u no operator explains so much.
+/// Share that the best of them may leave if there is little noise: no operator explains this much of a person's u.
 const LITTLE: f64 = 5e-3;
-/// Share below which the residual is rounding, which no search is to continue for.
+/// Share below which the residual is rounding, at which a search ends.
 const ROUNDING: f64 = 1e-25;
-/// Points of a grid from which a form is searched that has not been found without noise, and how often: the second time
-/// next to the best that the first has found.
+/// Number of grid points from which the search of a form is repeated if it has not been found without noise, and number
+/// of repetitions: the second uses the best form of the first.
 const MORE_STARTS: usize = 4;
 const ROUNDS: usize = 2;
-/// Share that one course of the error leaves over that of another which decides. For an error that is continuous the
-/// model of a hold misses `x^2/6` and that of straight lines `x^2/3`: a quarter of the squares, and neither is right.
+/// Relative difference of the shares of two intersample behaviours that is decisive. For a continuous error the model
+/// of a hold misses `x^2/6` and that of linear interpolation `x^2/3`: a quarter of the squares, and neither is right.
 const DECIDES: f64 = 0.02;
-/// Share over the least one from which on a form may not have been found.
+/// Ratio of a share to the smallest above which a form may not have been found.
 const WORSE: f64 = 1.1;
-/// Steps of a search.
+/// Largest number of steps of a search.
 const MOST_STEPS: usize = 200;
 
-/// A form with the coordinates that its searches start from.
+/// A form with the starting coordinates of its searches.
 pub(super) type Starts = (Form, Vec<Vec<f64>>);
 
-/// Where the search of a form ended.
+/// Result of the search of a form.
 #[derive(Debug, Clone)]
 pub(super) struct End {
     pub coordinates: Vec<f64>,
@@ -49,20 +49,20 @@ pub(super) struct End {
     share: f64,
 }
 
-/// Findings about all forms where there is little noise.
+/// Results of all forms if there is little noise.
 #[derive(Debug, Clone)]
 pub(super) struct LittleNoise {
-    /// The end of each form; `None` where its search came to none.
+    /// The result of each form; `None` if its search failed.
     pub ends: Vec<Option<End>>,
-    /// The least share of the power of u that is left.
+    /// The smallest share of the power of u that is left.
     pub share: f64,
-    /// The least Schwarz's criterion.
+    /// The smallest value of Schwarz's criterion.
     criterion: f64,
 }
 
 impl LittleNoise {
-    /// The search of all forms; `None` if there is more noise. Where an ARX model of high order finds hardly any,
-    /// `clean`, the starts may be far off.
+    /// Searches all forms; `None` if there is more noise. If an ARX model of high order finds almost no noise
+    /// (`clean`), the starts may be far off.
     pub fn of(
         prediction: &Prediction<'_>,
         neuromuscular: bool,
@@ -96,9 +96,9 @@ impl LittleNoise {
             let Some((best, share)) = least_of(&ends).filter(|(_, share)| clean || *share < LITTLE) else {
                 break;
             };
-            // A response without noise is one of a form: where none has been found, not the best of them either.
+            // A response without noise is that of a form: if none fits, the best form is not found either.
             let none_is_found = clean && round > 0 && share >= NONE;
-            // For a rest that is noise nothing is left to be found.
+            // If the residual is noise, there is nothing more to find.
             let beside = (starts[best].0, ends[best].clone()?.coordinates);
             for ((form, _), end) in starts.iter().zip(&mut ends) {
                 let known = end.as_ref().map_or(f64::INFINITY, |end| end.share);
@@ -122,7 +122,7 @@ impl LittleNoise {
         Some(Self { ends, share, criterion })
     }
 
-    /// Moves starts to the ends, with delays that are later by this.
+    /// Moves the starts to these results, with delays longer by `later_s`.
     pub fn move_to_ends(&self, starts: &mut [Starts], later_s: f64) {
         for ((_, coordinates), end) in starts.iter_mut().zip(&self.ends) {
             if let Some(end) = end {
@@ -135,7 +135,7 @@ impl LittleNoise {
         }
     }
 
-    /// The intersample behaviour with the better fit, of a smooth and a held error that were both searched, and whether
+    /// Returns the intersample behaviour with the better fit, for searches with a smooth and a held error, and whether
     /// the difference is decisive.
     pub fn course(smooth: &Self, held: &Self) -> (Intersample, bool) {
         match held.share.max(ROUNDING) / smooth.share.max(ROUNDING) {
@@ -147,7 +147,7 @@ impl LittleNoise {
     }
 }
 
-/// Which form leaves least, and how much.
+/// Returns the form with the smallest residual, and its share.
 fn least_of(ends: &[Option<End>]) -> Option<(usize, f64)> {
     let shares = ends
         .iter()
@@ -156,7 +156,7 @@ fn least_of(ends: &[Option<End>]) -> Option<(usize, f64)> {
     shares.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Output error searches over one course of the error.
+/// Output error searches with one intersample behaviour of the error.
 struct Search<'p, 'a> {
     prediction: &'p Prediction<'a>,
     neuromuscular: bool,
@@ -164,7 +164,7 @@ struct Search<'p, 'a> {
 }
 
 impl Search<'_, '_> {
-    /// The end of the best search from these coordinates.
+    /// Returns the best result of searches from these coordinates.
     fn least(&self, form: Form, starts: &[Vec<f64>], workspace: &mut Workspace) -> Option<End> {
         let criterion = self.prediction.criterion((form, self.neuromuscular), (0, 0));
         let search = SearchOptions {
@@ -189,15 +189,15 @@ impl Search<'_, '_> {
         best
     }
 
-    /// The points of the grid of a form that leave least, each with its best gain, by themselves and with the
-    /// neuromuscular system and the delay of another operator. u is linear in the gain, so that one step from a gain of
-    /// zero is the best.
+    /// Returns the grid points of a form with the smallest residuals, each with its best gain, by themselves and with
+    /// the neuromuscular system and the delay of another operator. u is linear in the gain, so that one step from a
+    /// gain of zero gives the best.
     fn more_starts(&self, form: Form, beside: &(Form, Vec<f64>), workspace: &mut Workspace) -> Vec<Vec<f64>> {
         let (prediction, neuromuscular) = (self.prediction, self.neuromuscular);
         let criterion = prediction.criterion((form, neuromuscular), (0, 0));
         let limits = coordinates::limits(form, neuromuscular, prediction.delay_range_s, prediction.sample_time);
         let mut grid = coordinates::start_grid(form, neuromuscular, &limits, Grid::Default);
-        // The last coordinates of all forms are these.
+        // These are the last coordinates of all forms.
         let tail = 1 + if neuromuscular { 2 } else { 0 };
         let of_other = &beside.1[beside.1.len() - tail..];
         let mut moved: Vec<Vec<f64>> = (grid.iter())
@@ -220,7 +220,7 @@ impl Search<'_, '_> {
         all.into_iter().take(MORE_STARTS).map(|(_, point)| point).collect()
     }
 
-    /// Share of the power of u that an operator leaves.
+    /// Returns the share of the power of u that an operator leaves.
     fn left(&self, form: Form, coordinates: &[f64], workspace: &mut Workspace) -> Option<f64> {
         let left = self
             .prediction

@@ -1,4 +1,4 @@
-//! An estimate over the forms that the data leave: weighed, not chosen.
+//! An estimate averaged over the forms that the data do not reject.
 //!
 //! Form f has the weight `w_f = exp(-Delta_f/2)/sum exp(-Delta_g/2)`, Delta its difference in Akaike's
 //! criterion to the least (H. Akaike, *J. Econometrics* 16 (1981) 3-14). A quantity x that forms have in
@@ -6,11 +6,11 @@
 //!
 //! `x = sum w_f x_f`,  `s^2 = sum w_f (s_f^2 + (x_f - x)^2)`,
 //!
-//! the unconditional standard error (K. P. Burnham and D. R. Anderson, *Sociological Methods and Research* 33
-//! (2004) 261-304, eq. 9): what the choice of a form costs is a part of the error. A form that lacks x has no
-//! part in it, and the other weights are scaled to one. The interval of 95 % is that of the mixture of the
-//! distributions of the forms, each of two halves of Student's distribution that meet at `x_f` and end at its
-//! own interval, which need not be symmetric.
+//! the unconditional standard error (K. P. Burnham and D. R. Anderson, *Sociological Methods and Research* 33 (2004)
+//! 261-304, eq. 9): the uncertainty of the choice of a form is a part of the error. A form without x is left out, and
+//! the other weights are scaled to a sum of one. The 95 % interval is that of the mixture of the distributions of the
+//! forms, each composed of two halves of Student's distribution that meet at `x_f` and end at its own interval, which
+//! need not be symmetric.
 
 use hoid_model::uncertainty::Estimate;
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -19,23 +19,23 @@ use super::clusters::{freedom, quantile};
 
 /// Halvings of a bracket.
 const HALVINGS: usize = 80;
-/// Widths of all intervals beyond which Student's distribution has less than a hundredth of a tail.
+/// Number of widths of all intervals beyond which Student's distribution has less than a hundredth of a tail.
 const FAR: f64 = 50.0;
 /// Probability in each tail.
 const TAIL: f64 = 0.025;
 
-/// Statement of a form about a quantity.
+/// Estimate of a quantity in one form.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Component {
     /// Weight of the form.
     pub weight: f64,
     /// Its estimate.
     pub estimate: Estimate,
-    /// Its interval of 95 %.
+    /// Its 95 % interval.
     pub interval: Option<(f64, f64)>,
 }
 
-/// Report of all of them.
+/// Estimate over all forms.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Mixture {
     pub estimate: Estimate,
@@ -43,7 +43,7 @@ pub(super) struct Mixture {
 }
 
 impl Mixture {
-    /// For these forms; `None` for none. Errors rest on this number of clusters.
+    /// Averages over these forms; `None` if there are none. Errors are based on this number of clusters.
     pub fn of(components: &[Component], clusters: usize) -> Option<Self> {
         let total: f64 = components.iter().map(|c| c.weight).sum();
         if let [only] = components {
@@ -57,7 +57,7 @@ impl Mixture {
         }
         let over = |of: &dyn Fn(&Component) -> f64| components.iter().map(|c| c.weight / total * of(c)).sum::<f64>();
         let value = over(&|c| c.estimate.value);
-        // An error that is missing is not one of zero.
+        // A missing error is not an error of zero.
         let known = components.iter().all(|c| c.estimate.standard_error.is_some()) && value.is_finite();
         let variance = over(&|c| {
             let s = c.estimate.standard_error.unwrap_or(0.0);
@@ -76,7 +76,7 @@ impl Mixture {
 /// Weight, estimate and interval of a form.
 type Part = (f64, f64, (f64, f64));
 
-/// The interval of the mixture; `None` if a form has none.
+/// Returns the interval of the mixture; `None` if a form has none.
 fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f64, f64)> {
     let student = StudentsT::new(0.0, 1.0, freedom(clusters)).ok()?;
     let quantile = quantile(clusters);
@@ -84,7 +84,7 @@ fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f6
         .map(|c| Some((c.weight / total, c.estimate.value, c.interval?)))
         .collect();
     let parts = parts?;
-    // Below x, of one form.
+    // Probability below x, for one form.
     let below = |x: f64, value: f64, (low, high): (f64, f64)| -> f64 {
         let reach = if x < value { value - low } else { high - value };
         match (x - value) / reach {
@@ -100,7 +100,7 @@ fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f6
         all.filter(|x| x.is_finite()).fold(from, pick)
     };
     let (least, most) = (finite(f64::min, f64::INFINITY), finite(f64::max, f64::NEG_INFINITY));
-    // Far out: a form with an end that is open keeps half of its probability there.
+    // Far out: a form with an infinite end keeps half of its probability there.
     let reach = FAR * (most - least).max(most.abs().max(least.abs()) * f64::EPSILON);
     let place = |wanted: f64| {
         let (mut low, mut high) = (least - reach, most + reach);
@@ -113,7 +113,7 @@ fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f6
             }
         }
         let found = 0.5 * (low + high);
-        // An end at zero, as of a time constant at its bound, is zero and not the rounding of it.
+        // An end at zero, such as a time constant at its bound, is zero and not its rounding error.
         if found.abs() < 1e-12 * (most - least) {
             0.0
         } else {
@@ -133,7 +133,7 @@ fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f6
     Some((low, high))
 }
 
-/// With a standard error that is larger: the ends of the interval move out in its ratio to the old one.
+/// Returns the interval for a larger standard error: its ends are moved outwards in the ratio to the old one.
 pub(super) fn widened(
     of: Estimate,
     interval: Option<(f64, f64)>,

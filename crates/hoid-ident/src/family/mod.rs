@@ -1,36 +1,35 @@
-//! Operators of recorded people: the family of operators with errors that hold.
+//! Operators of recorded people: the family of operators with reliable errors.
 //!
 //! `u = Y e + (C/D) eps` with Y an operator of the family ([`hoid_model::operator_family`]). People differ from a
-//! simulation in three ways that decide whether their parameters mean anything: they integrate slow errors (a lag that
-//! the operator must have), their remnant is not a filter of first order (the noise model must be rich), and they vary
-//! (error bars must come from the scatter between runs). What the data do not determine is reported to be so.
+//! simulation in three ways that are decisive for their parameters: they integrate slow errors (the operator needs a
+//! lag), their remnant is not a filter of first order (the noise model must be rich), and they vary (error bars must be
+//! based on the scatter between runs). Parameters that the data do not determine are reported as such.
 //!
-//! 1. The describing function at the lines of a periodic excitation, where one was recorded
-//!    ([`crate::frequency`]); each form is fitted to it ([`LineFit`]). Without one, the response of
-//!    an ARX model of high order gives the starts.
+//! 1. The describing function at the lines of a periodic excitation, if one was recorded ([`crate::frequency`]); each
+//!   form is fitted to it ([`LineFit`]). Without one, the response of an ARX model of high order gives the starts.
 //! 2. Each form by prediction error, with an autoregressive (or ARMA) noise model whose order Akaike's criterion
-//!    chooses, and a weak prior on what seconds of tracking do not determine ([`OperatorPrior`]).
-//! 3. Forms are weighed by Akaike's criterion ([`FormFigures`]), and estimates averaged over those that the data
-//!    leave ([`WeighedForm`]).
-//! 4. Errors by the scatter of runs or blocks; intervals in coordinates that are nearly normal, by
-//!    profile likelihood where they are not ([`Parameter`]).
-//! 5. The operator by refined instrumental variables, where an excitation was recorded ([`InstrumentalFit`]); all
-//!    methods next to each other ([`Agreement`]), a free model of the same orders ([`FreeModel`]), and the
-//!    [`Verdict`](hoid_model::Verdict) on all of it.
+//!   chooses, and a weak prior on parameters that seconds of tracking do not determine ([`OperatorPrior`]).
+//! 3. Forms have weights by Akaike's criterion ([`FormFigures`]), and estimates are averaged over those that the data
+//!   do not reject ([`WeighedForm`]).
+//! 4. Errors from the scatter of runs or blocks; intervals in coordinates that are nearly normal, and by profile
+//!   likelihood if they are not ([`Parameter`]).
+//! 5. The operator by refined instrumental variables, if an excitation was recorded ([`InstrumentalFit`]); the
+//!   comparison of all methods ([`Agreement`]), a free model of the same orders ([`FreeModel`]), and the
+//!   [`Verdict`](hoid_model::Verdict) on all of it.
 //!
 //! | file | contents |
 //! |---|---|
-//! | `options` | [`FamilyEstimator`]: what may be chosen, by fields and by names |
+//! | `options` | [`FamilyEstimator`]: the options, by fields and by names |
 //! | `estimator` | the searches of all forms |
-//! | `channel` | a further input: as requested, in a form, its results |
-//! | `channels` | what a person sees besides the error |
-//! | `channel_lines` | the responses to all of it at the lines |
-//! | `comparison` | what each form is worth next to the others |
+//! | `channel` | a further input: the request, its form, the results |
+//! | `channels` | further inputs of a person in addition to the error |
+//! | `channel_lines` | the responses to all inputs at the lines |
+//! | `comparison` | comparison of the forms |
 //! | `assembly` | from the searches of the forms that count to the result |
 //! | `estimated` | the operator of a record with its errors |
 //! | `result` | [`FamilyFit`] |
 //! | `parameter` | a parameter with its interval, its prior share, and whether it is determined |
-//! | `prior` | what is known before the data |
+//! | `prior` | prior knowledge |
 //! | `coordinates` | bounds and starting values of the coordinates |
 //! | `lines`, `line_fit` | the lines with their variances; the operator through them |
 //! | `response_fit` | least squares on a frequency response |
@@ -39,21 +38,21 @@
 //! | `layout` | places of coordinates and noise coefficients |
 //! | `noise` | autoregressions: starts and orders of the noise model |
 //! | `prediction` | the prediction error fit of one form |
-//! | `prediction_fit` | what its search found |
-//! | `joint` | the prediction error fit with the lines next to it |
-//! | `clusters`, `covariances` | runs or blocks; the covariance by them |
+//! | `prediction_fit` | the result of its search |
+//! | `joint` | the prediction error fit that includes the lines |
+//! | `clusters`, `covariances` | runs or blocks; the covariance from them |
 //! | `jackknife` | covariances from estimates without each part, and from a prior |
-//! | `sensitivity` | what the estimate owes to the choice of a noise model |
+//! | `sensitivity` | effect of the noise model on the estimate |
 //! | `profile` | intervals by profile likelihood |
-//! | `choice` | the weights of the forms, and which of them is in front |
+//! | `choice` | the weights of the forms, and the best form |
 //! | `mixture` | an estimate over several forms |
-//! | `agreement` | do methods agree |
-//! | `intersample` | what the error does between its samples |
-//! | `low_noise` | starts by output error, where there is little noise or none |
+//! | `agreement` | agreement of the methods |
+//! | `intersample` | intersample behaviour of the error |
+//! | `low_noise` | starts by output error, for little or no noise |
 //! | `open_loop` | crossover and phase margin |
-//! | `loop_shape` | every crossing, and whether the closed loop is stable |
-//! | `of_polynomials`, `pole_reading` | polynomials back to an operator; interpretation of poles |
-//! | `diagnostics` | what makes a result doubtful |
+//! | `loop_shape` | every crossing, and the stability of the closed loop |
+//! | `of_polynomials`, `pole_reading` | conversion of polynomials to an operator; interpretation of poles |
+//! | `diagnostics` | reasons to doubt a result |
 
 mod agreement;
 mod arx_response;

@@ -1,4 +1,4 @@
-//! Starts and orders of the noise model: an autoregression of what the operator leaves unexplained.
+//! Starts and orders of the noise model: an autoregression of the part of u that the operator does not explain.
 //!
 //! `v(t) = -d_1 v(t-1) - ... - d_nd v(t-nd) + eps(t)` by least squares over all records together,
 //! from sample nd on in each (the covariance method), for all orders from the same products. The
@@ -10,7 +10,7 @@ use crate::linalg::{gram::Gram, least_squares::solve_symmetric};
 
 /// Largest modulus of a root of C in a start.
 const LARGEST_ROOT: f64 = 0.999;
-/// By what roots that are larger are drawn in, and how often.
+/// Factor by which larger roots are moved inwards, and the largest number of times.
 const DRAWN_BY: f64 = 0.98;
 const MOST_DRAWN: usize = 200;
 
@@ -29,7 +29,7 @@ pub(crate) struct NoiseProducts {
 }
 
 impl NoiseProducts {
-    /// The products of these series up to an order.
+    /// Computes the products of these series up to an order.
     pub fn new(series: &[Vec<f64>], highest: usize) -> Self {
         let mut products = Gram::new(highest + 1);
         let mut count = 0;
@@ -44,7 +44,7 @@ impl NoiseProducts {
         }
     }
 
-    /// The autoregression of this order; `None` where v has no such.
+    /// Returns the autoregression of this order; `None` if it does not exist.
     pub fn fit(&self, order: usize) -> Option<Autoregression> {
         let power = self.products.at(0, 0);
         if self.count == 0 || power <= 0.0 {
@@ -64,15 +64,15 @@ impl NoiseProducts {
         })
     }
 
-    /// The autoregression of this order, or of the highest below it that there is, with zeros for what it lacks: a
-    /// smooth v without noise is predicted by fewer coefficients to rounding.
+    /// Returns the autoregression of this order, or of the highest lower order that exists, padded with zeros: a smooth
+    /// v without noise is predicted to rounding by fewer coefficients.
     pub fn fit_up_to(&self, order: usize) -> Option<Autoregression> {
         let mut found = (0..=order).rev().find_map(|order| self.fit(order))?;
         found.d.resize(order, 0.0);
         Some(found)
     }
 
-    /// The order of Akaike's criterion among these.
+    /// Returns the best of these orders by Akaike's criterion.
     pub fn best_order(&self, orders: impl Iterator<Item = usize>) -> Option<usize> {
         let n = self.count as f64;
         let value = |order: usize| Some((n * self.fit(order)?.loss.ln() + 2.0 * order as f64, order));
@@ -84,9 +84,9 @@ impl NoiseProducts {
     }
 }
 
-/// Start of an ARMA noise model, `[c.., d..]`: with the innovations of a long autoregression, v is
-/// regressed on its own past and on theirs (E. J. Hannan and J. Rissanen, *Biometrika* 69 (1982)
-/// 81-94). A C that is not invertible is drawn in, `c_k rho^k`.
+/// Start of an ARMA noise model, `[c.., d..]`: with the innovations of a long autoregression, v is regressed on its own
+/// past and on the past innovations (E. J. Hannan and J. Rissanen, *Biometrika* 69 (1982) 81-94). The roots of a C that
+/// is not invertible are moved inwards, `c_k rho^k`.
 pub(crate) fn hannan_rissanen(series: &[Vec<f64>], (nc, nd): (usize, usize), long: usize) -> Option<Vec<f64>> {
     let d = NoiseProducts::new(series, long).fit(long)?.d;
     let q = nc + nd;

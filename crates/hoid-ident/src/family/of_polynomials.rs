@@ -1,20 +1,18 @@
-//! The operator of the family that polynomials represent: `q^-nk B/F` (or `B/A`) back to K, T_L,
-//! T_I, omega_nm, zeta_nm and tau_e.
+//! Conversion of polynomials to an operator of the family: `q^-nk B/F` (or `B/A`) to K, T_L, T_I, omega_nm, zeta_nm and
+//! tau_e.
 //!
-//! The poles show which is the lag and which are the neuromuscular system
-//! ([`super::pole_reading`]).
+//! The poles determine the lag and the neuromuscular system ([`super::pole_reading`]).
 //!
-//! The exact model of an operator ([`FamilyOperator::zoh`]) has fewer parameters than B has
-//! coefficients, so that estimated polynomials lie next to it. The operator is the one whose exact
-//! model M(x) is nearest to the response H of the polynomials over the band of manual control,
+//! The exact model of an operator ([`FamilyOperator::zoh`]) has fewer parameters than B has coefficients, so that
+//! estimated polynomials are near but not on it. The operator is the one whose exact model M(x) is nearest to the
+//! response H of the polynomials over the band of manual control,
 //!
 //! `min_x sum_j |H(omega_j) - M(omega_j, x)|^2 / |H(omega_j)|^2`,
 //!
-//! which gives an operator back from its own exact model. Its covariance follows from that of theta
-//! to first order, `dx = (J'J)^-1 J' dH`, J the derivatives of M over |H| (the implicit function
-//! theorem without the second derivative, which vanishes where M meets H). What the fit leaves,
-//! [`FamilyConversion::mismatch`], states how far the polynomials are from the form; where it is
-//! large they have none.
+//! which returns an operator from its own exact model. Its covariance follows from that of theta to first order,
+//! `dx = (J'J)^-1 J' dH`, J the derivatives of M over |H| (the implicit function theorem without the second derivative,
+//! which vanishes if M equals H). The residual of the fit, [`FamilyConversion::mismatch`], is the distance of the
+//! polynomials from the form; if it is large, they have no such form.
 
 use hoid_model::{
     Complex64, FamilyOperator, Form, NotConvertible, PolynomialModel, SampleTime,
@@ -33,7 +31,7 @@ use crate::{
     optimize::{Linearisation, Minimum, Objective, minimise},
 };
 
-/// The forms that are tried, the simplest first.
+/// The candidate forms, the simplest first.
 const FORMS: [Form; 6] = [
     Form::Gain,
     Form::Lag,
@@ -42,14 +40,14 @@ const FORMS: [Form; 6] = [
     Form::Lead2,
     Form::Lead2Lag,
 ];
-/// Where responses are compared, rad/s, evenly over the logarithm.
+/// Range in which responses are compared, rad/s, evenly over the logarithm.
 const BAND_RAD_S: (f64, f64) = (0.2, 30.0);
 const POINTS: usize = 30;
-/// Largest part of the response by which an operator may miss its polynomials.
+/// Largest relative deviation of the response of an operator from that of its polynomials.
 const LARGEST_MISMATCH: f64 = 0.1;
-/// A form that is met as well as this is met exactly.
+/// Relative deviation up to which a form counts as exact.
 const EXACT: f64 = 1e-6;
-/// Delays from which searches start, in samples beyond those of nk.
+/// Delays from which searches start, in samples relative to nk.
 const LATER: [f64; 6] = [0.02, 0.5, 0.98, 2.5, 5.0, 10.0];
 /// Lead times from which searches start, s.
 const LEADS_S: [f64; 3] = [0.1, 0.5, 2.0];
@@ -59,7 +57,7 @@ const LEADS_S: [f64; 3] = [0.1, 0.5, 2.0];
 pub struct FamilyConversion {
     /// The operator.
     pub operator: FamilyOperator,
-    /// Covariance of its coordinates by rows, where that of the coefficients is known.
+    /// Covariance of its coordinates by rows, if that of the coefficients is known.
     pub covariance: Option<Vec<f64>>,
     /// The real poles, the slowest first.
     pub real_poles: Vec<RealPole>,
@@ -68,7 +66,7 @@ pub struct FamilyConversion {
 }
 
 impl FamilyConversion {
-    /// The parameters with their names, units and errors to first order.
+    /// Returns the parameters with their names, units and errors to first order.
     pub fn parameters(&self) -> Vec<(&'static str, &'static str, Estimate)> {
         let all = self.operator.named_estimates(self.covariance.as_deref());
         all.into_iter()
@@ -78,8 +76,8 @@ impl FamilyConversion {
 }
 
 impl Fit {
-    /// The operator of the family that the polynomials of this fit represent, of this form or, for
-    /// `None`, of the form that is nearest.
+    /// Returns the operator of the family that the polynomials of this fit represent, of this form or, for `None`, of
+    /// the nearest form.
     ///
     /// # Errors
     /// As [`family_of_polynomials`].
@@ -88,9 +86,8 @@ impl Fit {
     }
 }
 
-/// The operator of the family that polynomials represent, of this form or, for `None`, of the
-/// simplest form that is met exactly, else of the one that is nearest. `covariance` is that of
-/// theta, by rows.
+/// Returns the operator of the family that polynomials represent, of this form or, for `None`, of the simplest exact
+/// form or else the nearest one. `covariance` is that of theta, by rows.
 ///
 /// # Errors
 /// [`NotConvertible`]: poles in A and in F; more than three or none of them; an unstable pole; a
@@ -127,7 +124,7 @@ pub fn family_of_polynomials(
             let Some((mismatch, found)) = nearest(form, reading, &points, orders.nk, sample_time) else {
                 continue;
             };
-            // A simpler form that is met exactly is not given up for rounding.
+            // A simpler exact form is not rejected because of rounding.
             if best.as_ref().is_none_or(|known| known.0 > EXACT && mismatch < known.0) {
                 best = Some((mismatch, found, form, reading));
             }
@@ -170,7 +167,7 @@ pub fn family_of_polynomials(
 struct Point {
     omega_rad_s: f64,
     response: Complex64,
-    /// Its derivatives along theta.
+    /// Its derivatives with respect to theta.
     gradient: Vec<Complex64>,
 }
 
@@ -189,7 +186,7 @@ fn points(model: &PolynomialModel) -> Vec<Point> {
         .collect()
 }
 
-/// The operator of a form with these poles that is nearest, and its mismatch.
+/// Returns the nearest operator of a form with these poles, and its mismatch.
 fn nearest(
     form: Form,
     reading: &Reading,
@@ -198,7 +195,7 @@ fn nearest(
     sample_time: SampleTime,
 ) -> Option<(f64, Minimum)> {
     let neuromuscular = reading.neuromuscular.is_some();
-    // A form has a pole exactly where the polynomials have one, and no pure derivative.
+    // A form has a lag exactly if the polynomials have one, and no pure derivative.
     if form.has_pole() != reading.lag.is_some() || !form.is_proper(neuromuscular) {
         return None;
     }
@@ -235,7 +232,7 @@ impl<'a> Nearest<'a> {
         let ts = sample_time.s();
         let reach = (nk as f64 + 2.0 * LATER[LATER.len() - 1]) * ts;
         let mut limits = coordinates::limits(form, neuromuscular, (0.0, reach), sample_time);
-        // The poles are known: they move by what B has to report about them and no further.
+        // The poles are known: they are free only within the information of B.
         for (limit, coordinate) in limits.iter_mut().zip(form.coordinates(neuromuscular)) {
             match coordinate {
                 Coordinate::LagRate | Coordinate::LogOmega | Coordinate::LogZeta => {
@@ -278,7 +275,7 @@ impl<'a> Nearest<'a> {
                     other => self.reading.coordinate(*other),
                 })
                 .collect();
-            // The gain enters linearly: the best one.
+            // The gain is linear: the best one.
             let (mut cross, mut power) = (0.0, 0.0);
             for (point, m) in self.points.iter().zip(self.responses(&start)?) {
                 let weight = point.response.norm_sqr().recip();
@@ -291,7 +288,7 @@ impl<'a> Nearest<'a> {
         .collect()
     }
 
-    /// Responses of the exact model with their derivatives along the coordinates.
+    /// Returns responses of the exact model with their derivatives with respect to the coordinates.
     fn responses(&self, x: &[f64]) -> Option<Vec<(Complex64, Vec<Complex64>)>> {
         let operator = FamilyOperator::new(self.form, self.reading.neuromuscular.is_some(), x).ok()?;
         let held = operator.zoh(self.sample_time).ok()?;
@@ -318,7 +315,7 @@ impl<'a> Nearest<'a> {
             .map(|at| found.at.gram[at])
             .collect();
         let responses = self.responses(&found.theta)?;
-        // dx/dtheta, a column for each coefficient.
+        // dx/dtheta, one column for each coefficient.
         let mut slopes = vec![0.0; p * n];
         for k in 0..n {
             let right: Vec<f64> = free
@@ -346,7 +343,7 @@ impl<'a> Nearest<'a> {
     }
 }
 
-/// `z^-nk B/F` at `z = e^{j theta}` and its derivatives along the first `p` coordinates.
+/// Returns `z^-nk B/F` at `z = e^{j theta}` and its derivatives with respect to the first `p` coordinates.
 fn response(held: &HeldFamily, angle: f64, p: usize) -> (Complex64, Vec<Complex64>) {
     let back = |k: usize| Complex64::from_polar(1.0, -angle * k as f64);
     let (mut b, mut f) = (Complex64::new(0.0, 0.0), Complex64::new(1.0, 0.0));

@@ -1,9 +1,8 @@
 //! Crossover frequency and phase margin of an operator of the family with its controlled element.
 //!
-//! `L(omega) = Y(j omega) Z(omega) Y_c(j omega)`, Z the hold of the error. The crossover is the
-//! lowest frequency at which `|L|` falls through one, as for a describing function
-//! ([`crate::frequency`]): a neuromuscular resonance may lift `|L|` above one again. Where `|L| = 1`
-//! stays so while the coordinates x move,
+//! `L(omega) = Y(j omega) Z(omega) Y_c(j omega)`, Z the hold of the error. The crossover is the lowest frequency at
+//! which `|L|` falls through one, as for a describing function ([`crate::frequency`]): a neuromuscular resonance may
+//! raise `|L|` above one again. If the coordinates x change and `|L| = 1` still holds,
 //!
 //! `d omega_c = -(d ln|L|/dx)/(d ln|L|/d omega)`,
 //! `d phi_m = d arg L/dx + (d arg L/d omega) d omega_c`.
@@ -21,27 +20,27 @@ use super::{
     mixture::{Component, Mixture, widened},
 };
 
-/// Where crossovers are searched for, rad/s.
+/// Range in which crossovers are searched for, rad/s.
 const RANGE_RAD_S: (f64, f64) = (0.05, 60.0);
-/// Quantile of the normal distribution for 95 %.
+/// 97.5 % quantile of the normal distribution.
 const NORMAL: f64 = 1.959_963_984_540_054;
-/// Points of the scan.
+/// Number of points of the scan.
 const POINTS: usize = 150;
 
-/// Crossover and phase margin with their errors.
+/// Crossover and phase margin with their standard errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoopMeasures {
     /// Crossover frequency omega_c, rad/s.
     pub crossover_rad_s: Estimate,
-    /// Its interval of 95 %.
+    /// Its 95 % interval.
     pub crossover_interval: Option<(f64, f64)>,
     /// Phase margin phi_m, deg, between -180 and 180.
     pub phase_margin_deg: Estimate,
-    /// Its interval of 95 %.
+    /// Its 95 % interval.
     pub phase_margin_interval: Option<(f64, f64)>,
-    /// Effect of one per cent of gain on both, times 100: `d/d ln K`.
+    /// Derivatives of both with respect to the logarithm of the gain, `d/d ln K`.
     by_gain: [f64; 2],
-    /// Standard errors of both as those of the person, whose gain varies from run to run.
+    /// Standard errors of both for the person, whose gain varies from run to run.
     pub of_person: [Option<f64>; 2],
 }
 
@@ -58,7 +57,7 @@ impl LoopMeasures {
         }
     }
 
-    /// With Student's intervals of errors that rest on this number of clusters.
+    /// Returns the same with Student's intervals for errors from this number of clusters.
     pub(super) fn of_few(self, clusters: usize) -> Self {
         Self {
             crossover_interval: reaching(self.crossover_rad_s, quantile(clusters)),
@@ -67,7 +66,7 @@ impl LoopMeasures {
         }
     }
 
-    /// With the variation of the gain of the person by beyond these runs, as a part of it.
+    /// Returns the same with the variation of the person's gain that these runs do not show, relative to the gain.
     pub(super) fn with_run_to_run(self, share: f64) -> Self {
         let both = [self.crossover_rad_s, self.phase_margin_deg];
         let wider = |k: usize| {
@@ -80,7 +79,7 @@ impl LoopMeasures {
         }
     }
 
-    /// The same with the errors and intervals of the person.
+    /// Returns the same with the errors and intervals for the person.
     #[must_use]
     pub fn as_of_person(self) -> Self {
         let [crossover, margin] = self.of_person;
@@ -96,7 +95,7 @@ impl LoopMeasures {
         }
     }
 
-    /// Over forms with their weights; `None` for none.
+    /// Average over forms with their weights; `None` if there are none.
     pub(super) fn averaged(each: &[(f64, Self)], clusters: usize) -> Option<Self> {
         let [_, _, ..] = each else {
             return each.first().map(|(_, only)| *only);
@@ -129,13 +128,13 @@ impl LoopMeasures {
     }
 }
 
-/// A given number of standard errors to both sides.
+/// Interval of a given number of standard errors to both sides.
 fn reaching(of: Estimate, quantile: f64) -> Option<(f64, f64)> {
     let reach = quantile * of.standard_error?;
     Some((of.value - reach, of.value + reach))
 }
 
-/// Where the gain of an open loop falls through one.
+/// Frequency at which the gain of an open loop falls through one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossover {
     /// Crossover frequency, rad/s.
@@ -147,7 +146,7 @@ pub struct Crossover {
 }
 
 impl Crossover {
-    /// The lowest one of an open loop that is sampled; `None` where `|L|` does not fall through one.
+    /// Returns the lowest crossover of a sampled open loop; `None` if `|L|` does not fall through one.
     pub fn lowest(open_loop: impl Fn(f64) -> Complex64, sample_time: SampleTime) -> Option<Self> {
         let highest = RANGE_RAD_S.1.min(0.9 * sample_time.nyquist_rad_s());
         let at = |i: usize| RANGE_RAD_S.0 * (highest / RANGE_RAD_S.0).powf(i as f64 / (POINTS as f64 - 1.0));
@@ -166,7 +165,7 @@ impl Crossover {
         Some(Self::at(&open_loop, zero_between(gain, low, high)))
     }
 
-    /// The one at a frequency where `|L| = 1`.
+    /// Returns the crossover at a frequency where `|L| = 1`.
     pub(super) fn at(open_loop: impl Fn(f64) -> Complex64, omega_rad_s: f64) -> Self {
         // d ln L / d omega by a central difference of a smooth function.
         let h = 1e-5 * omega_rad_s;
@@ -177,20 +176,20 @@ impl Crossover {
         }
     }
 
-    /// `d ln L/d omega` there.
+    /// Returns `d ln L/d omega` at the crossover.
     pub(super) fn slope(&self) -> Complex64 {
         self.slope
     }
 
-    /// How crossover in rad/s and margin in deg move with a relative change `dL/L` there.
+    /// Returns the changes of the crossover in rad/s and of the margin in deg for a relative change `dL/L`.
     pub fn moved_by(&self, relative: Complex64) -> [f64; 2] {
         let by_crossover = -relative.re / self.slope.re;
         [by_crossover, (relative.im + self.slope.im * by_crossover).to_degrees()]
     }
 }
 
-/// Phase margin in deg at a crossover, of the phase that is followed from low frequencies on: it has no bounds,
-/// and one below zero is a loop that is not stable.
+/// Phase margin in deg at a crossover, with the phase followed from low frequencies: it is unbounded, and a negative
+/// one means an unstable loop.
 pub fn followed_margin_deg(open_loop: impl Fn(f64) -> Complex64, crossover_rad_s: f64) -> f64 {
     let at = |i: usize| RANGE_RAD_S.0 * (crossover_rad_s / RANGE_RAD_S.0).powf(i as f64 / POINTS as f64);
     let mut last = open_loop(RANGE_RAD_S.0.min(crossover_rad_s));
@@ -207,8 +206,8 @@ pub fn followed_margin_deg(open_loop: impl Fn(f64) -> Complex64, crossover_rad_s
     180.0 + phase.to_degrees()
 }
 
-/// Where a function that is positive at `low` and negative at `high` is zero, to rounding, by false
-/// position that halves an end which stays (M. Dowell and P. Jarratt, *BIT* 11 (1971) 168-174).
+/// Returns the zero of a function that is positive at `low` and negative at `high`, to rounding, by regula falsi with
+/// halving of a retained end (M. Dowell and P. Jarratt, *BIT* 11 (1971) 168-174).
 fn zero_between(of: impl Fn(f64) -> f64, mut low: (f64, f64), mut high: (f64, f64)) -> f64 {
     let (mut last, mut was_positive) = (low.0, None);
     for _ in 0..80 {
@@ -236,8 +235,8 @@ fn zero_between(of: impl Fn(f64) -> f64, mut low: (f64, f64), mut high: (f64, f6
     last
 }
 
-/// The measures of an operator whose coordinates have this covariance, and whose error has this sample time in s and
-/// this course between its samples; `None` where `|L|` does not fall through one.
+/// Returns the measures of an operator with this covariance of its coordinates, for an error with this sample time in s
+/// and this intersample behaviour; `None` if `|L|` does not fall through one.
 pub fn loop_measures(
     operator: &FamilyOperator,
     covariance: Option<&[f64]>,

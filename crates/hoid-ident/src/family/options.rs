@@ -1,5 +1,5 @@
-//! Options of the operator of a person: the fields of [`FamilyEstimator`], and the names under which texts set them. An
-//! option is declared here and nowhere else.
+//! Options of the operator of a person: the fields of [`FamilyEstimator`], and the names under which texts set them.
+//! Each option is declared only here.
 
 use hoid_model::{Detrend, Form, operator_family::Coordinate};
 
@@ -13,15 +13,15 @@ use crate::{
 
 /// Highest order of the noise model.
 pub const HIGHEST_NOISE_ORDER: usize = 24;
-/// Highest nd that is searched next to an nc: an ARMA model needs few.
+/// Highest nd that is searched together with an nc: an ARMA model needs few coefficients.
 const HIGHEST_BESIDE_NC: usize = 8;
 
-/// Quantities to be estimated of a person, and how.
+/// Estimator of the operator of a person, with its options.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FamilyEstimator {
-    /// The forms to choose from; one alone is fitted without a choice. Default all that are proper.
+    /// The candidate forms; a single one is fitted without a choice. Default: all that are proper.
     pub forms: Vec<Form>,
-    /// With the neuromuscular part. Default true.
+    /// True with the neuromuscular part. Default true.
     pub neuromuscular: bool,
     /// Prior knowledge before the data. Default [`OperatorPrior::population`].
     pub prior: OperatorPrior,
@@ -29,24 +29,24 @@ pub struct FamilyEstimator {
     pub delay_range_s: (f64, f64),
     /// Intersample behaviour of the error. Default [`Intersample::Auto`].
     pub intersample: Intersample,
-    /// Orders nc of the noise model to choose from. Default 0.
+    /// Candidate orders nc of the noise model. Default 0.
     pub nc: std::ops::RangeInclusive<usize>,
-    /// Orders nd of the noise model to choose from. Default 0 to 24.
+    /// Candidate orders nd of the noise model. Default 0 to 24.
     pub nd: std::ops::RangeInclusive<usize>,
-    /// What the person sees or feels besides the error, as channels of the records. Default none.
+    /// Further inputs that the person sees or feels, as channels of the records. Default none.
     pub channels: Vec<SeenChannel>,
     /// Channel of the recorded disturbance or target, for the fit at its lines.
     pub excitation: Option<String>,
-    /// Period of the excitation in s; found from its lines where it is `None`.
+    /// Period of the excitation in s; `None` determines it from the lines.
     pub period_s: Option<f64>,
-    /// Coordinates that each record has for itself; all others are common to the records.
+    /// Coordinates that are individual to each record; all others are common to the records.
     pub individual: Vec<Coordinate>,
-    /// Variation of the gain of a person from one run to the next, as a part of it: it is in the
-    /// error bars of fewer than five records, whose blocks cannot show it. Default 0.06: between 4
-    /// and 9 % in repeated runs of three people, each left out in turn.
+    /// Variation of a person's gain from one run to the next, relative to the gain. It is included in the error bars
+    /// for fewer than five records, whose blocks cannot show it. Default 0.06: between 4 and 9 % in repeated runs of
+    /// three people, each left out in turn.
     pub run_to_run: f64,
-    /// Trend removed from e and u of each record beforehand: an operator with a lag integrates an
-    /// offset. Default their mean.
+    /// Trend removed from e and u of each record beforehand: an operator with a lag integrates an offset. Default: the
+    /// mean.
     pub detrend: Detrend,
     /// Initial states of each record. Default: estimated.
     pub initial_state: InitialState,
@@ -80,10 +80,11 @@ impl Default for FamilyEstimator {
 }
 
 impl FamilyEstimator {
-    /// With orders nc and nd of the noise that are named; an nd that is not is searched, next to an nc from 0 to 8.
+    /// Sets the given orders nc and nd of the noise; an nd that is not given is searched, together with an nc from 0 to
+    /// 8.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for another order, and for one that is too high.
+    /// [`IdentError::BadOption`] for other orders, and for orders that are too high.
     pub fn with_noise_orders(self, named: &NamedOrders) -> Result<Self, IdentError> {
         for (name, range) in named {
             let refuse = |expected: String| IdentError::BadOption {

@@ -1,14 +1,12 @@
-//! A parameter as it is reported: with its interval, how much of it is prior, and whether the data
-//! determine it.
+//! A reported parameter: with its interval, its share of prior, and whether the data determine it.
 //!
-//! Estimates are nearly normal in the coordinates of the family, not in the parameters: where a lag
-//! is long, `1/T_I` has a symmetric error and T_I has none. Intervals are made in the coordinates
-//! and carried over; one that reaches `1/T_I = 0` is open above in T_I and in K.
+//! Estimates are nearly normal in the coordinates of the family, not in the parameters: for a long lag, `1/T_I` has a
+//! symmetric error and T_I has none. Intervals are computed in the coordinates and transformed; an interval that
+//! reaches `1/T_I = 0` is open above in T_I and in K.
 //!
-//! **Determined** means determined by the data: less than half of the variance before the data is
-//! left of it ([`Parameter::prior_share`]), it does not rest at a bound of the search range, and
-//! its interval excludes zero; for omega_nm and zeta_nm, whose prior has a scale, that it is known
-//! within a factor of two.
+//! **Determined** means determined by the data: less than half of the variance before the data remains
+//! ([`Parameter::prior_share`]), the parameter is not at a bound of the search range, and its interval excludes zero;
+//! for omega_nm and zeta_nm, whose prior has a scale, it has to be known within a factor of two.
 
 use hoid_model::{
     FamilyOperator, Form,
@@ -18,11 +16,11 @@ use hoid_model::{
 
 use super::mixture::{Component, Mixture, widened};
 
-/// Weight of the forms that have a parameter, below which it is not determined.
+/// Weight of the forms with a parameter below which it counts as undetermined.
 const LEAST_WEIGHT: f64 = 0.5;
-/// Largest part of the prior's variance in the determined parameters.
+/// Largest ratio of the variance after to that before the data for a determined parameter.
 const LARGEST_PRIOR_SHARE: f64 = 0.5;
-/// Largest standard error of a logarithm that is determined.
+/// Largest standard error of the logarithm of a determined parameter.
 const LARGEST_LOG_ERROR: f64 = 0.35;
 
 /// One parameter of an operator.
@@ -35,13 +33,13 @@ pub struct Parameter {
     pub unit: hoid_model::interned::Name,
     /// Its value; infinite for T_I of a pure integration.
     pub value: f64,
-    /// Standard error, to first order, of the operator of these runs; `None` if there is none.
+    /// Standard error, to first order, for the operator of these runs; `None` if there is none.
     pub standard_error: Option<f64>,
-    /// The value for the person, whose gain varies from one run to the next.
+    /// Standard error for the person, whose gain varies from one run to the next.
     pub standard_error_person: Option<f64>,
-    /// Interval of 95 %; an end that is open is infinite.
+    /// The 95 % interval; an open end is infinite.
     pub interval: Option<(f64, f64)>,
-    /// Variance after the data over that before; 0 without a prior.
+    /// Ratio of the variance after the data to that before; 0 without a prior.
     pub prior_share: f64,
     /// True if the data determine it.
     pub determined: bool,
@@ -50,7 +48,7 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// The same with error and interval of the person.
+    /// Returns the same with standard error and interval for the person.
     #[must_use]
     pub fn as_of_person(&self) -> Self {
         let (estimate, interval) = widened(self.estimate(), self.interval, self.standard_error_person);
@@ -69,10 +67,10 @@ impl Parameter {
         }
     }
 
-    /// The mean over forms of what has this name in each, with their weights, the best form first.
+    /// Mean over forms of the parameters with this name, by their weights, the best form first.
     pub(super) fn averaged(each: &[(Form, f64, &Self)], clusters: usize) -> Option<Self> {
         let (_, _, front) = *each.first()?;
-        // At a bound it has no error of its own, and no part in the mean of those that have.
+        // At a bound a parameter has no error, and is left out of the mean of those that have.
         let with_error: Vec<_> = each
             .iter()
             .filter(|(_, _, p)| p.standard_error.is_some())
@@ -104,7 +102,7 @@ impl Parameter {
             })
             .collect();
         let share = |of: &dyn Fn(&Self) -> f64| each.iter().map(|(_, w, p)| w / total * of(p)).sum::<f64>();
-        // For one sign, and within the factor that counts for a scale: in the mean as in a form.
+        // The same sign, and within the factor for a scale: in the mean as in a form.
         let one_sign = interval.is_some_and(|(low, high)| low * high > 0.0);
         let known = match estimate.standard_error {
             Some(s) if matches!(front.name.as_str(), "omega_nm" | "zeta_nm") => s < LARGEST_LOG_ERROR * estimate.value,
@@ -116,7 +114,7 @@ impl Parameter {
             standard_error_person: Mixture::of(&of_person, clusters)?.estimate.standard_error,
             interval,
             prior_share: share(&|p| p.prior_share),
-            // A parameter of forms that are less likely than those without it is not one of the person.
+            // A parameter of forms that are less likely than those without it is not determined.
             determined: total > LEAST_WEIGHT && share(&|p| f64::from(p.determined)) > 0.5 && one_sign && known,
             averaged_over: each.iter().map(|(form, ..)| *form).collect(),
             ..front.clone()
@@ -124,19 +122,19 @@ impl Parameter {
     }
 }
 
-/// Known properties of the coordinates of one operator.
+/// Estimated coordinates of one operator.
 pub(super) struct CoordinateEstimate<'a> {
     pub operator: &'a FamilyOperator,
     pub covariance: Option<&'a [f64]>,
-    /// For each coordinate.
+    /// Share of prior of each coordinate.
     pub prior_share: &'a [f64],
     /// Search range of each coordinate.
     pub limits: &'a [(f64, f64)],
-    /// Intervals by profile likelihood, where there are such.
+    /// Intervals by profile likelihood, if there are any.
     pub profile: &'a [Option<(f64, f64)>],
-    /// Quantile of Student's distribution for 95 %.
+    /// 97.5 % quantile of Student's distribution.
     pub quantile: f64,
-    /// Variation of the gain of the person beyond these runs, as a part of it.
+    /// Variation of the person's gain that these runs do not show, relative to the gain.
     pub run_to_run: f64,
 }
 
@@ -144,7 +142,7 @@ impl CoordinateEstimate<'_> {
     pub fn parameters(&self) -> Vec<Parameter> {
         let made = |named: &NamedParameter| {
             let made = self.parameter(named);
-            // All gains, and products with one, are proportional to it.
+            // All gains, and products with a gain, are proportional to it.
             let scales = matches!(named.coordinate, None | Some(Coordinate::Gain));
             let share = if scales {
                 self.run_to_run * made.value.abs()
@@ -164,7 +162,7 @@ impl CoordinateEstimate<'_> {
         all.iter().position(|c| *c == wanted)
     }
 
-    /// Standard error of a coordinate; none at a bound.
+    /// Standard error of a coordinate; `None` at a bound.
     fn error(&self, i: usize) -> Option<f64> {
         let x = self.operator.coordinates();
         let (low, high) = self.limits[i];
@@ -173,7 +171,7 @@ impl CoordinateEstimate<'_> {
         (inside && c[i * x.len() + i] > 0.0).then(|| c[i * x.len() + i].sqrt())
     }
 
-    /// 95 % of a coordinate, within what was searched for.
+    /// 95 % interval of a coordinate, within the search range.
     fn interval(&self, i: usize) -> Option<(f64, f64)> {
         let x = self.operator.coordinates()[i];
         if let Some(profile) = self.profile[i] {
@@ -225,7 +223,7 @@ impl CoordinateEstimate<'_> {
         let interval = self.interval(i);
         match coordinate {
             Coordinate::LagRate => {
-                // Zero up to the bound of the search range is a pure integration.
+                // Below the bound of the search range, it is a pure integration.
                 let end = |rate: f64| {
                     if rate <= self.limits[i].0 {
                         f64::INFINITY
@@ -296,11 +294,10 @@ impl CoordinateEstimate<'_> {
         made
     }
 
-    /// How far `ln|x_g| +- ln x_o` reaches below and above its estimate, from the intervals of
-    /// the two, which need not be symmetric (G. Y. Zou and A. Donner, *Statistics in Medicine* 27
-    /// (2008) 1693-1702): with a below and b above,
-    /// `sqrt(a_g^2 + a_o^2 + 2 r a_g a_o)` for the sum, `sqrt(a_g^2 + b_o^2 - 2 r a_g b_o)` for the
-    /// difference, r their correlation. Infinite where an interval reaches zero.
+    /// Distances of the ends of the interval of `ln|x_g| +- ln x_o` below and above its estimate, from the intervals of
+    /// the two, which need not be symmetric (G. Y. Zou and A. Donner, *Statistics in Medicine* 27 (2008) 1693-1702):
+    /// with a below and b above, `sqrt(a_g^2 + a_o^2 + 2 r a_g a_o)` for the sum, `sqrt(a_g^2 + b_o^2 - 2 r a_g b_o)`
+    /// for the difference, r their correlation. Infinite if an interval reaches zero.
     fn product_interval(&self, gain: usize, other: usize, sign: f64) -> Option<(f64, f64)> {
         let x = self.operator.coordinates();
         let p = x.len();

@@ -1,8 +1,8 @@
-//! Which poles of a discrete model are the lag, and which the neuromuscular system.
+//! Assignment of the poles of a discrete model to the lag and to the neuromuscular system.
 //!
-//! The poles are `s_i = ln z_i / Ts`: a pair of complex poles is the neuromuscular system, the real
-//! one that is left is the lag. For three real poles each may be the lag; all three readings are
-//! tried by who asks, and what was read is reported ([`RealPole`]).
+//! The poles are `s_i = ln z_i / Ts`: a pair of complex poles is the neuromuscular system, the remaining real one is
+//! the lag. Of three real poles each may be the lag; callers try all three assignments, and the one used is reported
+//! ([`RealPole`]).
 
 use hoid_model::{NotConvertible, SampleTime, operator_family::Coordinate, polynomial, polynomial_model::monic};
 
@@ -20,18 +20,18 @@ pub enum PoleRole {
 pub struct RealPole {
     /// Its rate, 1/s.
     pub rate: f64,
-    /// Its definition.
+    /// Its role.
     pub role: PoleRole,
 }
 
-/// Which pole is which.
+/// An assignment of the poles.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Reading {
     /// Rate of the lag, 1/s.
     pub lag: Option<f64>,
     /// omega and zeta.
     pub neuromuscular: Option<(f64, f64)>,
-    /// Rates of the neuromuscular poles where they are real.
+    /// Rates of the neuromuscular poles if they are real.
     real: Vec<f64>,
 }
 
@@ -50,7 +50,7 @@ impl Reading {
         all
     }
 
-    /// A coordinate that the poles show; zero for others.
+    /// Returns a coordinate that the poles determine; zero for others.
     pub fn coordinate(&self, wanted: Coordinate) -> f64 {
         let (omega, zeta) = self.neuromuscular.unwrap_or((1.0, 1.0));
         match wanted {
@@ -62,7 +62,7 @@ impl Reading {
     }
 }
 
-/// All ways in which the poles of F can be read.
+/// Returns all possible assignments of the poles of F.
 pub(super) fn readings(f: &[f64], sample_time: SampleTime) -> Result<Vec<Reading>, NotConvertible> {
     let other = |reason: String| NotConvertible::NotOfTheFamily { reason };
     let roots = polynomial::roots(&monic(f)).unwrap_or_default();

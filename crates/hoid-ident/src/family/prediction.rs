@@ -2,12 +2,11 @@
 //!
 //! The model is `u = Y e + (C/D) eps` with Y the operator after a hold, exactly discretised, and
 //! the criterion that of the general model ([`crate::criterion`]) in the coordinates of the family.
-//! A prior is next to the data as `kappa sigma^2 sum_i (g_i - m_i)^2/s_i^2`. Its weight is in units
-//! of the innovation variance sigma^2, and of kappa, by how much the variances of clusters (runs,
-//! or blocks of one) exceed those that white residuals would give: people vary in ways that no
-//! stationary noise holds, so that their samples show less than as many of a simulation (M.
-//! Ribatet, D. Cooley and A. C. Davison, *Statistica Sinica* 22 (2012) 813-845, the magnitude
-//! adjustment).
+//! A prior is added to the data as `kappa sigma^2 sum_i (g_i - m_i)^2/s_i^2`. Its weight is in units of the innovation
+//! variance sigma^2, and of kappa, the ratio of the variances of clusters (runs, or blocks of one) to those for white
+//! residuals: people vary in ways that no stationary noise describes, so that their samples contain less information
+//! than as many samples of a simulation (M. Ribatet, D. Cooley and A. C. Davison, *Statistica Sinica* 22 (2012)
+//! 813-845, the magnitude adjustment).
 
 use hoid_model::{
     SampleTime,
@@ -35,27 +34,27 @@ use crate::{
     optimize::Minimum,
 };
 
-/// Share of the power of u below which what an operator leaves is not noise, but the digits of a file.
+/// Share of the power of u below which the residual is not noise, but rounding in a file.
 pub(super) const NONE: f64 = 1e-8;
-/// Share below which one form does not fit better than another: where a search without noise comes to rest is chance.
+/// Share below which differences of forms do not count: the end of a search without noise is due to chance.
 pub(super) const EQUAL: f64 = 1e-18;
-/// Rounds in which sigma^2 and kappa of the prior are brought up to date.
+/// Rounds in which sigma^2 and kappa of the prior are updated.
 const ROUNDS: usize = 3;
-/// Relative change of the weight of the prior that needs no other round.
+/// Relative change of the weight of the prior below which no further round is necessary.
 const SETTLED: f64 = 0.05;
 
 /// The records and the common settings of all forms.
 #[derive(Debug, Clone)]
 pub(super) struct Prediction<'a> {
     pub data: Vec<Data<'a>>,
-    /// What is seen besides the error.
+    /// Further inputs.
     pub channels: Vec<Channel<'a>>,
     pub sample_time: SampleTime,
     /// Intersample behaviour of the error.
     pub intersample: Intersample,
-    /// Whether the data show that, or someone has reported it.
+    /// True if the data show the intersample behaviour, or the user has given it.
     pub course_is_known: bool,
-    /// Share of the power of u that an output error leaves, where it is little.
+    /// Share of the power of u that an output error fit leaves, if it is little.
     pub little_noise: Option<f64>,
     pub initial: InitialState,
     /// First residual that counts, the same for all forms.
@@ -70,7 +69,7 @@ pub(super) struct Prediction<'a> {
 pub(super) type NoiseOrders = (usize, usize);
 
 impl<'a> Prediction<'a> {
-    /// The least first residual that serves all these forms and orders.
+    /// Returns the smallest first residual that is valid for all these forms and orders.
     pub fn first_residual(
         forms: &[(Form, bool)],
         (nc, nd): NoiseOrders,
@@ -109,8 +108,8 @@ impl<'a> Prediction<'a> {
         }
     }
 
-    /// The part of u that an operator leaves unexplained in each record: `v = u - Y e`, the states
-    /// of Y estimated.
+    /// Returns the part of u that an operator does not explain in each record: `v = u - Y e`, with the states of Y
+    /// estimated.
     pub fn unexplained(
         &self,
         form: (Form, bool),
@@ -129,10 +128,10 @@ impl<'a> Prediction<'a> {
             .collect()
     }
 
-    /// The fit of a form from these coordinates, and from the noise model that is best for them.
+    /// Fits a form from these coordinates, and from the best noise model for them.
     ///
     /// # Errors
-    /// [`IdentError::NoFiniteLoss`], and those of the model.
+    /// [`IdentError::NoFiniteLoss`], and the errors of the model.
     pub fn fit(
         &self,
         form: (Form, bool),
@@ -144,7 +143,7 @@ impl<'a> Prediction<'a> {
         let products = NoiseProducts::new(&series, noise.1);
         let start_of_noise = match products.fit_up_to(noise.1) {
             Some(found) => found,
-            // Nothing is left but rounding: there is nothing to model.
+            // Only rounding is left: there is nothing to model.
             None if self.noise_free().is_some() => Autoregression {
                 d: vec![0.0; noise.1],
                 loss: self.rounding(),
@@ -155,7 +154,8 @@ impl<'a> Prediction<'a> {
         let coefficients = [vec![0.0; noise.0], start_of_noise.d].concat();
         let mut eta = criterion.layout.spread(start, &coefficients);
         let unit = self.penalties(&criterion.layout);
-        // The prior is weighted by kappa sigma^2, which is known only after a fit: a few rounds make both consistent.
+        // The prior is weighted by kappa sigma^2, which is known only after a fit: a few rounds make both
+        // consistent.
         let mut weight = start_of_noise.loss;
         let mut found = None;
         for round in 0..ROUNDS {
@@ -163,7 +163,7 @@ impl<'a> Prediction<'a> {
             let mut minimum = criterion
                 .search(eta, &self.search, None, workspace)
                 .ok_or(IdentError::NoFiniteLoss)?;
-            // Where nothing is left no step leads further down.
+            // If nothing is left, no step decreases the loss.
             if minimum.at.sum_of_squares < self.equal() {
                 minimum.termination.reason = Reason::ExactFit;
             }
@@ -179,8 +179,8 @@ impl<'a> Prediction<'a> {
         found.ok_or(IdentError::NoFiniteLoss)
     }
 
-    /// Where the search ends with another noise model, from the operator of a fit and with its
-    /// weight of the prior; `None` if there is no end.
+    /// Returns the result of the search with another noise model, from the operator of a fit and with its weight of the
+    /// prior; `None` if it fails.
     pub fn refit(
         &self,
         fit: &PredictionFit<'_>,
@@ -202,7 +202,7 @@ impl<'a> Prediction<'a> {
         found.theta.iter().all(|x| x.is_finite()).then_some(found.theta)
     }
 
-    /// The prior for each place in eta, in units of one standard deviation.
+    /// Returns the prior for each place in eta, in units of one standard deviation.
     fn penalties(&self, layout: &FamilyLayout) -> Vec<Penalty> {
         let all = layout.form.coordinates(layout.neuromuscular);
         let unit = self.prior.penalties(layout.form, layout.neuromuscular);
@@ -230,17 +230,17 @@ impl<'a> Prediction<'a> {
         self.data.iter().map(of).sum()
     }
 
-    /// Share of the power of u that is left, where it is not noise.
+    /// Returns the share of the power of u that is left, if it is not noise.
     pub fn noise_free(&self) -> Option<f64> {
         self.little_noise.filter(|share| *share < NONE)
     }
 
-    /// Sum of squares below which one form does not fit better than another; zero if there is noise.
+    /// Sum of squares below which differences of forms do not count; zero if there is noise.
     pub fn equal(&self) -> f64 {
         self.noise_free().map_or(0.0, |_| EQUAL * self.power())
     }
 
-    /// A mean square of residuals that is less than rounding by far, in place of zero, which has no logarithm.
+    /// A mean square of residuals far below rounding, instead of zero, whose logarithm does not exist.
     fn rounding(&self) -> f64 {
         f64::EPSILON.powi(2) * self.power() / self.samples().max(1) as f64
     }

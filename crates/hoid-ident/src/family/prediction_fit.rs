@@ -20,14 +20,15 @@ pub(super) struct PredictionFit<'a> {
     pub clusters: Clusters,
     /// kappa.
     pub inflation: f64,
-    /// Part of the diagonal of `G + P` that is added to it: zero, and [`OPEN`] where a combination of parameters
-    /// is open. It then has an enormous error, and what does not depend on it has its own.
+    /// Relative part of the diagonal of `G + P` that is added to it: zero, or [`OPEN`] if a combination of parameters
+    /// is undetermined. This combination then has a very large error, and quantities that do not depend on it are not
+    /// affected.
     pub ridge: f64,
-    /// w of [`super::joint`], zero if the lines are not a part of the criterion.
+    /// The weight w of [`super::joint`]; zero if the lines are not a part of the criterion.
     pub weight_of_lines: f64,
 }
 
-/// The ridge that makes `G + P` regular: errors of 3e4 times those of a parameter alone count as open.
+/// The ridge that makes `G + P` regular: errors of 3e4 times those of a single parameter count as undetermined.
 pub(super) const OPEN: f64 = 1e-9;
 
 impl PredictionFit<'_> {
@@ -39,7 +40,7 @@ impl PredictionFit<'_> {
         &self.minimum.theta
     }
 
-    /// Minimum of the objective: sum of squares with the prior.
+    /// Minimum of the objective: the sum of squares with the prior.
     pub fn objective(&self) -> f64 {
         self.minimum.at.sum_of_squares
     }
@@ -59,8 +60,7 @@ impl PredictionFit<'_> {
         self.minimum.theta.len()
     }
 
-    /// `G + P` less what is taken away, solved for a right-hand side over these elements; zero for
-    /// the others.
+    /// Solves with `G + P`, reduced by `less`, for a right-hand side over these elements; zero for the others.
     pub fn solve(&self, free: &[usize], less: Option<&[f64]>, rhs: &[f64]) -> Option<Vec<f64>> {
         let p = self.parameters();
         let gram = |i: usize, j: usize| {
@@ -80,7 +80,7 @@ impl PredictionFit<'_> {
         Some(whole)
     }
 
-    /// Elements of eta off their bounds.
+    /// Elements of eta that are not at their bounds.
     pub fn free(&self) -> Vec<usize> {
         let limits = &self.criterion.limits;
         let eta = self.eta();
@@ -89,8 +89,8 @@ impl PredictionFit<'_> {
             .collect()
     }
 
-    /// Elements of eta that were searched for, at a bound or off it: what others are uncertain by
-    /// because of one that rests at its bound, where the truth need not be.
+    /// Elements of eta that were free in the search, including those at a bound: their uncertainty contributes to that
+    /// of others, as the true value need not be at the bound.
     pub fn sought(&self) -> Vec<usize> {
         let limits = &self.criterion.limits;
         (0..limits.len()).filter(|&i| limits[i].0 < limits[i].1).collect()

@@ -1,16 +1,14 @@
-//! Prior knowledge of people before they are measured.
+//! Prior knowledge of people.
 //!
-//! Some seconds of tracking carry little information about the neuromuscular system: its resonance
-//! lies above the frequencies at which people are excited. A weak prior keeps its parameters where
-//! people's are, and does nothing if the data speak. A positive parameter x has a log-normal prior,
-//! `ln x ~ N(ln centre, spread)`, so that the spread is relative. In the criterion it is one more
-//! measurement of the parameter (a maximum a posteriori estimate; L. Ljung, *System
-//! Identification*, 1999, section 7.4).
+//! Some seconds of tracking carry little information about the neuromuscular system: its resonance is above the
+//! frequencies at which people are excited. A weak prior keeps its parameters in the range of people, and has no effect
+//! if the data determine them. A positive parameter x has a log-normal prior, `ln x ~ N(ln centre, spread)`, so that
+//! the spread is relative. In the criterion it is an additional measurement of the parameter (a maximum a posteriori
+//! estimate; L. Ljung, *System Identification*, 1999, section 7.4).
 //!
-//! How much of a result is prior is the ratio of its variance after the data to that before
-//! ([`prior share`](super::Parameter::prior_share)): one means that the data carried no
-//! information. The amount by which the prior moves the estimate follows from it
-//! ([`OperatorPrior::pull`]).
+//! The share of prior in a result is the ratio of its variance after the data to that before
+//! ([`prior share`](super::Parameter::prior_share)): one means that the data carried no information. It determines the
+//! shift of the estimate by the prior ([`OperatorPrior::pull`]).
 
 use std::{fmt, str::FromStr};
 
@@ -22,24 +20,24 @@ use hoid_model::{
 use super::Parameter;
 use crate::{IdentError, grey_box::objective::Penalty};
 
-/// Spread of a parameter that is in all but name fixed: refused, as `--fix` reports it openly. What
-/// another fit knows better is taken to be known so well.
+/// Spread below which a parameter is practically fixed; it is rejected, as `--fix` does this openly. A smaller error of
+/// another fit is replaced by this value.
 const LEAST_SPREAD: f64 = 1e-3;
 
-/// Known properties of one parameter.
+/// Prior of one parameter.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ParameterPrior {
     /// `omega_nm`, `zeta_nm`, `tau_e`, `T_L` or `T_I`.
     pub parameter: String,
-    /// The value that is as likely exceeded as not, in the unit of the parameter.
+    /// The median, in the unit of the parameter.
     pub centre: f64,
     /// Standard deviation of its natural logarithm.
     pub spread: f64,
-    /// Where that is known from.
+    /// Source of this knowledge.
     pub source: String,
 }
 
-/// Prior knowledge of the parameters of an operator before the data.
+/// Prior knowledge of the parameters of an operator.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct OperatorPrior {
     entries: Vec<ParameterPrior>,
@@ -54,7 +52,7 @@ const KNOWN: [Coordinate; 5] = [
     Coordinate::LagRate,
 ];
 
-/// The coordinate of a parameter that can have a prior.
+/// Returns the coordinate of a parameter that can have a prior.
 fn coordinate_of(parameter: &str) -> Option<Coordinate> {
     KNOWN.into_iter().find(|c| c.parameter() == parameter)
 }
@@ -64,13 +62,13 @@ const NEUROMUSCULAR: &str = "published pilots: D. T. McRuer et al., IEEE Trans. 
                              J. Guidance, Control, and Dynamics 32 (2009) 1089-1099";
 
 impl OperatorPrior {
-    /// Nothing is known.
+    /// Returns an empty prior.
     pub fn none() -> Self {
         Self::default()
     }
 
-    /// People in manual control: omega_nm 10.5 rad/s within a third, zeta_nm 0.3 within a factor of
-    /// 1.6, tau_e 0.2 s within a factor of two.
+    /// Returns the prior for people in manual control: omega_nm 10.5 rad/s within a third, zeta_nm 0.3 within a factor
+    /// of 1.6, tau_e 0.2 s within a factor of two.
     pub fn population() -> Self {
         let entry = |parameter: &str, centre, spread| ParameterPrior {
             parameter: parameter.to_owned(),
@@ -87,11 +85,11 @@ impl OperatorPrior {
         }
     }
 
-    /// These entries.
+    /// Creates a prior from these entries.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a parameter that cannot have a prior or has two, and for a
-    /// centre or spread that is not positive.
+    /// [`IdentError::BadOption`] for a parameter that cannot have a prior or has two, and for a centre or spread that
+    /// is not positive.
     pub fn new(entries: Vec<ParameterPrior>) -> Result<Self, IdentError> {
         for (i, entry) in entries.iter().enumerate() {
             let refuse = |found: String, expected: &str| {
@@ -124,12 +122,12 @@ impl OperatorPrior {
         Ok(Self { entries })
     }
 
-    /// Prior from another fit, from name, estimate, and whether it is determined: of the parameters
-    /// that can have a prior those that are determined and have an error, `standard error/value`
-    /// the spread of the logarithm to first order. It may be that none is left.
+    /// Creates a prior from another fit, given name, estimate, and whether it is determined: it contains the determined
+    /// parameters that can have a prior and have an error, with `standard error/value` as the spread of the logarithm
+    /// to first order. It may be empty.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a parameter that is named twice.
+    /// [`IdentError::BadOption`] for a parameter that occurs twice.
     pub fn of_parameters<'p>(
         found: impl IntoIterator<Item = (&'p str, Estimate, bool)>,
         source: &str,
@@ -147,7 +145,7 @@ impl OperatorPrior {
         Self::new(found.into_iter().filter_map(entry).collect())
     }
 
-    /// The entries of the neuromuscular system alone.
+    /// Keeps only the entries of the neuromuscular system.
     pub(super) fn of_muscles(mut self) -> Self {
         self.entries.retain(|entry| {
             matches!(
@@ -158,14 +156,15 @@ impl OperatorPrior {
         self
     }
 
-    /// Known properties of each parameter.
+    /// Returns the prior of each parameter.
     pub fn entries(&self) -> &[ParameterPrior] {
         &self.entries
     }
 
-    /// Amount by which the prior of a parameter moves the logarithm of its estimate. Two normal measurements of x with
-    /// the shares 1 - w and w of the information have the mean `(1 - w) x_data + w m`, so that
-    /// `x - x_data = w (m - x)/(1 - w)`; other priors stay. `None` if it has none, or nothing else.
+    /// Shift of the logarithm of an estimate by the prior of the parameter. Two normal measurements of x with the
+    /// shares 1 - w and w of the information have the mean `(1 - w) x_data + w m`, so that
+    /// `x - x_data = w (m - x)/(1 - w)`; other priors are unchanged. `None` if the parameter has no prior, or nothing
+    /// but the prior.
     pub fn pull(&self, parameter: &Parameter) -> Option<f64> {
         let name = parameter.name.split('[').next();
         let entry = self.entries.iter().find(|e| Some(e.parameter.as_str()) == name)?;
@@ -174,7 +173,7 @@ impl OperatorPrior {
         found.is_finite().then_some(found)
     }
 
-    /// The same as measurements of the coordinates of a form, in units of one standard deviation.
+    /// Returns the prior as measurements of the coordinates of a form, in units of one standard deviation.
     pub(crate) fn penalties(&self, form: Form, neuromuscular: bool) -> Vec<Penalty> {
         let coordinates = form.coordinates(neuromuscular);
         let of = |entry: &ParameterPrior| {
@@ -194,7 +193,7 @@ impl OperatorPrior {
 }
 
 impl fmt::Display for OperatorPrior {
-    /// As it is typed: `omega_nm=10.5:0.3,zeta_nm=0.3:0.5`, or `none`.
+    /// Formats it as typed: `omega_nm=10.5:0.3,zeta_nm=0.3:0.5`, or `none`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.entries.is_empty() {
             return f.write_str("none");

@@ -1,10 +1,10 @@
 //! Intervals by profile likelihood.
 //!
-//! With `S(x) = min over all else of the criterion at coordinate x`, the interval of 95 % is where
-//! `S(x) - S_min <= kappa sigma^2 t^2`, t the quantile, kappa the inflation of variances (D. M.
-//! Bates and D. G. Watts, *Nonlinear Regression Analysis and Its Applications*, 1988, section 6.1).
-//! Near the estimate it is the interval of the standard error; where the criterion is not a
-//! parabola (a lag that is nearly an integration) it is the one that holds.
+//! With `S(x) = min over all else of the criterion at coordinate x`, the 95 % interval is the set with
+//! `S(x) - S_min <= kappa sigma^2 t^2`, t the quantile, kappa the inflation of variances (D. M. Bates and D. G. Watts,
+//! *Nonlinear Regression Analysis and Its Applications*, 1988, section 6.1). Near the estimate it equals the interval
+//! of the standard error; if the criterion is not a parabola (a lag that is nearly an integration), only the profile
+//! interval is valid.
 
 use super::prediction_fit::PredictionFit;
 use crate::{SearchOptions, criterion::Workspace};
@@ -13,10 +13,10 @@ use crate::{SearchOptions, criterion::Workspace};
 const HALVINGS: usize = 7;
 /// Doublings of the step towards an end.
 const DOUBLINGS: usize = 8;
-/// The profile need not be known better than the interval.
+/// Limits of the search: the profile need not be more accurate than the interval.
 const SEARCH: (usize, f64) = (15, 1e-7);
 
-/// The interval of one element of eta, within the search range; `None` if a search fails.
+/// Returns the interval of one element of eta, within the search range; `None` if a search fails.
 pub(super) fn profile_interval(
     fit: &PredictionFit<'_>,
     place: usize,

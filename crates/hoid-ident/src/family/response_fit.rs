@@ -1,14 +1,13 @@
-//! An operator of the family through a frequency response that was measured.
+//! Fit of an operator of the family to a measured frequency response.
 //!
 //! With `H_j` the response at omega_j and `v_j = E|dH_j|^2` its variance (real and imaginary part
 //! have half of it each), the fit minimises
 //!
 //! `chi^2 = sum_j 2 |H_j - Y(j omega_j) Z(omega_j)|^2 / v_j + sum_i (g_i - m_i)^2 / s_i^2`
 //!
-//! where Z is the error between its samples and the second sum is the prior.
-//! Source: R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain Approach*,
-//! 2012, chapter 9 (the sample maximum likelihood estimator; the errors of input and output
-//! together are those of their ratio).
+//! where Z is the intersample behaviour of the error and the second sum is the prior. Source: R. Pintelon and J.
+//! Schoukens, *System Identification: A Frequency Domain Approach*, 2012, chapter 9 (the sample maximum likelihood
+//! estimator; the errors of input and output together are those of their ratio).
 
 use std::borrow::Cow;
 
@@ -30,12 +29,12 @@ use crate::{
     optimize::{Linearisation, Minimum, Objective, minimise},
 };
 
-/// Starts from which the search runs to its end.
+/// Number of starts from which the search runs to its end.
 const SEARCHES: usize = 6;
-/// The same for a response that is known exactly, which has more minima that are near to nothing.
+/// The same for a response that is known exactly, which has more minima near zero.
 const SEARCHES_OF_EXACT: usize = 30;
 
-/// A response at one frequency, and how well it is known.
+/// A response at one frequency, with its variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeasuredResponse {
     /// Frequency, rad/s.
@@ -59,7 +58,7 @@ pub(super) struct ResponseCriterion<'p> {
     pub penalty: Vec<Penalty>,
 }
 
-/// Where a search ended.
+/// Result of a search.
 #[derive(Debug, Clone)]
 pub(super) struct ResponseMinimum {
     pub coordinates: Vec<f64>,
@@ -90,7 +89,7 @@ impl<'p> ResponseCriterion<'p> {
         }
     }
 
-    /// The same with other points.
+    /// Returns the same criterion with other points.
     pub fn with_points<'q>(&self, points: &'q [MeasuredResponse]) -> ResponseCriterion<'q> {
         ResponseCriterion {
             points: Cow::Borrowed(points),
@@ -103,7 +102,7 @@ impl<'p> ResponseCriterion<'p> {
         }
     }
 
-    /// The best of the searches from the best points of a grid.
+    /// Returns the best result of searches from the best points of a grid.
     ///
     /// # Errors
     /// [`IdentError::NoFiniteLoss`].
@@ -141,13 +140,13 @@ impl<'p> ResponseCriterion<'p> {
         best.map(|minimum| self.result(minimum)).ok_or(IdentError::NoFiniteLoss)
     }
 
-    /// The search from one point.
+    /// Searches from one point.
     pub fn fit_from(&self, start: &[f64], search: &SearchOptions) -> Option<ResponseMinimum> {
         minimise(self, start.to_vec(), search, None, &mut Workspace::default()).map(|minimum| self.result(minimum))
     }
 
-    /// Covariance of the coordinates where the points have theirs, `information^-1`; zero for those
-    /// at a bound. `None` if it does not exist.
+    /// Covariance of the coordinates for the variances of the points, `information^-1`; zero for those at a bound.
+    /// `None` if it does not exist.
     pub fn covariance(&self, minimum: &ResponseMinimum) -> Option<Vec<f64>> {
         let p = minimum.coordinates.len();
         let free = self.inner(&minimum.coordinates);
@@ -166,8 +165,8 @@ impl<'p> ResponseCriterion<'p> {
         Some(covariance)
     }
 
-    /// Variance of each coordinate with the points over that of its prior: 0 without a prior, 1 at a
-    /// bound or where there is no covariance.
+    /// Ratio of the variance of each coordinate with the points to that of its prior: 0 without a prior, 1 at a bound
+    /// or without a covariance.
     pub fn prior_shares(&self, minimum: &ResponseMinimum) -> Vec<f64> {
         let x = &minimum.coordinates;
         let (p, inner, covariance) = (x.len(), self.inner(x), self.covariance(minimum));
@@ -182,19 +181,19 @@ impl<'p> ResponseCriterion<'p> {
         shares
     }
 
-    /// Coordinates off their bounds.
+    /// Coordinates that are not at their bounds.
     fn inner(&self, x: &[f64]) -> Vec<usize> {
         (0..x.len())
             .filter(|&i| self.limits[i].0 < x[i] && x[i] < self.limits[i].1)
             .collect()
     }
 
-    /// The response of an operator from sample to sample.
+    /// Returns the sampled response of an operator.
     pub fn sampled(&self, operator: &FamilyOperator, omega_rad_s: f64) -> Complex64 {
         operator.response(omega_rad_s) * self.intersample.response(omega_rad_s, self.sample_time)
     }
 
-    /// chi^2 at these coordinates, without the prior.
+    /// Returns chi^2 at these coordinates, without the prior.
     pub fn chi_squared(&self, x: &[f64]) -> Option<f64> {
         let operator = FamilyOperator::new(self.form, self.neuromuscular, x).ok()?;
         let of = |point: &MeasuredResponse| {
@@ -213,7 +212,7 @@ impl<'p> ResponseCriterion<'p> {
         }
     }
 
-    /// Sets the gain that is best for the other coordinates; the criterion there.
+    /// Sets the gain that is best for the other coordinates, and returns the criterion there.
     fn best_gain(&self, x: &mut [f64]) -> Option<f64> {
         debug_assert_eq!(self.form.coordinates(self.neuromuscular)[0], Coordinate::Gain);
         x[0] = 1.0;

@@ -28,29 +28,29 @@ use crate::{Fit, ResponsePoint, Termination};
 pub struct OperatorOfRecord {
     /// The operator.
     pub operator: FamilyOperator,
-    /// Covariance of its coordinates by rows: clustered, with the part of the prior. `None` if the
-    /// information is singular.
+    /// Covariance of its coordinates by rows: clustered, with the contribution of the prior. `None` if the information
+    /// is singular.
     pub covariance: Option<Vec<f64>>,
-    /// The same from the model alone, as if residuals were white and nothing varied.
+    /// The same from the model only, as if residuals were white and nothing varied.
     pub model_based: Option<Vec<f64>>,
-    /// Its parameters, averaged over the forms that the data leave ([`FamilyFit::weighed`]).
+    /// Its parameters, averaged over the forms that the data do not reject ([`FamilyFit::weighed`]).
     pub parameters: Vec<Parameter>,
     /// The same model as polynomials, for prediction and simulation.
     pub polynomial_fit: Fit,
 }
 
-/// A form that the data leave, with its weight and its operators.
+/// A form that the data do not reject, with its weight and its operators.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct WeighedForm {
     /// The form.
     pub form: Form,
-    /// Its weight; those of all forms make one.
+    /// Its weight; the weights of all forms have the sum one.
     pub weight: f64,
-    /// One for all records, or one for each.
+    /// One for all records, or one for each record.
     pub operators: Vec<OperatorInForm>,
 }
 
-/// The operator of a record in one of the forms, by this form alone.
+/// The operator of a record in one form, without averaging.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct OperatorInForm {
     /// The operator.
@@ -61,23 +61,23 @@ pub struct OperatorInForm {
     pub parameters: Vec<Parameter>,
 }
 
-/// Whether the form can be distinguished from a Box-Jenkins model of the same orders.
+/// Test of the form against a Box-Jenkins model of the same orders.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FreeModel {
     /// Loss of Box-Jenkins with the orders and the delay of the fit.
     pub loss: f64,
     /// `n ln(V/V_bj)/kappa`: the likelihood ratio, in units of the inflated variance.
     pub likelihood_ratio: f64,
-    /// Parameters that Box-Jenkins has more.
+    /// Number of additional parameters of Box-Jenkins.
     pub degrees_of_freedom: usize,
-    /// Probability of a ratio as large where the form is right.
+    /// Probability of a ratio at least as large if the form is right.
     pub p_value: f64,
 }
 
 /// The result of [`super::FamilyEstimator::fit`].
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct FamilyFit {
-    /// The form in front, or the one that was given.
+    /// The best form, or the given one.
     pub form: Form,
     /// True with the neuromuscular part.
     pub neuromuscular: bool,
@@ -85,38 +85,37 @@ pub struct FamilyFit {
     pub noise_orders: (usize, usize),
     /// Coefficients c and d of the noise model `v = (C/D) eps`.
     pub noise: (Vec<f64>, Vec<f64>),
-    /// The operator: one for all records, or one for each where some parameters are individual.
+    /// The operator: one for all records, or one for each if some parameters are individual.
     pub operators: Vec<OperatorOfRecord>,
     /// The prior.
     pub prior: OperatorPrior,
     /// The forms that were compared, simplest first.
     pub forms: Vec<FormFigures>,
-    /// Those that the data leave, over which estimates are averaged: the one in front first.
+    /// The forms that the data do not reject, over which estimates are averaged: the best one first.
     pub weighed: Vec<WeighedForm>,
-    /// Results of the channels in addition to the error, in the order in which they were requested.
+    /// Results of the further inputs, in the order in which they were requested.
     #[serde(default)]
     pub channels: Vec<ChannelFit>,
-    /// Variation of the gain of the person beyond these runs, as a part of it: standard deviation of their mean. Zero
-    /// where errors are those of the scatter between runs, which hold it.
+    /// Variation of the person's gain that these runs do not show, relative to the gain: the standard deviation of
+    /// their mean. Zero if the errors are those of the scatter between runs, which includes it.
     pub run_to_run: f64,
     /// The fit at the lines of the excitation, of the same form.
     pub lines: Option<LineFit>,
-    /// Why there is none.
+    /// The reason why there is no such fit.
     pub no_lines: Option<String>,
-    /// The operator of the same form by refined instrumental variables, where an excitation was
-    /// recorded.
+    /// The operator of the same form by refined instrumental variables, if an excitation was recorded.
     pub instrumental: Option<InstrumentalFit>,
-    /// Why there is none.
+    /// The reason why there is no such operator.
     pub no_instrumental: Option<String>,
-    /// The methods next to each other.
+    /// Comparison of the methods.
     pub agreement: Option<Agreement>,
     /// Box-Jenkins of the same orders.
     pub free_model: Option<FreeModel>,
-    /// Clusters of the error bars.
+    /// Type of the clusters from which the error bars are computed.
     pub cluster_kind: ClusterKind,
-    /// How many clusters.
+    /// Number of clusters.
     pub clusters: usize,
-    /// kappa: clustered over model-based variances.
+    /// kappa: ratio of clustered to model-based variances.
     pub inflation: f64,
     /// Largest ratio of a clustered to a model-based standard error.
     pub error_ratio: Option<f64>,
@@ -126,24 +125,25 @@ pub struct FamilyFit {
     pub innovation_variance: f64,
     /// Number n of residuals.
     pub residuals: usize,
-    /// Part of the power of u at the lines that the excitation explains: mean squared coherence.
+    /// Share of the power of u at the lines that the excitation explains: mean squared coherence.
     pub coherent_share: Option<f64>,
     /// How the search ended.
     pub termination: Termination,
-    /// Intersample behaviour of the error, as it was fitted.
+    /// Intersample behaviour of the error in the fit.
     #[serde(default)]
     pub intersample: Intersample,
-    /// Whether the data show that, or it was reported; else the delay may be half a sample longer
+    /// True if the data show it, or it was given; otherwise the delay may be half a sample longer
     /// ([`FamilyFit::delay_if_straight_s`]).
     #[serde(default)]
     pub course_is_known: bool,
-    /// Amount by which e was moved when its rate was lowered, for a hold that is longer than the recorded one, s.
+    /// Time in s by which e was advanced when its rate was lowered, because the new hold is longer than the recorded
+    /// one.
     #[serde(default)]
     pub lead_s: f64,
-    /// Share of the power of u that the operator leaves, where that is not noise.
+    /// Share of the power of u that the operator leaves, if it is not noise.
     #[serde(default)]
     pub noise_free: Option<f64>,
-    /// Whether there is so little noise that errors of the model would exceed it.
+    /// True if there is so little noise that errors of the model would exceed it.
     #[serde(default)]
     pub little_noise: bool,
     /// Time between two samples.
@@ -152,7 +152,7 @@ pub struct FamilyFit {
     pub verdict: Verdict,
 }
 
-/// An operator with its noise model, in a line.
+/// Returns an operator with its noise model as one line of text.
 pub(super) fn title(form: Form, neuromuscular: bool, (nc, nd): (usize, usize)) -> String {
     let muscles = if neuromuscular {
         " with neuromuscular dynamics"
@@ -163,12 +163,12 @@ pub(super) fn title(form: Form, neuromuscular: bool, (nc, nd): (usize, usize)) -
 }
 
 impl FamilyFit {
-    /// Form and noise model in a line; [`Fit::title`] of its polynomials states the same.
+    /// Returns form and noise model as one line of text, the same as [`Fit::title`] of its polynomials.
     pub fn title(&self) -> String {
         title(self.form, self.neuromuscular, self.noise_orders)
     }
 
-    /// The channels with a response, each in the form that was found.
+    /// Returns the channels with a response, each in the form that was found.
     pub fn channels_in_use(&self) -> Vec<SeenChannel> {
         let of = |channel: &ChannelFit| {
             Some(SeenChannel {
@@ -181,13 +181,13 @@ impl FamilyFit {
         self.channels.iter().filter_map(of).collect()
     }
 
-    /// The operator of a record; of records beyond them, the last.
+    /// Returns the operator of a record; beyond the last record, that of the last.
     pub fn operator(&self, record: usize) -> &OperatorOfRecord {
         &self.operators[record.min(self.operators.len() - 1)]
     }
 
-    /// Crossover frequency and phase margin of a record with a controlled element, averaged over the forms; `None` if
-    /// the loop of the best form has no crossover.
+    /// Returns crossover frequency and phase margin of a record with a controlled element, averaged over the forms;
+    /// `None` if the loop of the best form has no crossover.
     pub fn loop_measures(&self, record: usize, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let each = self.weighed.iter().map(|form| {
             let of = form.of(record)?;
@@ -199,14 +199,14 @@ impl FamilyFit {
         LoopMeasures::averaged(&each.into_iter().flatten().collect::<Vec<_>>(), self.clusters)
     }
 
-    /// The same by the best form alone.
+    /// Returns the same from the best form only.
     pub fn loop_measures_in_front(&self, record: usize, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let of = self.operator(record);
         self.measured(&of.operator, of.covariance.as_deref(), element)
     }
 
-    /// Delay tau_e in s of a record if its error runs straight from sample to sample, logged from what is faster or
-    /// continuous: half a sample longer, as it was recorded, where nothing shows or reports what it does.
+    /// Returns the delay tau_e in s of a record if its error is linear from sample to sample, logged from a faster or
+    /// continuous signal: half a sample longer. `None` if the intersample behaviour is known.
     pub fn delay_if_straight_s(&self, record: usize) -> Option<f64> {
         let of = self.operator(record);
         let averaged = of.parameters.iter().find(|p| p.name == Coordinate::Delay.parameter());
@@ -214,8 +214,8 @@ impl FamilyFit {
         (!self.course_is_known).then(|| tau + 0.5 * self.sample_time.s() - self.lead_s)
     }
 
-    /// Gain and phase of the operator of a record from e to u at frequencies in rad/s, held over a sample,
-    /// averaged over the forms: of `ln H` the mean, and its error with what the forms differ by.
+    /// Returns gain and phase of the operator of a record from e to u at frequencies in rad/s, held over a sample,
+    /// averaged over the forms: the mean of `ln H`, and its error including the differences of the forms.
     pub fn frequency_response(&self, record: usize, omega_rad_s: &[f64]) -> Vec<ResponsePoint> {
         let front = &self.operator(record).operator;
         let point = |&omega: &f64| {
@@ -255,9 +255,9 @@ impl FamilyFit {
         omega_rad_s.iter().map(point).collect()
     }
 
-    /// Finding from the loop of a record with a controlled element: a record that stays bounded was made in a stable
-    /// loop, which has a crossover and no phase margin below zero, and a person's has none above 120 deg. `None` if
-    /// nothing is against it.
+    /// Returns a finding about the loop of a record with a controlled element: a record that remains bounded was made
+    /// in a stable loop, which has a crossover and a positive phase margin, and the margin of a person is at most 120
+    /// deg. `None` if there is no evidence against the operator.
     pub fn loop_finding(&self, record: usize, element: &ContinuousTransferFunction) -> Option<Finding> {
         let reach = (self.loop_measures_in_front(record, element))
             .and_then(|found| found.phase_margin_interval)
@@ -265,7 +265,7 @@ impl FamilyFit {
         self.loop_shape(record, element).doubt(reach)
     }
 
-    /// Every crossing of the loop of a record with a controlled element, and whether it is stable, by the best form.
+    /// Returns every crossing of the loop of a record with a controlled element, and its stability, for the best form.
     pub fn loop_shape(&self, record: usize, element: &ContinuousTransferFunction) -> LoopShape {
         let of = self.operator(record);
         let known = |omega: f64| {
@@ -278,13 +278,13 @@ impl FamilyFit {
         LoopShape::of(known, element, self.sample_time)
     }
 
-    /// Crossover frequency and phase margin of the fit at the lines.
+    /// Returns crossover frequency and phase margin of the fit at the lines.
     pub fn loop_measures_at_lines(&self, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let lines = self.lines.as_ref()?;
         self.measured(&lines.operator, lines.covariance.as_deref(), element)
     }
 
-    /// Crossover frequency and phase margin by refined instrumental variables.
+    /// Returns crossover frequency and phase margin by refined instrumental variables.
     pub fn loop_measures_by_instruments(&self, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let found = self.instrumental.as_ref()?;
         self.measured(&found.operator, found.covariance.as_deref(), element)
@@ -300,7 +300,7 @@ impl FamilyFit {
         Some(measures.of_few(self.clusters).with_run_to_run(self.run_to_run))
     }
 
-    /// A coordinate of a record with its standard error.
+    /// Returns a coordinate of a record with its standard error.
     pub fn coordinate(&self, record: usize, wanted: Coordinate) -> Option<Estimate> {
         let of = self.operator(record);
         let all = self.form.coordinates(self.neuromuscular);
@@ -314,7 +314,7 @@ impl FamilyFit {
 }
 
 impl WeighedForm {
-    /// The operator of a record; of records beyond them, the last.
+    /// Returns the operator of a record; beyond the last record, that of the last.
     pub fn of(&self, record: usize) -> Option<&OperatorInForm> {
         self.operators.get(record).or(self.operators.last())
     }

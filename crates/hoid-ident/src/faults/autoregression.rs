@@ -1,25 +1,25 @@
-//! Information of a channel about its own next sample, by a fit that faults cannot carry.
+//! Prediction of a channel from its own past, by a fit that faults cannot dominate.
 //!
 //! `x(t) = -a_1 x(t-1) - ... - a_p x(t-p) + eps(t)` by least squares with bounded influence: a row
 //! counts only where neither x(t) nor any of its p past values lies beyond [`FAR`] robust deviations
 //! (the weights of Mallows on the regressors), and, in the rounds that follow, where eps lies within
 //! [`BEYOND`] of its robust scale (R. A. Maronna, R. D. Martin, V. J. Yohai, *Robust Statistics*,
 //! 2006, sections 5.11 and 8.4). A small white part is added to x, of [`FLOOR`] of its deviation: it
-//! keeps the normal equations of a smooth channel regular, and what is smaller is not a fault.
+//! keeps the normal equations of a smooth channel regular, and smaller deviations are not faults.
 
 use super::robust::quantile;
 use crate::linalg::{gram::Gram, least_squares::solve_symmetric};
 
 /// Order of the autoregression.
 pub(super) const ORDER: usize = 16;
-/// Deviations of the channel beyond which a row does not count.
+/// Deviations of the channel above which a row does not count.
 const FAR: f64 = 6.0;
-/// Deviations of the residuals beyond which a row does not count.
+/// Deviations of the residuals above which a row does not count.
 const BEYOND: f64 = 4.0;
-/// White part, of the deviation of the channel.
+/// White part, relative to the deviation of the channel.
 pub(super) const FLOOR: f64 = 1e-3;
 const ROUNDS: usize = 3;
-/// Rows that are enough for the coefficients.
+/// Number of rows that suffices for the coefficients.
 const MOST_ROWS: usize = 40_000;
 
 /// `1, a_1 .. a_p`.
@@ -29,7 +29,7 @@ pub(super) struct Autoregression {
 }
 
 impl Autoregression {
-    /// The fit to a centred channel of this deviation; `None` if it is too short or constant.
+    /// Fits a centred channel with this deviation; `None` if it is too short or constant.
     pub fn of(x: &[f64], deviation: f64) -> Option<Self> {
         let p = ORDER.min(x.len() / 20);
         if p == 0 || deviation <= 0.0 {
@@ -68,17 +68,17 @@ impl Autoregression {
         self.a.len() - 1
     }
 
-    /// `|a|`.
+    /// Returns `|a|`.
     pub fn norm(&self) -> f64 {
         self.a.iter().map(|a| a * a).sum::<f64>().sqrt()
     }
 
-    /// eps(t), t at least the order.
+    /// Returns eps(t), for t of at least the order.
     pub fn residual(&self, x: &[f64], t: usize) -> f64 {
         self.a.iter().enumerate().map(|(i, a)| a * x[t - i]).sum()
     }
 
-    /// eps over the channel, zero before the order.
+    /// Returns eps over the channel, zero before the order.
     pub fn residuals(&self, x: &[f64]) -> Vec<f64> {
         (0..x.len())
             .map(|t| if t < self.order() { 0.0 } else { self.residual(x, t) })

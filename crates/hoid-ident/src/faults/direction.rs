@@ -1,20 +1,20 @@
-//! Which of two channels answers the other, and with which sign.
+//! Test of which of two channels responds to the other, and with which sign.
 //!
 //! Both are averaged over blocks of [`BLOCK_S`], and each is regressed on its own past and on that of
 //! the other,
 //!
 //! `u(k) = sum_{i=1..P} a_i u(k-i) + sum_{j=1..L} b_j e(k-j) + c + v(k)`
 //!
-//! and e on u alike; P = [`OWN`], L = [`OTHER`] blocks. In a closed loop such a prediction is consistent
-//! whatever the loop is (L. Ljung, *System Identification*, 1999, section 13.4).
+//! and e on u likewise; P = [`OWN`], L = [`OTHER`] blocks. In a closed loop such a prediction is consistent whatever
+//! the loop is (L. Ljung, *System Identification*, 1999, section 13.4).
 //!
-//! **Exchanged.** A person answers no sooner than after their delay, a tenth of a second and more; a controlled element
-//! answers at once. The gain of a lag j is by how much the loss grows without b_1: `R = (V_without - V)/V`. Where e
-//! answers u late and u answers e at once, `R` of u beyond [`AT_ONCE`] and [`TIMES`] times that of e, input and output
-//! are exchanged. Where neither answers at once nothing is reported.
+//! **Exchanged.** A person responds only after their delay, a tenth of a second or more; a controlled element responds
+//! at once. The significance of a lag j is the growth of the loss without it: for b_1, `R = (V_without - V)/V`. If e
+//! responds to u late and u responds to e at once, with `R` of u above [`AT_ONCE`] and [`TIMES`] times that of e, input
+//! and output are exchanged. If neither responds at once, nothing is reported.
 //!
-//! **Sign.** All that a person does with an error starts in its direction: `sum_j b_j` is positive. It is the wrong
-//! sign where the sum lies [`WRONG`] standard errors below zero.
+//! **Sign.** The response of a person to an error starts in its direction: `sum_j b_j` is positive. The sign is wrong
+//! if the sum is [`WRONG`] standard errors below zero.
 
 use hoid_model::{FaultKind, Record};
 use hoid_numerics::statistics::mean;
@@ -23,19 +23,19 @@ use crate::linalg::least_squares::solve_symmetric;
 
 /// Length of a block, s.
 const BLOCK_S: f64 = 0.05;
-/// Own past and that of the other, blocks.
+/// Length of the own past and of that of the other channel, in blocks.
 const OWN: usize = 8;
 const OTHER: usize = 12;
-/// Growth of the loss without the first lag that is an answer at once.
+/// Growth of the loss without the first lag that counts as an immediate response.
 const AT_ONCE: f64 = 0.1;
-/// How much larger it is than that of the other direction.
+/// Least ratio to that of the other direction.
 const TIMES: f64 = 20.0;
-/// Standard errors by which the sum of an answer is negative.
+/// Standard errors below zero from which on the sum of a response counts as negative.
 const WRONG: f64 = 4.0;
-/// Blocks below which nothing is reported.
+/// Number of blocks below which nothing is reported.
 const FEWEST: usize = 200;
 
-/// A wrong direction, and its statistic: the ratio of the growths, or standard errors.
+/// A wrong direction, with its statistic: the ratio of the growths, or the number of standard errors.
 pub(super) fn wrong_direction(record: &Record) -> Option<(FaultKind, f64)> {
     let block = ((BLOCK_S / record.sample_time().s()).round() as usize).max(1);
     if record.input().is_empty() || record.sample_time().s() > 0.1 {
@@ -54,7 +54,7 @@ pub(super) fn wrong_direction(record: &Record) -> Option<(FaultKind, f64)> {
     (of_output.sum < -WRONG).then_some((FaultKind::Sign, -of_output.sum))
 }
 
-/// How a channel answers another.
+/// Response of a channel to another.
 struct CrossResponse {
     /// Growth of the loss without the first lag.
     at_once: f64,
@@ -63,7 +63,7 @@ struct CrossResponse {
 }
 
 impl CrossResponse {
-    /// Of y to x; `None` if the regression is singular.
+    /// Response of y to x; `None` if the regression is singular.
     fn of(y: &[f64], x: &[f64]) -> Option<Self> {
         let first = OWN.max(OTHER);
         let size = OWN + OTHER + 1;
@@ -91,7 +91,7 @@ impl CrossResponse {
             for j in i + 1..size {
                 gram[i * size + j] = gram[j * size + i];
             }
-            // Rounding of a smooth channel.
+            // Rounding, for a smooth channel.
             gram[i * size + i] *= 1.0 + 1e-9;
         }
         let without = |left_out: Option<usize>| -> Option<(f64, Vec<f64>)> {

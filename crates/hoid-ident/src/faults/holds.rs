@@ -1,4 +1,4 @@
-//! Stretches in which a channel does not move: frozen, dropped out, idle.
+//! Stretches with a constant channel: frozen, dropped out, idle.
 //!
 //! A *hold* is a run of equal values. A channel in full precision has none, but where it stays at its largest or
 //! smallest value (a rail, which is another matter): [`FROZEN`] equal samples are frozen. A channel in steps, or a hand
@@ -17,28 +17,28 @@ use super::{
     robust::{level_and_deviation, quantile, quantum},
 };
 
-/// Equal samples that are frozen, in full precision.
+/// Number of equal samples that are frozen, in full precision.
 const FROZEN: usize = 6;
-/// Times the default hold of a channel in steps.
+/// Multiple of the typical hold of a channel in steps from which on it is frozen.
 const LONGER: f64 = 20.0;
-/// Shortest hold of a channel in steps that is frozen, s.
+/// Shortest frozen hold of a channel in steps, s.
 const RESTING_S: f64 = 3.0;
 /// Shortest idle stretch, s.
 const IDLE_S: f64 = 1.5;
-/// Time in which the range of an idle channel is examined, s.
+/// Length in s of the blocks in which the range of an idle channel is examined.
 const BLOCK_S: f64 = 0.5;
-/// Range of an idle channel, of its deviation.
+/// Range of an idle channel, relative to its deviation.
 const QUIET: f64 = 0.05;
 
 /// A hold of a channel.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Hold {
     pub samples: Range<usize>,
-    /// Whether the channel jumps there and back, and by how much.
+    /// The size of the jump if the channel jumps there and back.
     pub jump: Option<f64>,
 }
 
-/// Holds of one channel that are faults, by what the other does meanwhile.
+/// Returns the holds of one channel that are faults, depending on the behaviour of the other.
 pub(super) fn frozen(values: &[f64], other: Option<&[f64]>, sample_time_s: f64) -> Vec<Hold> {
     let n = values.len();
     let (low, high) = values
@@ -91,7 +91,7 @@ fn range_of(values: &[f64]) -> f64 {
     high - low
 }
 
-/// Stretches in which all channels are idle, next to what is `out` of use.
+/// Returns stretches in which all channels are idle, apart from those that are `out` of use.
 pub(super) fn idle(channels: &[&[f64]], out: &[bool], sample_time_s: f64) -> Vec<Range<usize>> {
     let n = channels.first().map_or(0, |c| c.len());
     let block = ((BLOCK_S / sample_time_s).round() as usize).max(5);
@@ -117,7 +117,7 @@ pub(super) fn idle(channels: &[&[f64]], out: &[bool], sample_time_s: f64) -> Vec
     }
     let least = ((IDLE_S / sample_time_s).ceil() as usize).max(2 * block);
     let whole = |stretch: Range<usize>| {
-        // To the sample: as long as nothing leaves what the stretch is within.
+        // To the sample: as long as no channel leaves the range of the stretch.
         let stays = |t: usize, stretch: &Range<usize>| {
             channels.iter().zip(&scales).all(|(channel, scale)| {
                 let inside = &channel[stretch.clone()];
@@ -170,10 +170,10 @@ mod tests {
         let slow = autoregressive(1125, 2).into_iter().flat_map(|v| [zone(&v); 8]);
         let mut u: Vec<f64> = slow.collect();
         assert!(frozen(&u, Some(&e), 0.01).is_empty());
-        // Left alone for five seconds, as people do.
+        // Released for five seconds, as people do.
         u[3000..3500].fill(0.0);
         assert!(frozen(&u, Some(&e), 0.01).is_empty());
-        // Held where no hand holds it, and dead for the better part of a minute.
+        // Held at a value without a hand, and for most of a minute.
         u[1000..1400].fill(2.125);
         u[3900..8900].fill(0.0);
         let found = frozen(&u, Some(&e), 0.01);

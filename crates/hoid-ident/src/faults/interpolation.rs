@@ -1,9 +1,9 @@
-//! Samples from their neighbours on both sides.
+//! Interpolation of samples from their neighbours on both sides.
 //!
-//! With the innovations `eps = A x` of the autoregression, the m samples from s on that the others
-//! make most likely minimise `sum eps(t)^2` over all rows that hold one of them (A. J. E. M. Janssen,
-//! R. N. J. Veldhuis and L. B. Vries, *IEEE Trans. Acoustics, Speech and Signal Processing* 34 (1986)
-//! 317-330). A change delta of them changes eps by `A delta`, so that
+//! With the innovations `eps = A x` of the autoregression, the most likely values of the m samples from s on, given the
+//! others, minimise `sum eps(t)^2` over all rows that contain one of them (A. J. E. M. Janssen, R. N. J. Veldhuis and
+//! L. B. Vries, *IEEE Trans. Acoustics, Speech and Signal Processing* 34 (1986) 317-330). A change delta of them
+//! changes eps by `A delta`, so that
 //!
 //! `G delta = -g`, `G_ij = sum_t a(t-s-i) a(t-s-j)`, `g_i = sum_t a(t-s-i) eps(t)`
 //!
@@ -12,16 +12,16 @@
 
 use super::autoregression::Autoregression;
 
-/// How the samples from `start` on would change, for every number of them up to `most`.
+/// Changes of the samples from `start` on, for every number of them up to `most`.
 pub(super) struct Interpolation {
-    /// Lower triangle by rows, `most` by `most`.
+    /// Lower triangular matrix by rows, `most` by `most`.
     factor: Vec<f64>,
     y: Vec<f64>,
     size: usize,
 }
 
 impl Interpolation {
-    /// For the innovations of a channel; fewer than `most` samples at its end.
+    /// Computes the changes for the innovations of a channel; fewer than `most` samples at its end.
     pub fn new(ar: &Autoregression, eps: &[f64], start: usize, most: usize) -> Self {
         let p = ar.order();
         let n = eps.len();
@@ -49,7 +49,7 @@ impl Interpolation {
                 };
             }
             let pivot = factor[i * size + i];
-            // Samples that no row holds cannot be found.
+            // Samples that no row contains cannot be determined.
             if pivot.is_nan() || pivot < 1e-9 {
                 break;
             }
@@ -63,17 +63,17 @@ impl Interpolation {
         Self { factor, y, size }
     }
 
-    /// Largest number of samples that can be found.
+    /// Largest number of samples that can be determined.
     pub fn most(&self) -> usize {
         self.y.len()
     }
 
-    /// Amount by which the sum of squares falls with m samples.
+    /// Decrease of the sum of squares with m samples.
     pub fn fall(&self, m: usize) -> f64 {
         self.y[..m].iter().map(|y| y * y).sum()
     }
 
-    /// delta of m samples.
+    /// Returns delta of m samples.
     pub fn change(&self, m: usize) -> Vec<f64> {
         let mut delta = vec![0.0; m];
         for i in (0..m).rev() {
@@ -84,7 +84,7 @@ impl Interpolation {
     }
 }
 
-/// The innovations after a change of the samples from `start` on, at the rows that hold them.
+/// Updates the innovations for a change of the samples from `start` on, at the rows that contain them.
 pub(super) fn apply(ar: &Autoregression, eps: &mut [f64], start: usize, delta: &[f64]) {
     let p = ar.order();
     for (i, change) in delta.iter().enumerate() {

@@ -3,15 +3,15 @@
 //! A *large* change from one sample to the next is beyond [`LARGE`] times the 99 % quantile of all
 //! changes.
 //!
-//! **Wrap.** A channel that is kept within a range of the modulus M leaves it at one end and comes in at the other:
-//! large changes that are all M within that quantile, which taken out leave no large change. M is 360, 2 pi, 180, pi or
-//! 65536 (or one less, or 4096), or what four changes or more agree in. For these a pair of changes less than
-//! [`BRIDGED_S`](super::limits::BRIDGED_S) apart is a spike; of a known modulus it is a turn there and back, and
+//! **Wrap.** A channel that is kept within a range of the modulus M leaves it at one end and re-enters at the other:
+//! large changes that are all M within that quantile, and without which no large change is left. M is 360, 2 pi, 180,
+//! pi or 65536 (or one less, or 4096), or a common value of four changes or more. For the latter a pair of changes less
+//! than [`BRIDGED_S`](super::limits::BRIDGED_S) apart is a spike; for a known modulus it is a turn there and back, and
 //! unwrapping repairs either.
 //!
-//! **Step.** At one large change the median of [`BESIDE_S`] before and after differ by more than [`STEPPED`] times the
-//! deviation within each of the two, and by four fifths of the change: the person has not answered it away, as they do
-//! with a step of the target.
+//! **Step.** At one large change the medians of [`BESIDE_S`] before and after differ by more than [`STEPPED`] times the
+//! deviation within each of the two, and by four fifths of the change: the person has not compensated it, as for a step
+//! of the target.
 //!
 //! **Scale.** The deviation from the level in each second, over its median over all seconds, beyond
 //! [`UNITS`], of a stick with a [rest](super::rest) that of the samples away from it: no person grows by that much from one second to the next. Edges are those samples beyond
@@ -25,23 +25,23 @@ use super::{
 };
 
 const LARGE: f64 = 6.0;
-/// Span next to a step, s.
+/// Span on each side of a step, s.
 const BESIDE_S: f64 = 5.0;
-/// Least step, in deviations next to it.
+/// Least step, relative to the deviation on each side.
 const STEPPED: f64 = 6.0;
 /// Ratio of the deviations of seconds above which the unit has changed.
 const UNITS: f64 = 100.0;
-/// Deviations of the rest beyond which a sample belongs to such a stretch.
+/// Deviations of the rest above which a sample belongs to such a stretch.
 const OUTSIDE: f64 = 15.0;
 const MODULI: [f64; 7] = [360.0, 2.0 * PI, 180.0, PI, 65_536.0, 65_535.0, 4096.0];
-/// Number of changes that must agree in a modulus of their own.
+/// Number of changes that must agree on an unknown modulus.
 const AGREE: usize = 4;
 
 /// A channel that wraps around.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Wrap {
     pub modulus: f64,
-    /// Samples between the first and the last turn.
+    /// Samples from the first to the last turn.
     pub samples: Range<usize>,
     pub unwrapped: Vec<f64>,
 }
@@ -53,7 +53,7 @@ fn typical_change(values: &[f64]) -> f64 {
     )
 }
 
-/// The wraps of a channel.
+/// Returns the wraps of a channel.
 pub(super) fn wrap(values: &[f64], sample_time_s: f64) -> Option<Wrap> {
     let typical = typical_change(values);
     if values.len() < 100 || typical <= 0.0 {
@@ -98,7 +98,7 @@ pub(super) fn wrap(values: &[f64], sample_time_s: f64) -> Option<Wrap> {
     })
 }
 
-/// Steps of the level: the first sample after each, and by how much.
+/// Returns the steps of the level: the first sample after each, and its size.
 pub(super) fn steps(values: &[f64], sample_time_s: f64) -> Vec<(usize, f64, f64)> {
     let beside = (BESIDE_S / sample_time_s) as usize;
     let typical = typical_change(values);
@@ -122,7 +122,7 @@ pub(super) fn steps(values: &[f64], sample_time_s: f64) -> Vec<(usize, f64, f64)
     found
 }
 
-/// Stretches in which a channel is larger by orders of magnitude, and by how much.
+/// Returns stretches in which a channel is larger by orders of magnitude, with the ratio.
 pub(super) fn scales(values: &[f64], sample_time_s: f64) -> Vec<(Range<usize>, f64)> {
     let block = ((1.0 / sample_time_s) as usize).max(10);
     let n = values.len();
@@ -163,7 +163,7 @@ pub(super) fn scales(values: &[f64], sample_time_s: f64) -> Vec<(Range<usize>, f
     let rest: Vec<f64> = (0..n).filter(|t| !inside(*t)).map(|t| values[t]).collect();
     let limit = OUTSIDE * level_and_deviation(&rest).1;
     let outside = |t: usize| (values[t] - level).abs() > limit;
-    // A sample of the stretch may be small, ten in a row are not.
+    // A single sample of the stretch may be small, ten in a row are not.
     let last_outside = |mut rows: Box<dyn Iterator<Item = usize>>| {
         let (mut last, mut calm) = (None, 0);
         while calm < 10 {

@@ -4,5 +4,5 @@
 pub const BRIDGED_S: f64 = 0.1;
 /// Shortest segment between cuts that is used, s.
 pub const SHORTEST_S: f64 = 2.0;
-/// Share of a channel in spikes beyond which none is bridged.
+/// Share of spikes in a channel above which none is bridged.
 pub const MOST_SPIKES: f64 = 0.05;

@@ -1,7 +1,8 @@
 //! Faults of recorded data: found by stated statistics, and bridged or cut out before a fit.
 //!
-//! An estimator by prediction error trusts each sample: one sample of e that is off by 20 of its deviations enters the
-//! criterion through the operator with a weight that no thousand good ones have. What is searched for, in this order:
+//! An estimator by prediction error uses every sample: one sample of e that is off by 20 deviations enters the
+//! criterion through the operator with a weight that a thousand good ones do not have. Faults are searched in this
+//! order:
 //!
 //! | file | fault | statistic |
 //! |---|---|---|
@@ -9,22 +10,22 @@
 //! | `rest` | | the value at which a stick with a dead zone rests, which is not a fault |
 //! | `holds` | frozen channels, dropouts, idle stretches | lengths of runs of equal values, ranges |
 //! | `spikes` | spikes | two explanations of a large innovation: fault or push |
-//! | `interpolation` | | the samples that those around them make most likely, and what they explain |
-//! | `direction` | input and output exchanged, the wrong sign | lags at which each answers the other |
-//! | `resistant` | | a record that no single sample can carry, for a second opinion |
+//! | `interpolation` | | the most likely values of samples given their neighbours, and the gain in likelihood |
+//! | `direction` | input and output exchanged, wrong sign | lags at which each channel responds to the other |
+//! | `resistant` | | a record in which no single sample can dominate a fit, for a second opinion |
 //! | `slow` | | a record without drifts and steps of a sensor, for a second opinion |
-//! | `search`, `repairing`, `limits` | | their order, and the treatment of the record |
-//! | `autoregression`, `robust` | | fits and scales that faults cannot carry |
+//! | `search`, `repairing`, `limits` | | order of the searches, and repair of the record |
+//! | `autoregression`, `robust` | | fits and scales that faults cannot dominate |
 //!
-//! Each channel is judged by itself, since its own neighbours know a sample better than any other channel does; only
-//! what *nothing* happens in is reported by e and u together. No model of the person is needed. What people do is not a
-//! fault: their remnant comes in pulses and bursts, but through their muscles, and the statistics of the spikes
-//! distinguish pushes from faults.
+//! Each channel is judged by itself, since its own neighbours predict a sample better than any other channel does; only
+//! *idle* stretches are determined from e and u together. No model of the person is needed. Normal control activity is
+//! not a fault: the remnant of people comes in pulses and bursts, but through their muscles, and the statistics of the
+//! spikes distinguish pushes from faults.
 //!
-//! [`repair`] looks at a record and does what [`FaultHandling`](hoid_model::FaultHandling) states: by default it
-//! bridges faults of up to [`BRIDGED_S`], cuts the record at longer ones, and leaves segments of [`SHORTEST_S`] or
-//! more, each a record. Faults of more than [`MOST_SPIKES`] of the samples of a channel are reported and not bridged:
-//! then the channel is not what is assumed of it.
+//! [`repair`] inspects a record and follows [`FaultHandling`](hoid_model::FaultHandling): by default it bridges faults
+//! of up to [`BRIDGED_S`], cuts the record at longer ones, and returns segments of [`SHORTEST_S`] or more, each as a
+//! record. Faults of more than [`MOST_SPIKES`] of the samples of a channel are reported and not bridged: the
+//! assumptions about the channel are then invalid.
 
 mod autoregression;
 mod direction;

@@ -1,4 +1,4 @@
-//! Treatment of a record with faults: segments, the actions taken, and its report on a result.
+//! Repair of a record with faults: segments, actions, and the resulting findings.
 
 use std::ops::Range;
 
@@ -12,24 +12,24 @@ use super::{
 };
 use crate::frequency::COMMON_EXCITATIONS;
 
-/// Sample time in s that no person is recorded with.
+/// Sample time in s above which no person can be identified.
 pub const SLOWEST_S: f64 = 0.5;
 
-/// A record without its faults, in one or more segments, and the actions taken.
+/// A record without its faults, in one or more segments, with the actions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RepairedRecord {
-    /// The remainder, in its order; the record as it was where nothing usable would be.
+    /// The usable segments, in their order; the original record if nothing usable would be left.
     pub segments: Vec<Record>,
-    /// The findings, in the order of time.
+    /// The faults, in the order of time.
     pub faults: Vec<Fault>,
-    /// Report of that on any result.
+    /// Findings about the faults for the verdict of any result.
     pub findings: Vec<Finding>,
 }
 
-/// The faults of e and u of a record, repaired as specified, and the spikes of its excitation.
+/// Finds the faults of e and u of a record, repaired as specified, and the spikes of its excitation.
 ///
 /// # Errors
-/// None that a record can give; [`ModelError`] is that of making one.
+/// None for a valid record; [`ModelError`] is that of creating a record.
 pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord, ModelError> {
     let all_of_it = |record: &Record, kind: FaultKind, size: f64| Fault {
         kind,
@@ -49,7 +49,7 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
     if handling == FaultHandling::Keep {
         return Ok(untouched(Vec::new()));
     }
-    // Each of the other statistics counts in seconds, and would find a fault in every second one.
+    // The other statistics use times in seconds, and would find a fault in every second record.
     let ts = record.sample_time().s();
     if ts > SLOWEST_S {
         return Ok(untouched(vec![all_of_it(record, FaultKind::TimeUnit, ts)]));
@@ -111,7 +111,7 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
             .map(|s| whole.span(whole.time_s(s.start), whole.time_s(s.end)))
             .collect::<Result<_, _>>()?,
     };
-    // Of what is left: faults would reveal more than the channels do.
+    // After the repair: faults would be mistaken for a response.
     let longest = segments.iter().max_by_key(|segment: &&Record| segment.len());
     faults.extend(
         longest
@@ -125,8 +125,8 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
     })
 }
 
-/// The spikes of channels that are named as an excitation is; they are bridged, since nothing is fitted
-/// to such a channel: its lines alone are taken from it.
+/// Finds the spikes of channels with the name of an excitation; they are bridged, since nothing is fitted to such a
+/// channel: only its lines are used.
 fn excitations(others: &mut [Channel], record: &Record) -> Vec<Fault> {
     let ts = record.sample_time().s();
     let mut all = Vec::new();
@@ -159,7 +159,7 @@ fn excitations(others: &mut [Channel], record: &Record) -> Vec<Fault> {
     all
 }
 
-/// Segments between cuts.
+/// Returns the segments between cuts.
 fn segments(n: usize, places: &[(FaultSpan, FaultAction)], shortest: usize) -> Vec<Range<usize>> {
     let mut out = vec![false; n];
     let mut ends = vec![false; n + 1];

@@ -1,13 +1,13 @@
-//! A record that no single sample can carry, for a second opinion on a fit.
+//! A record in which no single sample can dominate a fit, for a second opinion.
 //!
-//! Each sample of e and of u is held to what those on both sides of it: with the interpolation error
+//! Each sample of e and of u is limited by the values on both sides: with the interpolation error
 //! `r(t) = sum_i a_i eps(t+i)/|a|^2`, whose standard deviation is `s = sigma/|a|`, a sample beyond `c s` is moved to
-//! it, `x(t) - r + c s sign(r)` (the filter cleaner of R. D. Martin and D. J. Thomson, *Proc. IEEE* 70 (1982)
-//! 1097-1115, with two sides). The sample that is farthest off comes first, and the others are examined again: an
-//! outlier is in the interpolation of its neighbours, and they would be moved in its place. For any sample, its effect
-//! on the filters after it is bounded, in e as in u, and so is its leverage on theta. c = [`HELD`]: of a normal channel
-//! one sample in 16 000 is moved. A fit to this record that is another than that to the record itself shows that few
-//! samples carry the fit; where no sample is moved the two are one.
+//! this limit, `x(t) - r + c s sign(r)` (the filter cleaner of R. D. Martin and D. J. Thomson, *Proc. IEEE* 70 (1982)
+//! 1097-1115, with two sides). The sample with the largest error comes first, and the others are examined again: an
+//! outlier enters the interpolation of its neighbours, and they would be moved in its place. The effect of any sample
+//! on the filters after it is then bounded, in e as in u, and so is its leverage on theta. c = [`HELD`]: in a normal
+//! channel one sample in 16 000 is moved. A fit to this record that differs from that to the original record shows that
+//! few samples dominate the fit; if no sample is moved, both are identical.
 
 use std::{cmp::Ordering, collections::BinaryHeap};
 
@@ -19,10 +19,10 @@ use super::{
     spikes::scales,
 };
 
-/// Deviations of the interpolation error to which a sample is held.
+/// Deviations of the interpolation error to which a sample is limited.
 const HELD: f64 = 4.0;
 
-/// The record with its samples held; `None` if none is moved.
+/// Returns the record with limited samples; `None` if none is moved.
 pub fn resistant(record: &Record) -> Option<Record> {
     let ts = record.sample_time().s();
     let mut moved = false;
@@ -53,7 +53,7 @@ fn hold(values: &mut [f64], sample_time_s: f64) -> bool {
     let mut moves = 0;
     while let Some(Excess { ratio, t }) = queue.pop() {
         let (r, most_here) = (error(&eps, t), most(t));
-        // What another sample has brought back meanwhile, or made worse and put in again.
+        // A sample that another one has moved back into its limit or further out is inserted again.
         if r.abs() <= most_here || (r.abs() / most_here - ratio).abs() > 1e-9 * ratio {
             continue;
         }
@@ -74,7 +74,7 @@ fn hold(values: &mut [f64], sample_time_s: f64) -> bool {
     moves > 0
 }
 
-/// A sample that is beyond what it is held to, by this ratio.
+/// A sample beyond its limit, with the ratio to the limit.
 struct Excess {
     ratio: f64,
     t: usize,
@@ -106,7 +106,7 @@ impl PartialEq for Excess {
 
 impl Eq for Excess {}
 
-/// The records with their samples held; `None` if none is moved.
+/// Returns the records with limited samples; `None` if none is moved.
 pub fn held(records: &[Record]) -> Option<Vec<Record>> {
     let all: Vec<Option<Record>> = records.iter().map(resistant).collect();
     all.iter().any(Option::is_some).then(|| {

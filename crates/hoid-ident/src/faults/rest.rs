@@ -1,12 +1,12 @@
 //! The value at which a stick rests.
 //!
-//! A stick with a dead zone or breakout gives one value, exactly, as long as a hand pushes little; so
-//! does a hand that works in pulses and lets go between them. Pilots leave it there in half of the
-//! samples and for seconds at a time. That is how they control, and no fault of the recording.
+//! A stick with a dead zone or breakout gives exactly one value as long as the hand force is small; so does a hand that
+//! works in pulses and releases the stick between them. Pilots leave it there in half of the samples and for seconds at
+//! a time. This is normal control, and no fault of the recording.
 //!
-//! The rest is the most frequent value, where it makes [`SHARE`] of the samples or more, is come to [`VISITS`] times or
-//! oftener, and is [`ALONE`] times as frequent as any other: levels of a channel in steps are side by side, and a
-//! channel that has stopped once has stopped once. In the ends of its range nothing rests.
+//! The rest is the most frequent value, if it makes up [`SHARE`] of the samples or more, is reached [`VISITS`] times or
+//! more, and is [`ALONE`] times as frequent as any other: levels of a channel in steps have similar frequencies, and a
+//! channel that has stopped once has stopped once. The ends of the range are excluded.
 
 use std::ops::Range;
 
@@ -16,21 +16,21 @@ const SHARE: f64 = 0.1;
 const VISITS: usize = 10;
 const ALONE: f64 = 4.0;
 
-/// Where and how a stick rests.
+/// The rest of a stick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rest {
     /// The value.
     pub value: f64,
-    /// Part of the samples at it.
+    /// Share of the samples at this value.
     pub share: f64,
-    /// How often it is come to.
+    /// Number of times that it is reached.
     pub visits: usize,
-    /// Samples that nine of ten visits do not exceed.
+    /// 90 % quantile of the lengths of the visits, samples.
     pub typical_samples: f64,
 }
 
 impl Rest {
-    /// The rest of a channel; `None` if it has none.
+    /// Returns the rest of a channel; `None` if it has none.
     pub fn of(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_unstable_by(f64::total_cmp);
@@ -59,7 +59,7 @@ impl Rest {
     }
 }
 
-/// Runs of equal values, those of one value too.
+/// Returns the runs of equal values, including those of one sample.
 pub(super) fn runs(values: &[f64]) -> Vec<Range<usize>> {
     let mut all: Vec<Range<usize>> = Vec::new();
     for (t, v) in values.iter().enumerate() {

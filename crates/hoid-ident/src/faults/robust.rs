@@ -1,4 +1,4 @@
-//! Scales that faults cannot move.
+//! Scales that faults cannot change.
 //!
 //! The deviation of a channel is the largest of its median absolute deviation from the median over
 //! 0.6745 and its 90 % quantile over 1.6449, which agree for a normal channel; the second holds where
@@ -7,17 +7,17 @@
 
 use hoid_numerics::statistics::{nearest_quantile, upper_median};
 
-/// The value nearest to the place of a quantile, zero of none; the values are put in another order.
+/// Returns the quantile, zero for no values; the values are reordered.
 pub(super) fn quantile(values: &mut [f64], share: f64) -> f64 {
     nearest_quantile(values, share).unwrap_or(0.0)
 }
 
-/// The median, zero of none.
+/// Returns the median, zero for no values.
 pub(super) fn median(values: &[f64]) -> f64 {
     upper_median(&mut values.to_vec()).unwrap_or(0.0)
 }
 
-/// Median and robust deviation.
+/// Returns median and robust deviation.
 pub(super) fn level_and_deviation(values: &[f64]) -> (f64, f64) {
     if values.is_empty() {
         return (0.0, 0.0);
@@ -34,7 +34,7 @@ pub(super) fn level_and_deviation(values: &[f64]) -> (f64, f64) {
     (level, (squares / kept.len().max(1) as f64).sqrt())
 }
 
-/// Step of a channel that often holds its value; zero for one in full precision.
+/// Returns the step of a channel that often holds its value; zero for a channel in full precision.
 pub(super) fn quantum(values: &[f64]) -> f64 {
     let changes = || values.windows(2).map(|w| (w[1] - w[0]).abs());
     let held = changes().filter(|c| *c == 0.0).count();

@@ -1,8 +1,8 @@
-//! The order in which faults are searched for, and the treatment of each.
+//! Order of the searches for faults, and the action for each fault.
 //!
-//! Wraps first, since a channel without them has no jumps; then what lasts: stretches in other units, idle and frozen
-//! ones. Between these, on the residual, spikes and steps: an autoregression of a record with an idle half is one of
-//! neither half.
+//! Wraps come first, since a channel without them has no jumps; then long faults: stretches in other units, idle and
+//! frozen ones. Between these, on the residual, spikes and steps: an autoregression of a record that is half idle
+//! describes neither half.
 
 use std::ops::Range;
 
@@ -17,19 +17,19 @@ use super::{
 /// Samples between longer faults below which no spike is searched for.
 const FEWEST: usize = 100;
 
-/// A fault by its samples.
+/// A fault with its samples.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct FaultSpan {
     pub kind: FaultKind,
-    /// e or u by its place; none for both.
+    /// Index of the channel, e or u; `None` for both.
     pub channel: Option<usize>,
     pub samples: Range<usize>,
     pub size: f64,
     pub deviations: Option<f64>,
 }
 
-/// The faults of channels of one record in the order of time, with what is to be done; the channels
-/// are unwrapped, and bridged where that is to be done and not all `cut`.
+/// Finds the faults of the channels of one record in the order of time, with the action for each; the channels are
+/// unwrapped, and bridged where this is the action and not all are `cut`.
 pub(super) fn search(values: &mut [Vec<f64>], ts: f64, cut: bool) -> Vec<(FaultSpan, FaultAction)> {
     let n = values.first().map_or(0, Vec::len);
     let long = |samples: &Range<usize>| samples.len() as f64 * ts > BRIDGED_S * (1.0 + 1e-9);
@@ -104,7 +104,7 @@ pub(super) fn search(values: &mut [Vec<f64>], ts: f64, cut: bool) -> Vec<(FaultS
     found
 }
 
-/// Stretches in other units, idle and frozen ones.
+/// Returns stretches in other units, idle and frozen ones.
 fn lasting(values: &[Vec<f64>], ts: f64) -> Vec<FaultSpan> {
     let mut all: Vec<FaultSpan> = Vec::new();
     for (channel, values) in values.iter().enumerate() {
@@ -158,7 +158,7 @@ fn lasting(values: &[Vec<f64>], ts: f64) -> Vec<FaultSpan> {
     all
 }
 
-/// Runs of samples that are in use, long enough to look at.
+/// Returns the runs of samples in use that are long enough for a search.
 fn stretches(out: &[bool]) -> Vec<Range<usize>> {
     let mut all: Vec<Range<usize>> = Vec::new();
     for t in (0..out.len()).filter(|t| !out[*t]) {

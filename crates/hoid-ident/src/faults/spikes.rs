@@ -1,33 +1,33 @@
-//! One or few samples that those before and after them rule out.
+//! Spikes: one or few samples that are inconsistent with their neighbours.
 //!
-//! Two explanations of a large innovation is compared with each other (A. J. Fox, *J. Royal Statistical Society B* 34
-//! (1972) 350-363; I. Chang, G. C. Tiao and C. Chen, *Technometrics* 30 (1988) 193-204). A *push* of the person enters
-//! the innovations: it moves the channel, which then continues as it always does. A *fault* is added to the samples
-//! alone: each innovation after it is off by a coefficient of A, and the channel continues as if nothing had been. For
-//! m samples from s on,
+//! Two explanations of a large innovation are compared (A. J. Fox, *J. Royal Statistical Society B* 34 (1972) 350-363;
+//! I. Chang, G. C. Tiao and C. Chen, *Technometrics* 30 (1988) 193-204). A *push* of the person enters the innovations:
+//! it moves the channel, which then continues with its normal dynamics. A *fault* is added to the samples only: each
+//! innovation after it is off by a coefficient of A, and the channel continues as if nothing had happened. For m
+//! samples from s on,
 //!
-//! | explanation | what it leaves of `S = sum eps^2/sigma^2` |
+//! | explanation | residual sum `S = sum eps^2/sigma^2` |
 //! |---|---|
 //! | m pushes | `S` without the m largest terms |
 //! | m faulty samples | `S` after the [interpolation](super::interpolation) of them |
 //!
-//! Both have m unknowns. The fewest samples are a fault where their interpolation
+//! Both have m unknowns. The smallest number of samples is a fault if their interpolation
 //!
-//! 1. takes more than [`LARGE`]^2 away: for normal innovations once in 1e15 samples;
-//! 2. leaves less than m pushes do, by [`BETTER`]^2 and by [`PART`] of what it takes away, or leaves less
-//!    than a part in [`DECISIVE`] of what they leave (several faulty samples of a smooth channel make
-//!    few more large innovations than there are pushes, whose squares are nearly all of S);
+//! 1. reduces the sum by more than [`LARGE`]^2: for normal innovations once in 1e15 samples;
+//! 2. leaves less than m pushes do, by [`BETTER`]^2 and by [`PART`] of the reduction, or leaves less than a part in
+//!   [`DECISIVE`] of what they leave (several faulty samples of a smooth channel give a few more large innovations than
+//!   there are pushes, whose squares are nearly all of S);
 //! 3. leaves nothing beyond [`CLEAN`] sigma (or a twentieth of S);
 //! 4. moves a sample by more than [`SMALLEST`] of the deviation of the channel, and by two of its steps.
 //!
-//! The first samples of a record are examined backwards, where they are last: a normal autoregression is the same in
+//! The first samples of a record are examined backwards, so that they are last: a normal autoregression is the same in
 //! both directions.
 //!
-//! A channel without memory, and the last sample of a record, distinguish the two: there a sample beyond [`WILD`]
-//! deviations is a fault. sigma is the median absolute innovation over 0.6745, of the record or of the second around
-//! the sample, whichever is larger: remnants come and go, and follow u. Found faults are bridged, the autoregression is
-//! fitted again, and the search repeats (C. Chen and L. M. Liu, *J. American Statistical Association* 88 (1993)
-//! 284-297).
+//! In a channel without memory, and at the last sample of a record, the two explanations do not differ: there a sample
+//! beyond [`WILD`] deviations is a fault. sigma is the median absolute innovation over 0.6745, of the record or of the
+//! second around the sample, whichever is larger: the remnant is not stationary, and depends on u. Faults that are
+//! found are bridged, the autoregression is fitted again, and the search is repeated (C. Chen and L. M. Liu, *J.
+//! American Statistical Association* 88 (1993) 284-297).
 
 use std::ops::Range;
 
@@ -37,41 +37,41 @@ use super::{
     robust::{level_and_deviation, median, quantum},
 };
 
-/// Least fall of the sum of squares, as sigma.
+/// Least reduction of the sum of squares, as a multiple of sigma.
 const LARGE: f64 = 8.0;
-/// How much better faults are than pushes, as sigma.
+/// Least advantage of faults over pushes, as a multiple of sigma.
 const BETTER: f64 = 5.0;
-/// The same as a part of the fall.
+/// The same relative to the reduction.
 const PART: f64 = 0.2;
-/// Ratio to the remainder of faults, or of noise, pushes must leave where it is a small part.
+/// Least ratio of the residual sum of pushes to that of faults, or of noise, if the advantage is a small part.
 const DECISIVE: f64 = 20.0;
-/// Largest innovation that is left, as sigma.
+/// Largest remaining innovation, as a multiple of sigma.
 const CLEAN: f64 = 5.0;
-/// Innovation that a search starts at, as sigma.
+/// Innovation at which a search starts, as a multiple of sigma.
 const SEED: f64 = 4.0;
-/// Least change of a sample, of the deviation of the channel.
+/// Least change of a sample, relative to the deviation of the channel.
 const SMALLEST: f64 = 1.5;
-/// Deviations of the channel that no one moves by in a few samples.
+/// Number of deviations of the channel by which no person moves it in a few samples.
 const WILD: f64 = 20.0;
 const ROUNDS: usize = 4;
 
-/// Samples that are not a part of the channel.
+/// Samples that do not belong to the signal.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Spike {
     pub samples: Range<usize>,
-    /// Amount by which the worst of them is off.
+    /// Largest deviation of its samples.
     pub size: f64,
-    /// Square root of the fall of the sum of squares.
+    /// Square root of the reduction of the sum of squares.
     pub deviations: f64,
 }
 
-/// The spikes of a channel, which is bridged at them.
+/// Finds the spikes of a channel, and bridges them.
 pub(super) fn find(values: &mut [f64], sample_time_s: f64) -> Vec<Spike> {
     let (level, deviation) = level_and_deviation(values);
     let mut x: Vec<f64> = values.iter().map(|v| v - level).collect();
     let step = quantum(values);
     let window = ((1.0 / sample_time_s) as usize).clamp(64, 4096);
-    // At least three: a hand that trembles is never one sample.
+    // At least three: tremor of the hand is never a single sample.
     let longest = ((super::limits::BRIDGED_S / sample_time_s).round() as usize).clamp(1, 12);
     let mut found: Vec<Spike> = Vec::new();
     for _ in 0..ROUNDS {
@@ -103,7 +103,7 @@ pub(super) fn find(values: &mut [f64], sample_time_s: f64) -> Vec<Spike> {
     joined(found)
 }
 
-/// Samples that are to be replaced, by their neighbours.
+/// Replaces samples by interpolation between their neighbours.
 pub(super) fn bridge(values: &mut [f64], samples: Range<usize>) {
     let (level, deviation) = level_and_deviation(values);
     let x: Vec<f64> = values.iter().map(|v| v - level).collect();
@@ -118,7 +118,7 @@ pub(super) fn bridge(values: &mut [f64], samples: Range<usize>) {
     }
 }
 
-/// Lags that hold 95 % of `|a|^2`.
+/// Number of lags that contain 95 % of `|a|^2`.
 fn reach(ar: &Autoregression) -> usize {
     let total = ar.norm().powi(2);
     let mut sum = 0.0;
@@ -166,7 +166,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The first samples, backwards.
+    /// Searches the first samples, backwards.
     fn beginning(&self, x: &mut [f64]) -> Vec<Spike> {
         let p = self.ar.order();
         let length = x.len().min(8 * p);
@@ -207,7 +207,7 @@ impl Search<'_> {
         found
     }
 
-    /// The fault that starts at this sample, and how its samples change.
+    /// Returns the fault that starts at this sample, with the changes of its samples.
     fn at(&self, x: &[f64], eps: &[f64], start: usize) -> Option<(Spike, Vec<f64>)> {
         let sigma = self.sigma.at(start);
         let all = Interpolation::new(self.ar, eps, start, self.longest);
@@ -268,7 +268,7 @@ impl Search<'_> {
     }
 }
 
-/// Spikes that touch, as one.
+/// Joins adjacent spikes.
 fn joined(mut all: Vec<Spike>) -> Vec<Spike> {
     all.sort_by_key(|spike| spike.samples.start);
     let mut joined: Vec<Spike> = Vec::new();

@@ -1,5 +1,4 @@
-//! From records to a describing function: coefficients at the lines of every run, their averages
-//! and errors.
+//! Describing function of records: coefficients at the lines of every run, their averages and errors.
 
 use hoid_model::{Channel, Complex64, Record, uncertainty::Estimate};
 use hoid_numerics::statistics::root_mean_square;
@@ -13,10 +12,10 @@ use super::{
 };
 use crate::{IdentError, informative_data::common_sample_time};
 
-/// Amplitude of a line, as a part of the rms of its channel, below which it is rounding.
+/// Amplitude of a line, relative to the rms of its channel, below which it is rounding.
 const LEAST_LINE: f64 = 1e-12;
 
-/// Bins at non-excited frequencies from which the remnant at a line is taken.
+/// Number of bins at non-excited frequencies from which the remnant at a line is estimated.
 const NEIGHBOURS: usize = 8;
 
 /// The describing function at one line.
@@ -24,7 +23,7 @@ const NEIGHBOURS: usize = 8;
 pub struct Line {
     /// Its frequency, rad/s.
     pub omega_rad_s: f64,
-    /// Its number among the harmonics of the period.
+    /// Its harmonic number of the period.
     pub harmonic: usize,
     /// H, the average over runs.
     pub response: Complex64,
@@ -33,22 +32,21 @@ pub struct Line {
     /// Standard deviation of the ratios of single runs, as the root of the mean square modulus;
     /// `None` for one run.
     pub spread: Option<f64>,
-    /// sigma as the remnant next to the line has it: of `N = U - H E` at the nearest non-excited
-    /// bins, where there is nothing but remnant. It does not include differences between runs, and
-    /// is defined for a single run as well.
+    /// sigma from the remnant next to the line: from `N = U - H E` at the nearest non-excited bins, which contain only
+    /// remnant. It does not include differences between runs, and is defined for a single run as well.
     pub neighbour_error: f64,
     /// Squared coherence, 0 to 1; `None` for one run, where it is always 1.
     pub coherence: Option<f64>,
     /// `U_i/E_i`.
     pub per_run: Vec<Complex64>,
-    /// The controlled element, where it is estimated.
+    /// The controlled element, if it is estimated.
     pub element: Option<Complex64>,
     pub(crate) ratio: Ratio,
     pub(super) element_ratio: Option<Ratio>,
 }
 
 impl Line {
-    /// `20 log10 |H|` in dB.
+    /// Returns `20 log10 |H|` in dB.
     pub fn magnitude_db(&self) -> Estimate {
         Estimate {
             value: 20.0 * self.response.norm().log10(),
@@ -56,7 +54,7 @@ impl Line {
         }
     }
 
-    /// `arg H` in deg, between -180 and 180.
+    /// Returns `arg H` in deg, between -180 and 180.
     pub fn phase_deg(&self) -> Estimate {
         Estimate {
             value: self.response.arg().to_degrees(),
@@ -70,14 +68,14 @@ impl Line {
             .map(|s| s / (std::f64::consts::SQRT_2 * self.response.norm()))
     }
 
-    /// H without one of the runs.
+    /// Returns H without one of the runs.
     pub fn response_without(&self, run: usize) -> Complex64 {
         self.ratio.value(Some(run))
     }
 
-    /// Centre and radius of the circle in the complex plane that holds the true H with this
-    /// probability, exact for a circular normal remnant however small e is against it; `None` for
-    /// one run, or where e does not differ from zero at this level.
+    /// Returns centre and radius of the circle in the complex plane that contains the true H with this probability,
+    /// exact for a circular normal remnant even if e is small relative to it; `None` for one run, or if e does not
+    /// differ from zero at this level.
     pub fn confidence_circle(&self, probability: f64) -> Option<(Complex64, f64)> {
         self.ratio.confidence_disc(probability)
     }
@@ -88,7 +86,7 @@ impl Line {
 pub struct RunSummary {
     /// Label of its record.
     pub label: String,
-    /// Periods in it.
+    /// Number of its periods.
     pub periods: usize,
     /// Root mean square of e.
     pub rms_e: f64,
@@ -96,11 +94,11 @@ pub struct RunSummary {
     pub rms_u: f64,
     /// Share of the variance of u at non-excited frequencies.
     pub off_line_share: f64,
-    /// Power of the remnant in u as a part of the variance of u.
+    /// Power of the remnant in u relative to the variance of u.
     pub noise_ratio: f64,
 }
 
-/// A describing function with what the records show next to it.
+/// A describing function with the remnant and the runs of the records.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DescribingFunction {
     /// The lines, by frequency.
@@ -109,7 +107,7 @@ pub struct DescribingFunction {
     pub runs: Vec<RunSummary>,
     /// Share of the variance of u at non-excited frequencies, mean over runs.
     pub off_line_share: Estimate,
-    /// Power of the remnant in u as a part of the variance of u (P_n of eq. 43), mean over runs.
+    /// Power of the remnant in u relative to the variance of u (P_n of eq. 43), mean over runs.
     pub noise_ratio: Estimate,
     /// Spectrum of the remnant in u.
     pub remnant_spectrum: Vec<RemnantBand>,
@@ -131,13 +129,12 @@ struct Run {
     rms: (f64, f64),
 }
 
-/// The describing function from e to u of one or several records at the lines of their excitation.
+/// Computes the describing function from e to u of one or several records at the lines of their excitation.
 ///
 /// # Errors
 /// [`IdentError::NoRecords`], [`IdentError::MixedSampling`], [`IdentError::NotWholePeriods`],
-/// [`IdentError::LineBeyondNyquist`], [`IdentError::NoExcitation`] for e or u that does not move,
-/// [`IdentError::NoLinePower`] for a line without power, [`IdentError::BadOption`] for a channel
-/// that does not exist.
+/// [`IdentError::LineBeyondNyquist`], [`IdentError::NoExcitation`] for a constant e or u, [`IdentError::NoLinePower`]
+/// for a line without power, [`IdentError::BadOption`] for a channel that does not exist.
 pub fn describe(
     records: &[Record],
     excitation: &Excitation,
@@ -282,7 +279,7 @@ fn runs_of(record: &Record, excitation: &Excitation, options: &DescribingOptions
 }
 
 impl Run {
-    /// Every line must have power in what is divided by.
+    /// Checks that every line has power in the denominators.
     fn check_lines(
         &self,
         record: &Record,
@@ -322,7 +319,7 @@ fn line(runs: &[Run], harmonic: usize, omega_rad_s: f64, options: &DescribingOpt
     let (mut cross, mut power_u, mut power_d) = (Complex64::new(0.0, 0.0), 0.0, 0.0);
     for run in runs {
         let (e, u) = (at(run, &run.e), at(run, &run.u));
-        // What the products are with: the ratios have the inverse of their denominator.
+        // Reference of the products: ratios have the inverse of their denominator.
         let (weight, element_weight, d) = match (&options.averaging, &run.reference) {
             (Averaging::Reference { .. }, Some(reference)) => {
                 let d = at(run, reference);

@@ -1,17 +1,15 @@
-//! From records to a describing function with its loop and its verdict, with every choice that the
-//! records decide.
+//! Description of records: a describing function with its loop and its verdict, with all choices made from the records.
 //!
-//! | choice | how it is made |
+//! | choice | rule |
 //! |---|---|
-//! | excitation | the channel named; else the first of those that usually hold one in which there are lines |
-//! | lines | those of the options; else found in that channel |
-//! | average | `sum U_i D_i* / sum E_i D_i*` with D of the channel; the mean of `U_i/E_i` if there is none |
-//! | runs | records, whatever number of periods they have, where there are three or more; else their periods |
-//! | delay | that of gain, lead and delay through the lines: it unwraps the phase, and the margin is interpolated without it |
+//! | excitation | the given channel; otherwise the first of the common names whose channel has lines |
+//! | lines | those of the options; otherwise found in that channel |
+//! | average | `sum U_i D_i* / sum E_i D_i*` with D of the channel; the mean of `U_i/E_i` without a channel |
+//! | runs | records, whatever number of periods they have, if there are three or more; otherwise their periods |
+//! | delay | that of gain, lead and delay fitted to the lines: it unwraps the phase, and the margin is interpolated without it |
 //!
-//! Records are the runs wherever they can be: the remnant of neighbouring periods is one signal, so
-//! that periods of one run are not independent, and what a person does from day to day is not in
-//! the scatter of one run.
+//! Records are used as runs if possible: the remnant of neighbouring periods is one signal, so that periods of one run
+//! are not independent, and variations of a person from day to day are not in the scatter of one run.
 
 use hoid_model::{ContinuousTransferFunction, Detrend, Record, Verdict, uncertainty::Estimate};
 
@@ -27,47 +25,47 @@ use super::{
 };
 use crate::IdentError;
 
-/// Names of channels that usually hold the excitation, in the order in which they are searched for.
+/// Names of channels that commonly contain the excitation, in the order of the search.
 pub const COMMON_EXCITATIONS: [&str; 8] = ["f_t", "d", "r", "f_d", "target", "disturbance", "reference", "forcing"];
 
-/// Runs from which on their scatter alone gives the errors.
+/// Number of runs from which on the errors are computed from their scatter.
 const RUNS_ENOUGH: usize = 3;
-/// Delays beyond that of a person are what noise makes of the phase.
+/// Longest delay: longer ones than that of a person are artefacts of noise in the phase.
 const LONGEST_DELAY_S: f64 = 0.6;
 
-/// The request. By default all is found in the records.
+/// Options of a description. By default everything is determined from the records.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DescriptionOptions {
     /// Channel of the recorded disturbance or target.
     pub excitation: Option<String>,
     /// Its lines, rad/s.
     pub lines_rad_s: Option<Vec<f64>>,
-    /// Its period, s. Lines that are given need it.
+    /// Its period, s. Necessary if the lines are given.
     pub period_s: Option<f64>,
     /// The controlled element, for the open loop.
     pub controlled_element: Option<ContinuousTransferFunction>,
     /// Start of the span, s.
     pub from_s: Option<f64>,
-    /// End of the span, s, which is not part of it.
+    /// End of the span, s, which is excluded.
     pub to_s: Option<f64>,
-    /// `e[k]` belongs to `u[k + offset_samples]`, a whole number or not.
+    /// `e[k]` belongs to `u[k + offset_samples]`, an integer or not.
     pub offset_samples: f64,
     /// Trend removed from e and u of each run beforehand.
     pub detrend: Detrend,
 }
 
-/// A describing function, and its reliability.
+/// A describing function with its margins and its verdict.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Description {
     /// Lines, runs, remnant.
     pub function: DescribingFunction,
     /// The lines and their period.
     pub excitation: Excitation,
-    /// The channel that the average refers to.
+    /// The reference channel of the average.
     pub channel: Option<String>,
     /// Definition of a run.
     pub realisation: Realisation,
-    /// Delay that is taken out where phases are unwrapped and interpolated, s.
+    /// Delay that is removed to unwrap and interpolate phases, s.
     pub delay_s: f64,
     /// Crossover and margins, with a controlled element.
     pub margins: Option<DescribingMargins>,
@@ -76,7 +74,7 @@ pub struct Description {
 }
 
 impl Description {
-    /// Phase at each line in deg, without jumps from line to line.
+    /// Returns the phase at each line in deg, without jumps from line to line.
     pub fn phases_deg(&self) -> Vec<Estimate> {
         let known: Vec<Estimate> = self.function.lines.iter().map(|line| line.phase_deg()).collect();
         let omega = self.function.lines.iter().map(|line| line.omega_rad_s);
@@ -87,18 +85,17 @@ impl Description {
     }
 }
 
-/// The describing function of one or several runs.
+/// Computes the describing function of one or several runs.
 ///
 /// # Errors
-/// [`IdentError::BadOption`] where no excitation is found, and those of [`describe()`] and
-/// [`Excitation::found_in`].
+/// [`IdentError::BadOption`] if no excitation is found, and the errors of [`describe()`] and [`Excitation::found_in`].
 pub fn describe_runs(records: &[Record], options: &DescriptionOptions) -> Result<Description, IdentError> {
     let (from_s, to_s) = (options.from_s, options.to_s);
     let cut = |r: &Record| match (from_s, to_s) {
         (None, None) => Ok(r.clone()),
         _ => r.span(from_s.unwrap_or(f64::NEG_INFINITY), to_s.unwrap_or(f64::INFINITY)),
     };
-    // The offset may need what lies beyond the span, so that `records` are what is described.
+    // The offset may need samples beyond the span, so that `records` are described.
     let parts = records.iter().map(cut).collect::<Result<Vec<Record>, _>>()?;
     let Some(first) = parts.first() else {
         return Err(IdentError::NoRecords);
@@ -154,8 +151,8 @@ pub fn describe_runs(records: &[Record], options: &DescriptionOptions) -> Result
     })
 }
 
-/// Delay of gain, lead and delay through the lines; without the lead where it would be negative,
-/// and so a part of the delay.
+/// Returns the delay of gain, lead and delay fitted to the lines; without the lead if it would be negative, and
+/// therefore a part of the delay.
 fn delay_of(function: &DescribingFunction) -> f64 {
     let fit = |lead| {
         let options = GainLeadDelayOptions {
@@ -172,7 +169,7 @@ fn delay_of(function: &DescribingFunction) -> f64 {
         .unwrap_or(0.0)
 }
 
-/// The lines, and the channel that they are in if there is one.
+/// Returns the lines, and their channel if there is one.
 fn excitation_of(record: &Record, options: &DescriptionOptions) -> Result<(Excitation, Option<String>), IdentError> {
     let search = LineSearch {
         period_s: options.period_s,
@@ -207,7 +204,7 @@ fn excitation_of(record: &Record, options: &DescriptionOptions) -> Result<(Excit
             (Ok(found), None) => return Ok((found, Some(name.to_owned()))),
             (Ok(found), Some(given)) if found == *given => return Ok((found, Some(name.to_owned()))),
             (Ok(_), Some(_)) => {}
-            // A target of zero next to a disturbance is none, and not what is wrong.
+            // A zero target in addition to a disturbance is no excitation, and no error.
             (Err(IdentError::NoExcitation { .. }), _) => {}
             (Err(error), _) => {
                 reason.get_or_insert(error);

@@ -1,22 +1,22 @@
-//! Findings that make a describing function doubtful.
+//! Findings about a describing function.
 //!
-//! Of n runs with a u that is not related to the excitation, the squared coherence `gamma^2` at a line exceeds x with
+//! For n runs with a u that is not related to the excitation, the squared coherence `gamma^2` at a line exceeds x with
 //! the probability `(1 - x)^{n-1}` (N. R. Goodman, 1957, in J. S. Bendat and A. G. Piersol, *Random Data*, 2010,
 //! section 9.2): one of twenty is above `1 - 0.05^{1/(n-1)}`. So `-(n-1) ln(1 - gamma^2)` is exponential with mean 1,
 //! and twice its sum over K lines has the chi-square distribution with 2K degrees of freedom (R. A. Fisher's
-//! combination of tests): what all lines show together, which two periods are enough for.
+//! combination of tests): a test of all lines together, for which two periods suffice.
 //!
 //! | finding | severity |
 //! |---|---|
-//! | `unrelated`: together the lines do not differ from chance | undetermined |
+//! | `unrelated`: all lines together do not differ from chance | undetermined |
 //! | `low-coherence`: single lines do not | doubt next to the crossover or at half of the lines, else a note |
-//! | `few-runs`: one run has no errors, those of two are rough | doubt |
+//! | `few-runs`: one run has no errors, those of two are inaccurate | doubt |
 //! | `periods-as-runs`: the errors are those between periods of one or two runs | note |
 //! | `no-reference`: no channel of the excitation | note |
-//! | `no-crossover`, `large-error`: crossover outside the lines; errors of the size of the value | doubt |
+//! | `no-crossover`, `large-error`: crossover outside the lines; errors as large as the value | doubt |
 //! | `several-crossovers`: the magnitude falls through 0 dB again | note |
 //! | `leakage`: the excitation has power at frequencies other than its lines | doubt above 1 %, else a note |
-//! | `offset-not-whole`: an offset that may have been meant as whole samples | note |
+//! | `offset-not-whole`: an offset that may have been meant as an integer number of samples | note |
 
 use hoid_model::{Finding, Record};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -31,13 +31,12 @@ use super::{
 };
 use crate::IdentError;
 
-/// Level at which chance is excluded.
+/// Significance level of the tests against chance.
 const LEVEL: f64 = 0.05;
-/// Share of the power of the excitation at frequencies other than its lines that is not rounding of
-/// the file.
+/// Share of the power of the excitation at frequencies other than its lines above which it is not rounding of the file.
 const LEAKAGE: f64 = 1e-4;
 const MUCH_LEAKAGE: f64 = 1e-2;
-/// Distance from a whole number of samples, from rounding to what is meant.
+/// Range of the distance from an integer number of samples in which an offset may have been meant as an integer.
 const NEARLY_WHOLE: (f64, f64) = (1e-6, 0.05);
 
 /// Inputs of the diagnostics.
@@ -51,12 +50,12 @@ pub(super) struct DiagnosticInputs<'a> {
     pub offset_samples: f64,
 }
 
-/// Squared coherence that one of twenty sets of n unrelated runs exceeds; none for one run.
+/// Squared coherence that one of twenty sets of n unrelated runs exceeds; `None` for one run.
 pub fn chance_coherence(n: usize) -> Option<f64> {
     (n > 1).then(|| 1.0 - LEVEL.powf(1.0 / (n as f64 - 1.0)))
 }
 
-/// Probability that n unrelated runs have coherences as large as these.
+/// Probability that n unrelated runs have coherences at least as large as these.
 fn probability_by_chance(coherences: &[f64], n: usize) -> Option<f64> {
     let sum: f64 = coherences
         .iter()
@@ -70,7 +69,7 @@ fn probability_by_chance(coherences: &[f64], n: usize) -> Option<f64> {
     Some(if sum.is_finite() { chi_square.sf(2.0 * sum) } else { 0.0 })
 }
 
-/// All findings about the describing function of these records.
+/// Returns all findings about the describing function of these records.
 pub(super) fn doubts(found: &DiagnosticInputs<'_>, records: &[Record]) -> Result<Vec<Finding>, IdentError> {
     let mut findings = Vec::new();
     findings.extend(of_runs(found, records.len()));
@@ -130,7 +129,7 @@ fn of_runs(found: &DiagnosticInputs<'_>, records: usize) -> Option<Finding> {
 
 fn of_coherence(found: &DiagnosticInputs<'_>) -> Option<Finding> {
     let n = found.function.runs.len();
-    // Without the excitation it is that of u with e, which the loop makes large.
+    // Without the excitation this is the coherence of u with e, which the loop makes large.
     found.channel?;
     let least = chance_coherence(n)?;
     let lines = &found.function.lines;
@@ -219,8 +218,8 @@ fn of_loop(open_loop: &OpenLoop, margins: &DescribingMargins) -> Vec<Finding> {
     findings
 }
 
-/// Power of the excitation at frequencies other than its lines: a span of no whole periods, a file
-/// that is damaged, or a channel that was measured with noise.
+/// Returns the power of the excitation at frequencies other than its lines: caused by a span of no whole number of
+/// periods, a damaged file, or noise in the measured channel.
 fn leakage(found: &DiagnosticInputs<'_>, records: &[Record]) -> Result<Option<Finding>, IdentError> {
     let Some(channel) = found.channel else {
         return Ok(None);

@@ -18,24 +18,24 @@ use super::{
 };
 use crate::IdentError;
 
-/// Deviation of a line from a harmonic that is taken as rounding, in harmonics.
+/// Deviation of a line from a harmonic that counts as rounding, in harmonics.
 const ROUNDING: f64 = 1e-4;
-/// Share of the power of a channel that its lines must hold to be its lines.
+/// Least share of the lines of a channel in its power.
 const SHARE_OF_LINES: f64 = 0.99;
 
-/// Harmonics of a period.
+/// An excitation: harmonics of a period.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Excitation {
     harmonics: Vec<usize>,
     period_s: f64,
 }
 
-/// Definition of a line of a channel.
+/// Criteria for the lines of a channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LineSearch {
-    /// Period T in s; the longest that all lines found are harmonics of where it is `None`.
+    /// Period T in s; if `None`, the longest of which all found lines are harmonics.
     pub period_s: Option<f64>,
-    /// Smallest amplitude of a line as a part of that of the largest. Default 0.01.
+    /// Smallest amplitude of a line relative to the largest. Default 0.01.
     pub least_amplitude: f64,
 }
 
@@ -49,11 +49,11 @@ impl Default for LineSearch {
 }
 
 impl Excitation {
-    /// The harmonics n_k of the period T in s.
+    /// Creates an excitation from the harmonics n_k of the period T in s.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] without harmonics, with a harmonic 0 or one that appears twice, or
-    /// for a period that is not positive.
+    /// [`IdentError::BadOption`] without harmonics, for a harmonic 0 or one that occurs twice, or for a period that is
+    /// not positive.
     pub fn of_harmonics(harmonics: &[usize], period_s: f64) -> Result<Self, IdentError> {
         if !(period_s.is_finite() && period_s > 0.0) {
             return refuse(
@@ -83,10 +83,10 @@ impl Excitation {
         })
     }
 
-    /// The lines omega_k in rad/s, each a harmonic of the period T in s within 1e-4 of a harmonic.
+    /// Creates an excitation from the lines omega_k in rad/s, each within 1e-4 of a harmonic of the period T in s.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a line that is invalid, and as [`Excitation::of_harmonics`].
+    /// [`IdentError::BadOption`] for an invalid line, and as [`Excitation::of_harmonics`].
     pub fn new(omega_rad_s: &[f64], period_s: f64) -> Result<Self, IdentError> {
         let mut harmonics = Vec::with_capacity(omega_rad_s.len());
         for &omega in omega_rad_s {
@@ -105,7 +105,7 @@ impl Excitation {
         Self::of_harmonics(&harmonics, period_s)
     }
 
-    /// The lines of a forcing function of the period T in s.
+    /// Returns the lines of a forcing function with the period T in s.
     ///
     /// # Errors
     /// As [`Excitation::new`].
@@ -119,14 +119,14 @@ impl Excitation {
         Self::new(&omega, period_s)
     }
 
-    /// The lines of a channel of a record that spans whole periods: the bins with at least the
-    /// amplitude of `search`. A span that is wrong by a sample or so leaks too little to be seen;
-    /// with the period given it is refused.
+    /// Finds the lines of a channel of a record that spans whole periods: the bins with at least the amplitude of
+    /// `search`. The leakage of a span that is wrong by about a sample is too small to be detected; with a given period
+    /// it is refused.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a channel that does not exist, or whose power is not in such
-    /// lines: noise, or a span of no whole periods; [`IdentError::NoExcitation`] for a constant
-    /// channel; [`IdentError::NotWholePeriods`].
+    /// [`IdentError::BadOption`] for a channel that does not exist, or whose power is not in such lines: noise, or a
+    /// span of no whole number of periods; [`IdentError::NoExcitation`] for a constant channel;
+    /// [`IdentError::NotWholePeriods`].
     pub fn found_in(record: &Record, channel: &str, search: &LineSearch) -> Result<Self, IdentError> {
         let values = channel_of(record, channel, "the channel to find lines in")?;
         if !(search.least_amplitude > 0.0 && search.least_amplitude <= 1.0) {
@@ -184,17 +184,17 @@ impl Excitation {
         Self::of_harmonics(&harmonics, period_s)
     }
 
-    /// The harmonics n_k, ascending.
+    /// Returns the harmonics n_k, ascending.
     pub fn harmonics(&self) -> &[usize] {
         &self.harmonics
     }
 
-    /// The period T, s.
+    /// Returns the period T, s.
     pub fn period_s(&self) -> f64 {
         self.period_s
     }
 
-    /// The lines omega_k in rad/s, ascending.
+    /// Returns the lines omega_k in rad/s, ascending.
     pub fn omega_rad_s(&self) -> Vec<f64> {
         self.harmonics.iter().map(|n| TAU * *n as f64 / self.period_s).collect()
     }
@@ -204,7 +204,7 @@ pub(crate) fn greatest_common_divisor(a: usize, b: usize) -> usize {
     if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }
 
-/// The values of a channel by its name.
+/// Returns the values of a channel by its name.
 pub(super) fn channel_of<'r>(record: &'r Record, channel: &str, what: &str) -> Result<&'r [f64], IdentError> {
     match record.channel(channel) {
         Some(values) => Ok(values),

@@ -1,14 +1,13 @@
 //! Gain, lead and delay of `M = K (T_L s + 1) e^{-s tau}` from a describing function.
 //!
-//! The criterion is `sum_k w_k |M(j omega_k)/H_k - 1|^2`: errors relative to the describing
-//! function, which would else count most where it is largest. For a given tau the model is linear
-//! in K and K T_L, so that the criterion is a function of tau alone (G. H. Golub and V. Pereyra,
-//! SIAM J. Numerical Analysis 10 (1973) 413-432); it is scanned over the range of delays, and its
-//! lowest point refined. Without lead this is the crossover model of McRuer and Jex (1967) for a
-//! single integrator. The delay holds all of the phase lag that the model has no other term for,
-//! that of the neuromuscular system too.
+//! The criterion is `sum_k w_k |M(j omega_k)/H_k - 1|^2`: errors relative to the describing function, as otherwise its
+//! largest values would dominate. For a given tau the model is linear in K and K T_L, so that the criterion is a
+//! function of tau alone (G. H. Golub and V. Pereyra, SIAM J. Numerical Analysis 10 (1973) 413-432); it is scanned over
+//! the range of delays, and its lowest point is refined. Without lead this is the crossover model of McRuer and Jex
+//! (1967) for a single integrator. The delay includes all phase lag for which the model has no other term, also that of
+//! the neuromuscular system.
 //!
-//! Standard errors are those of the jackknife over runs, with the weights kept (`ratio.rs`).
+//! Standard errors are those of the jackknife over runs, with fixed weights (`ratio.rs`).
 
 use std::f64::consts::TAU;
 
@@ -17,7 +16,7 @@ use hoid_model::{Complex64, uncertainty::Estimate};
 use super::{DescribingFunction, excitation::refuse, ratio::jackknife};
 use crate::IdentError;
 
-/// How much each line counts.
+/// Weights of the lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LineWeights {
     /// `w_k` is the squared coherence; 1 for one run.
@@ -25,14 +24,14 @@ pub enum LineWeights {
     Coherence,
     /// `w_k = |H_k|^2/sigma_k^2`, of least variance when the model is true. Needs several runs.
     Variance,
-    /// All alike.
+    /// Equal weights.
     Uniform,
 }
 
 /// Options of [`DescribingFunction::fit_gain_lead_delay`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GainLeadDelayOptions {
-    /// False holds T_L at 0. Default true.
+    /// True if T_L is estimated, false if it is 0. Default true.
     pub lead: bool,
     /// Weights of the lines. Default [`LineWeights::Coherence`].
     pub weights: LineWeights,
@@ -64,16 +63,17 @@ pub struct GainLeadDelay {
 }
 
 impl GainLeadDelay {
-    /// M at a frequency in rad/s.
+    /// Returns M at a frequency in rad/s.
     pub fn response(&self, omega_rad_s: f64) -> Complex64 {
         let lead = Complex64::new(1.0, omega_rad_s * self.lead_s.value);
         self.gain.value * lead * Complex64::from_polar(1.0, -omega_rad_s * self.delay_s.value)
     }
 }
 
-/// Steps of the scan in a turn of the highest line.
+/// Steps of the scan per turn of the phase of the highest line.
 const STEPS_PER_TURN: f64 = 40.0;
-/// Each shrinks the bracket by 0.618: from a fortieth of a turn to rounding of the criterion.
+/// Number of refinements, each of which reduces the bracket by 0.618: from a fortieth of a turn to rounding of the
+/// criterion.
 const REFINEMENTS: usize = 60;
 const MOST_STEPS: f64 = 1e5;
 
@@ -87,11 +87,11 @@ struct Solution {
 }
 
 impl DescribingFunction {
-    /// Gain, lead and delay by weighted least squares.
+    /// Fits gain, lead and delay by weighted least squares.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a range of delays that is invalid, for variance weights of one
-    /// run, or for fewer lines than parameters need.
+    /// [`IdentError::BadOption`] for an invalid range of delays, for variance weights with one run, or for fewer lines
+    /// than the parameters need.
     pub fn fit_gain_lead_delay(&self, options: &GainLeadDelayOptions) -> Result<GainLeadDelay, IdentError> {
         let (shortest, longest) = options.delay_range_s;
         let omega: Vec<f64> = self.lines.iter().map(|l| l.omega_rad_s).collect();
@@ -107,7 +107,7 @@ impl DescribingFunction {
                 ),
             );
         }
-        // Each line gives two numbers.
+        // Each line gives two equations.
         let needed = if options.lead { 2 } else { 1 };
         if omega.len() < needed {
             return refuse(
@@ -176,9 +176,8 @@ struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// The best K and K T_L at a delay: normal equations of two unknowns with the columns `c` and
-    /// `j omega c`, where `c = e^{-j omega tau}/H`. As their product is imaginary, they are
-    /// orthogonal.
+    /// Returns the best K and K T_L at a delay: normal equations of two unknowns with the columns `c` and `j omega c`,
+    /// where `c = e^{-j omega tau}/H`. As their product is imaginary, they are orthogonal.
     fn at(&self, delay_s: f64) -> Solution {
         let lines = || self.omega.iter().zip(self.response).zip(self.weights);
         let column = |w: f64, h: Complex64| Complex64::from_polar(1.0, -w * delay_s) / h;
@@ -204,7 +203,7 @@ impl Problem<'_> {
         }
     }
 
-    /// The lowest of a scan, refined by the golden section.
+    /// Returns the lowest point of a scan, refined by golden section search.
     fn lowest(&self, (shortest, longest): (f64, f64), steps: usize) -> Solution {
         let step = (longest - shortest) / steps as f64;
         let mut best = self.at(shortest);

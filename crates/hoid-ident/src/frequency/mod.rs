@@ -1,15 +1,14 @@
-//! Describing functions: how a human operator responds at the lines of a periodic excitation,
-//! without a model.
+//! Describing functions: the response of a human operator at the lines of a periodic excitation, without a model.
 //!
-//! With `E_i, U_i` the Fourier coefficients of e and u at a line in run i, `H_i = U_i/E_i` is the
-//! describing function of that run. The remnant n, `U = H E + N`, goes round the loop, so that the
-//! mean of the ratios is biased, by more the smaller E is. With D_i the coefficient of the forcing
-//! function or the disturbance, to which the remnant is not related,
+//! With `E_i, U_i` the Fourier coefficients of e and u at a line in run i, `H_i = U_i/E_i` is the describing function
+//! of that run. The remnant n, `U = H E + N`, is fed back through the loop, so that the mean of the ratios is biased,
+//! and the more the smaller E is. With D_i the coefficient of the forcing function or the disturbance, to which the
+//! remnant is not related,
 //!
 //! `H = sum_i U_i D_i* / sum_i E_i D_i*`
 //!
-//! has the bias only in the second order of the error of its denominator. [`Averaging`] offers
-//! both, and `D_i = 1` for runs that all had the same excitation.
+//! has a bias only in the second order of the error of its denominator. [`Averaging`] has both, and `D_i = 1` for runs
+//! that all had the same excitation.
 //!
 //! - **Standard error**: with `N_i = U_i - H E_i`,
 //!   `sigma^2 = n/(n-1) sum |N_i D_i*|^2 / |sum E_i D_i*|^2` is the expectation of `|dH|^2`. The
@@ -19,7 +18,7 @@
 //!   [`Line::confidence_circle`] holds where it is not.
 //! - **Coherence** between excitation and u over runs:
 //!   `|sum U_i D_i*|^2 / (sum |U_i|^2 sum |D_i|^2)`. Of n unrelated runs it is 1/n in the mean.
-//! - **Remnant**: what u has at non-excited frequencies, as the remnant shows in u after the loop, `N/(1 + L)`.
+//! - **Remnant**: the part of u at non-excited frequencies, which is the remnant after the loop, `N/(1 + L)`.
 //!
 //! Sources: D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in Electronics 8 (1967) 231-249;
 //! M. M. van Paassen and M. Mulder, *Identification of Human Operator Control Behaviour in
@@ -35,8 +34,8 @@
 //! | `describe` | [`describe()`]: lines of all runs, averages, standard errors |
 //! | `remnant` | power at non-excited frequencies: spectrum, share, noise ratio |
 //! | `open_loop` | crossover frequency and phase margin by interpolation, with their spread |
-//! | `description` | [`describe_runs()`]: all of it with every choice that the records decide, and its verdict |
-//! | `diagnostics` | what makes a describing function doubtful |
+//! | `description` | [`describe_runs()`]: everything with all choices made from the records, and the verdict |
+//! | `diagnostics` | reasons to doubt a describing function |
 //! | `unwrapping` | [`unwrapped_deg()`]: phase without jumps |
 //! | `gain_lead_delay` | gain, lead and delay by weighted least squares |
 

@@ -1,15 +1,14 @@
 //! Crossover frequency and phase margin of `L = H H_CE` between the lines.
 //!
-//! Magnitude in dB and phase are taken as straight lines over log omega between neighbouring lines.
-//! The crossover is where the magnitude passes 0 dB; the phase margin is 180 deg plus the phase
-//! there. Where there are several, the lowest at which the magnitude falls is given: the describing
-//! function of one run scatters above the crossover, where coherence is low, and may pass 0 dB
-//! there again. The phase is followed from one line to the next along the shorter way. A delay
-//! bends the phase over log omega, so that between lines half an octave apart the straight line is
-//! a degree or so too low; with the delay taken out before and put back after, it is not. The gain
-//! margin is the negative magnitude where the phase falls through -180 deg, in the same way; of
-//! several the one nearest to 0 dB. Standard
-//! errors are those of the jackknife over runs (`ratio.rs`); the spread is that of single runs.
+//! Magnitude in dB and phase are interpolated linearly over log omega between neighbouring lines. The crossover is the
+//! frequency at which the magnitude passes 0 dB; the phase margin is 180 deg plus the phase there. If there are
+//! several, the lowest one with a falling magnitude is returned: the describing function of one run scatters above the
+//! crossover, where coherence is low, and may pass 0 dB there again. The phase is followed from one line to the next
+//! along the shorter way. A delay makes the phase curved over log omega, so that between lines half an octave apart the
+//! linear interpolation is about a degree too low; if the delay is removed before and added after the interpolation, it
+//! is not. The gain margin is the negative magnitude where the phase falls through -180 deg, in the same way; of
+//! several the one nearest to 0 dB. Standard errors are those of the jackknife over runs (`ratio.rs`); the spread is
+//! that of single runs.
 
 use hoid_model::{Complex64, ContinuousTransferFunction, uncertainty::Estimate};
 
@@ -29,32 +28,31 @@ pub struct OpenLoop {
     pub response: Vec<Complex64>,
     /// L of each run: `per_run[i][k]` of run i at line k.
     pub per_run: Vec<Vec<Complex64>>,
-    /// L of all runs but one.
+    /// L of all runs except one.
     without: Vec<Vec<Complex64>>,
 }
 
-/// Where `|L|` passes 1.
+/// A crossing of `|L| = 1`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossover {
     /// Frequency omega_c, rad/s.
     pub omega_rad_s: f64,
-    /// Phase margin there, deg, between -180 and 180.
+    /// Phase margin at this frequency, deg, between -180 and 180.
     pub phase_margin_deg: f64,
 }
 
-/// Crossover and phase margin with their uncertainty; `None` if no crossover lies between the
-/// lines.
+/// Crossover and phase margin with their standard errors; `None` if there is no crossover between the lines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DescribingMargins {
     /// Crossover frequency omega_c, rad/s.
     pub crossover_rad_s: Option<Estimate>,
     /// Phase margin phi_m, deg.
     pub phase_margin_deg: Option<Estimate>,
-    /// Frequency where the phase falls through -180 deg, rad/s.
+    /// Frequency at which the phase falls through -180 deg, rad/s.
     pub phase_crossover_rad_s: Option<Estimate>,
-    /// Gain margin there, dB.
+    /// Gain margin at this frequency, dB.
     pub gain_margin_db: Option<Estimate>,
-    /// The entries of each run.
+    /// The crossover of each run.
     pub per_run: Vec<Option<Crossover>>,
     /// Standard deviation of the crossover over the runs that have one, rad/s.
     pub crossover_spread_rad_s: Option<f64>,
@@ -63,23 +61,22 @@ pub struct DescribingMargins {
 }
 
 impl DescribingFunction {
-    /// The open loop with a controlled element that is known.
+    /// Returns the open loop with a known controlled element.
     pub fn open_loop(&self, element: &ContinuousTransferFunction) -> OpenLoop {
         self.open_loop_with(|omega| element.response(omega))
     }
 
-    /// The open loop with any frequency response over rad/s, such as that of the controlled element
-    /// after its hold.
+    /// Returns the open loop with any frequency response over rad/s, such as that of the controlled element after its
+    /// hold.
     pub fn open_loop_with(&self, element: impl Fn(f64) -> Complex64) -> OpenLoop {
         let known: Vec<Complex64> = self.lines.iter().map(|l| element(l.omega_rad_s)).collect();
         self.loop_of(|k, _| known[k], |k, _| known[k])
     }
 
-    /// The open loop with the controlled element that is estimated from the records.
+    /// Returns the open loop with the controlled element that is estimated from the records.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] when [`super::DescribingOptions::element`] did not name its
-    /// channels.
+    /// [`IdentError::BadOption`] if [`super::DescribingOptions::element`] did not name its channels.
     pub fn measured_open_loop(&self) -> Result<OpenLoop, IdentError> {
         let ratios: Vec<_> = self.lines.iter().filter_map(|l| l.element_ratio.as_ref()).collect();
         if ratios.len() < self.lines.len() {
@@ -121,13 +118,13 @@ impl DescribingFunction {
 }
 
 impl OpenLoop {
-    /// Crossover frequency and phase margin.
+    /// Returns crossover frequency and phase margin.
     pub fn margins(&self) -> DescribingMargins {
         self.margins_with_delay(0.0)
     }
 
-    /// The same with the phase interpolated apart from that of a delay in s, such as the one of
-    /// [`DescribingFunction::fit_gain_lead_delay`].
+    /// Returns the same with the phase of a delay in s, such as that of [`DescribingFunction::fit_gain_lead_delay`],
+    /// removed during the interpolation.
     pub fn margins_with_delay(&self, delay_s: f64) -> DescribingMargins {
         let of = |response: &Vec<Complex64>| Crossover::of(&self.omega_rad_s, response, delay_s);
         let without: Vec<Option<Crossover>> = self.without.iter().map(of).collect();
@@ -159,9 +156,9 @@ impl OpenLoop {
 }
 
 impl Crossover {
-    /// The lowest crossover where the magnitude of an open loop falls, between ascending
-    /// frequencies in rad/s at which its response is known; none if it does not. The phase of the
-    /// delay in s is interpolated apart.
+    /// Returns the lowest crossover with a falling magnitude of an open loop, between ascending frequencies in rad/s at
+    /// which its response is known; `None` if there is none. The phase of the delay in s is removed during the
+    /// interpolation.
     pub fn of(omega_rad_s: &[f64], response: &[Complex64], delay_s: f64) -> Option<Self> {
         let mut pairs = omega_rad_s.windows(2).zip(response.windows(2));
         pairs.find_map(|(w, l)| {
@@ -183,7 +180,7 @@ impl Crossover {
     }
 }
 
-/// Where the phase of L passes -180 deg.
+/// A crossing of -180 deg by the phase of L.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct PhaseCrossover {
     omega_rad_s: f64,
@@ -191,7 +188,7 @@ struct PhaseCrossover {
 }
 
 impl PhaseCrossover {
-    /// The fall through -180 deg at which the magnitude is nearest to 1.
+    /// Returns the fall through -180 deg at which the magnitude is nearest to 1.
     fn of(omega_rad_s: &[f64], response: &[Complex64], delay_s: f64) -> Option<Self> {
         let of_pair = |(w, l): (&[f64], &[Complex64])| {
             let by_delay = |omega: f64| Complex64::from_polar(1.0, -delay_s * omega);

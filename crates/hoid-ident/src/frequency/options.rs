@@ -1,9 +1,8 @@
-//! Components of a describing function: averaging, spans, offsets, and the channels of the
-//! controlled element.
+//! Options of a describing function: averaging, spans, offsets, and the channels of the controlled element.
 
 use hoid_model::Detrend;
 
-/// How runs are averaged.
+/// Method of averaging over runs.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Averaging {
     /// The mean of the ratios `U_i/E_i`. Coherence is that between e and u.
@@ -15,19 +14,18 @@ pub enum Averaging {
         /// Name of the channel.
         channel: String,
     },
-    /// The same with D_i = 1: every run (and period) starts at the same phase of the same
-    /// excitation.
+    /// The same with D_i = 1: every run (and period) starts at the same phase of the same excitation.
     SameExcitation,
 }
 
-/// Averaging.
+/// Definition of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Realisation {
     /// Each record is one realisation, however many periods it has.
     #[default]
     Record,
-    /// Each period of each record is one, which gives one record a spread. The remnant of
-    /// neighbouring periods is taken as independent.
+    /// Each period of each record is one, so that one record has a spread. The remnants of neighbouring periods are
+    /// assumed independent.
     Period,
 }
 
@@ -36,31 +34,30 @@ pub enum Realisation {
 pub struct MeasuredElement {
     /// Name of the channel of its output y.
     pub output: String,
-    /// Name of the channel of a disturbance that is added to u, row by row and with the offset of
-    /// u, if there is one: without it, `Y/U` would be minus the inverse of H.
+    /// Name of the channel of a disturbance that is added to u, row by row and with the offset of u, if there is one:
+    /// without the disturbance, `Y/U` would be minus the inverse of H.
     pub disturbance: Option<String>,
 }
 
 /// Options of [`super::describe()`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct DescribingOptions {
-    /// How runs are averaged. Default [`Averaging::Ratios`].
+    /// Method of averaging over runs. Default [`Averaging::Ratios`].
     pub averaging: Averaging,
     /// Definition of a run. Default [`Realisation::Record`].
     pub realisation: Realisation,
-    /// Start of the span, s; that of the record where it is `None`.
+    /// Start of the span, s; `None` for the start of the record.
     pub from_s: Option<f64>,
-    /// End of the span, s, which is not part of it.
+    /// End of the span, s, which is excluded.
     pub to_s: Option<f64>,
-    /// `e[k]` belongs to `u[k + offset_samples]`, a whole number or not. Default 0.
+    /// `e[k]` belongs to `u[k + offset_samples]`, an integer or not. Default 0.
     pub offset_samples: f64,
-    /// Trend removed from e and u of each run beforehand. The lines do not see a mean, the rms
-    /// does; a straight line has power at all lines. Default nothing.
+    /// Trend removed from e and u of each run beforehand. A mean has no effect on the lines, but on the rms; a straight
+    /// line has power at all lines. Default none.
     pub detrend: Detrend,
-    /// Bins of the shortest run that are averaged into one value of the remnant spectrum. Default
-    /// 8.
+    /// Number of bins of the shortest run that are averaged into one value of the remnant spectrum. Default 8.
     pub smoothing_bins: usize,
-    /// Channels to estimate the controlled element from, if any.
+    /// Channels from which the controlled element is estimated, if any.
     pub element: Option<MeasuredElement>,
 }
 

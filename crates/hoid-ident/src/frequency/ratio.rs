@@ -13,7 +13,7 @@
 use hoid_model::{Complex64, uncertainty::Estimate};
 use hoid_numerics::statistics::{self, sample_variance, squared_deviations};
 
-/// Terms of numerator and denominator, one of each a run.
+/// Terms of numerator and denominator, one pair for each run.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Ratio(pub Vec<(Complex64, Complex64)>);
 
@@ -24,18 +24,18 @@ impl Ratio {
         kept.fold((zero, zero), |(a, b), (_, term)| (a + term.0, b + term.1))
     }
 
-    /// H, without one of the runs on request.
+    /// Returns H, optionally without one of the runs.
     pub fn value(&self, without: Option<usize>) -> Complex64 {
         let (a, b) = self.sums(without);
         a / b
     }
 
-    /// `a_i/b_i`.
+    /// Returns `a_i/b_i`.
     pub fn per_run(&self) -> Vec<Complex64> {
         self.0.iter().map(|(a, b)| a / b).collect()
     }
 
-    /// sigma; `None` for one run.
+    /// Returns sigma; `None` for one run.
     pub fn standard_error(&self) -> Option<f64> {
         let n = self.0.len() as f64;
         let (a, b) = self.sums(None);
@@ -44,8 +44,8 @@ impl Ratio {
         (n > 1.0).then(|| (n / (n - 1.0) * squares).sqrt() / b.norm())
     }
 
-    /// Centre and radius of the disc that holds the true ratio with this probability; `None` for
-    /// one run, or where there is no bound.
+    /// Returns centre and radius of the disc that contains the true ratio with this probability; `None` for one run, or
+    /// if it is unbounded.
     pub fn confidence_disc(&self, probability: f64) -> Option<(Complex64, f64)> {
         let n = self.0.len() as f64;
         let (a, b) = self.sums(None);
@@ -68,8 +68,8 @@ impl Ratio {
     }
 }
 
-/// A value with the standard error of the jackknife; none if one of the values without a run does
-/// not exist, or there is only one run.
+/// Returns a value with the standard error of the jackknife; without it if one of the values without a run does not
+/// exist, or there is only one run.
 pub(super) fn jackknife(value: f64, without: &[Option<f64>]) -> Estimate {
     let known: Vec<f64> = without.iter().copied().flatten().collect();
     let n = without.len();
@@ -79,7 +79,7 @@ pub(super) fn jackknife(value: f64, without: &[Option<f64>]) -> Estimate {
     Estimate::with_variance(value, squared_deviations(&known) * (n as f64 - 1.0) / n as f64)
 }
 
-/// Mean with its standard error from the spread; none for one value.
+/// Returns the mean with its standard error from the spread; without it for one value.
 pub(super) fn mean(values: &[f64]) -> Estimate {
     let value = statistics::mean(values);
     match deviation(values) {
@@ -88,7 +88,7 @@ pub(super) fn mean(values: &[f64]) -> Estimate {
     }
 }
 
-/// Standard deviation with n - 1; `None` for fewer than two values.
+/// Returns the standard deviation with n - 1; `None` for fewer than two values.
 pub(super) fn deviation(values: &[f64]) -> Option<f64> {
     (values.len() > 1).then(|| sample_variance(values).sqrt())
 }

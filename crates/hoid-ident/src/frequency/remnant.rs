@@ -1,14 +1,14 @@
 //! The remnant in u: its power at non-excited frequencies.
 //!
-//! Over whole periods the response to the excitation has no power between its lines, so that all of
-//! it there is remnant. Bin k of a window of N samples gives the one-sided density
+//! Over whole periods the response to the excitation has no power between its lines, so that all power there is
+//! remnant. Bin k of a window of N samples gives the one-sided density
 //! `|U_k|^2/2 / (2 pi/(N Ts))` per rad/s, with a relative standard error of 1 (chi-square with two
 //! degrees of freedom); the mean over n runs and neighbouring bins, m values, has one of
 //! `1/sqrt(m)` (J. S. Bendat and A. G. Piersol, *Random Data*, 2010, section 8.5.4).
 //!
-//! At the lines there is also remnant. With the density of the neighbourhood there,
-//! `noise ratio = power of the remnant / var(u)` estimates P_n of eq. 43, where the share at
-//! non-excited frequencies leaves the lines out.
+//! The lines contain remnant too. With the density of the neighbourhood at the lines,
+//! `noise ratio = power of the remnant / var(u)` estimates P_n of eq. 43, while the share at non-excited frequencies
+//! leaves the lines out.
 
 use std::f64::consts::TAU;
 
@@ -24,12 +24,12 @@ pub struct RemnantBand {
     /// One-sided power density of u at non-excited frequencies, square of the unit of u per rad/s:
     /// its integral is a variance.
     pub density: f64,
-    /// Values that the mean is over: bins of all runs.
+    /// Number of averaged values: bins of all runs.
     pub values: usize,
 }
 
 impl RemnantBand {
-    /// Standard error of the density for a remnant that is stationary and normal.
+    /// Returns the standard error of the density for a stationary normal remnant.
     pub fn standard_error(&self) -> f64 {
         self.density / (self.values as f64).sqrt()
     }
@@ -54,7 +54,7 @@ impl Control<'_> {
         power(self.coefficients, k, self.window.samples)
     }
 
-    /// Variance, and the power at non-excited frequencies.
+    /// Returns the variance, and the power at non-excited frequencies.
     fn powers(&self, harmonics: &[usize]) -> (f64, f64) {
         let bins = 1..self.coefficients.len();
         let all: f64 = bins.clone().map(|k| self.power(k)).sum();
@@ -66,8 +66,7 @@ impl Control<'_> {
     }
 }
 
-/// Bands of `neighbours` bins of the shortest window, each the mean over the non-excited bins of
-/// all runs.
+/// Returns bands of `neighbours` bins of the shortest window, each the mean over the non-excited bins of all runs.
 pub(super) fn spectrum(runs: &[Control<'_>], harmonics: &[usize], ts_s: f64, neighbours: usize) -> Vec<RemnantBand> {
     let widest = runs.iter().map(|r| r.width_rad_s(ts_s)).fold(0.0, f64::max);
     let band_rad_s = widest * neighbours.max(1) as f64;
@@ -77,8 +76,7 @@ pub(super) fn spectrum(runs: &[Control<'_>], harmonics: &[usize], ts_s: f64, nei
         let width = run.width_rad_s(ts_s);
         for k in (1..run.coefficients.len()).filter(|k| !run.is_line(*k, harmonics)) {
             let omega = k as f64 * width;
-            // Half a bin up: a frequency at an edge belongs to the band below, whatever its
-            // rounding.
+            // Half a bin up: a frequency at an edge belongs to the band below, whatever its rounding.
             let band = ((omega - 0.5 * width) / band_rad_s).max(0.0) as usize;
             if bands.len() <= band {
                 bands.resize(band + 1, (0.0, 0.0, 0));
@@ -95,7 +93,7 @@ pub(super) fn spectrum(runs: &[Control<'_>], harmonics: &[usize], ts_s: f64, nei
     bands.iter().filter(|b| b.2 > 0).map(mean).collect()
 }
 
-/// Share of the power of u at non-excited frequencies, and noise ratio of one run.
+/// Returns the share of the power of u at non-excited frequencies, and the noise ratio of one run.
 pub(super) fn share_and_ratio(
     run: &Control<'_>,
     harmonics: &[usize],
@@ -112,8 +110,7 @@ pub(super) fn share_and_ratio(
     (off / all, (off + at_lines) / all)
 }
 
-/// Density between the centres of two bands by linear interpolation; that of the first or the last
-/// band outside.
+/// Density between the centres of two bands by linear interpolation; outside, that of the first or the last band.
 fn density_at(spectrum: &[RemnantBand], omega: f64) -> f64 {
     let above = spectrum.partition_point(|b| b.omega_rad_s <= omega);
     match (above.checked_sub(1).map(|i| &spectrum[i]), spectrum.get(above)) {

@@ -9,7 +9,7 @@
 use hoid_model::Complex64;
 use realfft::RealFftPlanner;
 
-/// `X_k`, k = 0 .. N/2.
+/// Returns `X_k`, k = 0 .. N/2.
 pub(crate) fn coefficients(values: &[f64]) -> Vec<Complex64> {
     let n = values.len();
     if n == 0 {
@@ -18,7 +18,7 @@ pub(crate) fn coefficients(values: &[f64]) -> Vec<Complex64> {
     let transform = RealFftPlanner::<f64>::new().plan_fft_forward(n);
     let mut input = values.to_vec();
     let mut output = vec![Complex64::new(0.0, 0.0); n / 2 + 1];
-    // Both lengths are those that the plan was made for, so that there is no error to report.
+    // Both lengths are those of the plan, so that there is no error to report.
     let _ = transform.process(&mut input, &mut output);
     let scale = 2.0 / n as f64;
     for x in &mut output {
@@ -27,7 +27,7 @@ pub(crate) fn coefficients(values: &[f64]) -> Vec<Complex64> {
     output
 }
 
-/// Part of the variance of N samples that bin k has.
+/// Contribution of bin k to the variance of N samples.
 pub(super) fn power(coefficients: &[Complex64], k: usize, samples: usize) -> f64 {
     let once = k == 0 || 2 * k == samples;
     coefficients[k].norm_sqr() / if once { 4.0 } else { 2.0 }

@@ -1,14 +1,14 @@
 //! Phase without jumps of whole turns.
 //!
-//! Between two lines the phase is known except for whole turns. It is taken along the shorter way
-//! once the phase of a delay, which turns fastest, is taken out: `phi + omega tau` moves by less
-//! than half a turn from line to line where tau is right within `pi/(omega_{k+1} - omega_k)`.
+//! Between two lines the phase is known up to whole turns. The shorter way is taken after the phase of a delay, which
+//! turns fastest, is removed: `phi + omega tau` changes by less than half a turn from line to line if tau is right
+//! within `pi/(omega_{k+1} - omega_k)`.
 
 use std::f64::consts::PI;
 
-/// Phases in deg without jumps, for pairs of frequency in rad/s and phase in deg, with the phase of
-/// a delay in s taken out beforehand and put back. The first value is the principal one with the
-/// delay taken out. What is not finite stays as it is.
+/// Returns phases in deg without jumps, for pairs of frequency in rad/s and phase in deg, with the phase of a delay in
+/// s removed beforehand and added afterwards. The first value is the principal one without the delay. Values that are
+/// not finite are unchanged.
 pub fn unwrapped_deg(phases: &[(f64, f64)], delay_s: f64) -> Vec<f64> {
     let mut before: Option<f64> = None;
     phases

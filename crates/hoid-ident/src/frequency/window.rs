@@ -1,9 +1,8 @@
-//! Spans of whole periods, and the Fourier coefficients of two channels that are recorded at an
-//! offset.
+//! Spans of whole periods, and the Fourier coefficients of two channels that are recorded with an offset.
 //!
-//! With `e[k]` belonging to `u[k + s]`, s of any size, `U(omega) e^{j omega s Ts}` is the
-//! coefficient of u at the time of e: exact for what is periodic. The whole samples of s are taken
-//! from the record where it reaches so far, which is exact for the rest as well.
+//! If `e[k]` belongs to `u[k + s]`, s of any size, `U(omega) e^{j omega s Ts}` is the coefficient of u at the time of
+//! e: exact for periodic components. The whole samples of s are taken from the record as far as possible, which is
+//! exact for the remainder as well.
 
 use std::f64::consts::TAU;
 
@@ -17,17 +16,16 @@ use crate::IdentError;
 pub(crate) struct Window {
     pub first: usize,
     pub samples: usize,
-    /// Periods of the excitation that it holds: the bin of its first harmonic.
+    /// Number of periods of the excitation: the bin of its first harmonic.
     pub periods: usize,
 }
 
-/// The number of periods in `samples` samples of a record, when it is a whole one within half a
-/// sample.
+/// Returns the number of periods in `samples` samples of a record, if it is an integer within half a sample.
 pub(super) fn whole_periods(record: &Record, samples: usize, period_s: f64) -> Result<usize, IdentError> {
     let ts = record.sample_time().s();
     let of_period = period_s / ts;
     let nearest = (samples as f64 / of_period).round();
-    // A period of no whole number of samples cannot be met better than by half a sample.
+    // If a period is not an integer number of samples, the best accuracy is half a sample.
     if nearest >= 1.0 && (samples as f64 - nearest * of_period).abs() <= 0.5 + 1e-6 {
         return Ok(nearest as usize);
     }
@@ -52,7 +50,7 @@ pub(super) fn whole_periods(record: &Record, samples: usize, period_s: f64) -> R
 }
 
 impl Window {
-    /// The samples of a record with `from_s <= t < to_s`, which must be whole periods.
+    /// Returns the window of the samples of a record with `from_s <= t < to_s`, which must be whole periods.
     pub fn of_span(record: &Record, from_s: Option<f64>, to_s: Option<f64>, period_s: f64) -> Result<Self, IdentError> {
         let ts = record.sample_time().s();
         let start_s = record.time_s(0);
@@ -65,7 +63,7 @@ impl Window {
         })
     }
 
-    /// Its periods one by one.
+    /// Splits the window into its periods.
     pub fn single_periods(self) -> Vec<Self> {
         let edge = |i: usize| (i * self.samples + self.periods / 2) / self.periods;
         let one = |i: usize| Self {
@@ -76,8 +74,8 @@ impl Window {
         (0..self.periods).map(one).collect()
     }
 
-    /// Its samples of a channel that is `offset` samples late, and the part of the offset that is
-    /// left.
+    /// Returns the samples in the window of a channel that is `offset` samples late, and the remaining part of the
+    /// offset.
     pub fn samples_of(self, values: &[f64], offset: f64) -> (&[f64], f64) {
         let whole = offset.floor();
         let begin = self.first as f64 + whole;
@@ -88,14 +86,14 @@ impl Window {
         (&values[self.first..self.first + self.samples], offset)
     }
 
-    /// Coefficients of a channel that is `offset` samples late.
+    /// Returns the coefficients of a channel that is `offset` samples late.
     pub fn coefficients(self, values: &[f64], offset: f64) -> Vec<Complex64> {
         let (samples, rest) = self.samples_of(values, offset);
         advanced(samples, rest)
     }
 }
 
-/// Coefficients of samples that are `offset` samples late.
+/// Returns the coefficients of samples that are `offset` samples late.
 pub(super) fn advanced(samples: &[f64], offset: f64) -> Vec<Complex64> {
     let mut x = coefficients(samples);
     if offset != 0.0 {

@@ -20,17 +20,17 @@ use crate::{
     progress,
 };
 
-/// Relative decrease of the loss, and steps, at which the search of an order ends while orders are
-/// compared.
+/// Relative decrease of the loss, and number of steps, at which the search of an order ends during the comparison of
+/// orders.
 const QUICK_TOLERANCE: f64 = 1e-7;
 const QUICK_ITERATIONS: usize = 30;
 
 impl GreyBox {
-    /// Fits one model to all records, initial states of each.
+    /// Fits one model to all records, with initial states of each record.
     ///
     /// # Errors
-    /// [`IdentError`]; how a search ended is part of the fit. With several orders an error means
-    /// that none could be fitted.
+    /// [`IdentError`]; how a search ended is part of the fit. With several orders an error means that none could be
+    /// fitted.
     pub fn fit(&self, records: &[Record]) -> Result<GreyBoxFit, IdentError> {
         let sample_time = informative_data::common_sample_time(records)?;
         self.check_orders()?;
@@ -67,8 +67,7 @@ impl GreyBox {
             let candidates = vec![candidate(criterion, Ok(&fit))];
             return Ok(GreyBoxFit { candidates, ..fit });
         }
-        // To compare orders the loss need not be known to the last digit; a wrong order converges
-        // slowly.
+        // To compare orders the loss need not be known to the last digit; a wrong order converges slowly.
         let quick = SearchOptions {
             tolerance: self.search.tolerance.max(QUICK_TOLERANCE),
             max_iterations: self.search.max_iterations.min(QUICK_ITERATIONS),
@@ -156,8 +155,7 @@ impl GreyBox {
         workspace: &mut Workspace,
     ) -> Result<GreyBoxFit, IdentError> {
         let mut etas: Vec<(String, Vec<f64>)> = Vec::new();
-        // The minimum of another order is near, whatever the layout of the records; m = 0 has no
-        // T_n to continue with.
+        // The minimum of another order is near, whatever the layout of the records; m = 0 has no T_n to continue with.
         if let Some(before) = before.filter(|b| b.len() == criterion.layout.names.len()) {
             etas.push((format!("order {}", criterion.layout.order - 1), before.to_vec()));
         }

@@ -1,9 +1,8 @@
-//! Where the physical parameters of each record are in eta, and what they mean for its polynomials.
+//! Places of the physical parameters of each record in eta, and their polynomials.
 //!
-//! Slots of one record: `[K_e, K_e_dot (or T_L), omega_nm, zeta_nm, tau_e, T_n]`, the last only for
-//! m > 0. A parameter that the records share has one place in eta, one that is individual has as
-//! many as there are records. K_e_dot is the coordinate of the lead unless the user constrains T_L
-//! itself: `K_e_dot = K_e T_L` is well determined also where K_e is small.
+//! Slots of one record: `[K_e, K_e_dot (or T_L), omega_nm, zeta_nm, tau_e, T_n]`, the last only for m > 0. A parameter
+//! common to the records has one place in eta, an individual one has a place for each record. K_e_dot is the coordinate
+//! of the lead unless the user constrains T_L itself: `K_e_dot = K_e T_L` is well determined even if K_e is small.
 
 use std::{collections::BTreeMap, ops::Range};
 
@@ -25,12 +24,12 @@ pub(crate) const DELAY: usize = 4;
 /// Slot of the remnant's time constant.
 pub(crate) const TIME_CONSTANT: usize = 5;
 
-/// Names that can be constrained or be individual.
+/// Names of the parameters that can be constrained or individual.
 pub const GREY_BOX_NAMES: [&str; 7] = ["K_e", "K_e_dot", "T_L", "omega_nm", "zeta_nm", "tau_e", "T_n"];
 
-/// Bounds of zeta_nm: beyond them the two poles have nothing to do with each other.
+/// Bounds of zeta_nm: beyond them the two poles are independent.
 const ZETA_LIMITS: (f64, f64) = (1e-4, 20.0);
-/// Bounds of T_n in samples: white below, a drift above.
+/// Bounds of T_n in samples: white noise below, a drift above.
 const TIME_CONSTANT_LIMITS: (f64, f64) = (0.1, 1e4);
 /// Largest omega_nm as a share of pi/Ts.
 const HIGHEST_FREQUENCY: f64 = 0.999;
@@ -44,7 +43,7 @@ pub(crate) enum Lead {
     Time,
 }
 
-/// The parameters as constrained, checked.
+/// The parameters with their constraints, after the checks.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Layout {
     /// Order m of the remnant filter.
@@ -53,7 +52,7 @@ pub(crate) struct Layout {
     pub sample_time: SampleTime,
     /// Place in eta of each slot, for each record.
     pub positions: Vec<[usize; SLOTS]>,
-    /// Name of each element of eta; with the number of the record where it is individual.
+    /// Name of each element of eta; with the number of the record if it is individual.
     pub names: Vec<String>,
     /// Bounds of each element of eta.
     pub limits: Vec<(f64, f64)>,
@@ -61,8 +60,7 @@ pub(crate) struct Layout {
     pub slots: Vec<usize>,
 }
 
-/// Orders and theta of one record at one eta; the Jacobian has a row for each coefficient and a
-/// column for each slot.
+/// Orders and theta of one record at one eta; the Jacobian has a row for each coefficient and a column for each slot.
 #[derive(Debug, Clone)]
 pub(crate) struct Polynomials {
     pub orders: Orders,
@@ -70,7 +68,7 @@ pub(crate) struct Polynomials {
     pub jacobian: Vec<[f64; SLOTS]>,
 }
 
-/// Orders of the Box-Jenkins model that holds the grey box.
+/// Returns the orders of the Box-Jenkins model that contains the grey box.
 pub(crate) fn orders(order: usize, nk: usize) -> Orders {
     Orders {
         na: 0,
@@ -151,7 +149,7 @@ impl Layout {
         names
     }
 
-    /// The constraint of a parameter within what has a meaning at all.
+    /// Returns the constraint of a parameter within its admissible range.
     fn slot_limits(
         &self,
         slot: usize,
@@ -199,18 +197,18 @@ impl Layout {
         if self.order == 0 { TIME_CONSTANT } else { SLOTS }
     }
 
-    /// Longest delay that eta can take, in samples of nk.
+    /// Returns the longest possible delay, in samples of nk.
     pub fn longest_nk(&self) -> Result<usize, ModelError> {
         let longest = self.delays().into_iter().map(|i| self.limits[i].1).fold(0.0, f64::max);
         Ok(whole_samples(longest, self.sample_time)? + 1)
     }
 
-    /// An eta whose parameters are the same for all records.
+    /// Returns an eta whose parameters are the same for all records.
     pub fn spread(&self, slots: &[f64; SLOTS]) -> Vec<f64> {
         self.slots.iter().map(|&slot| slots[slot]).collect()
     }
 
-    /// The parameters of one record; T_n is 0 where there is none.
+    /// Returns the parameters of one record; T_n is 0 if there is none.
     pub fn of_record(&self, eta: &[f64], record: usize) -> [f64; SLOTS] {
         let mut values = [0.0; SLOTS];
         for (value, &position) in values.iter_mut().zip(&self.positions[record]).take(self.slots_in_use()) {
@@ -219,7 +217,7 @@ impl Layout {
         values
     }
 
-    /// `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]` of the slots of one record.
+    /// Returns `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]` from the slots of one record.
     pub fn operator(&self, slots: &[f64; SLOTS]) -> [f64; 5] {
         let [k_e, lead, omega, zeta, tau, _] = *slots;
         let k_e_dot = match self.lead {
@@ -229,8 +227,7 @@ impl Layout {
         [k_e, k_e_dot, omega, zeta, tau]
     }
 
-    /// The polynomials of one record; `sample` is the sample in which tau_e lies, where the caller
-    /// has chosen one.
+    /// Returns the polynomials of one record; `sample` is the sample that contains tau_e, if the caller has chosen one.
     pub fn polynomials(&self, eta: &[f64], record: usize, sample: Option<usize>) -> Result<Polynomials, ModelError> {
         let slots = self.of_record(eta, record);
         let operator = self.operator(&slots);

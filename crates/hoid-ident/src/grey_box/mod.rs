@@ -9,21 +9,21 @@
 //! has to replace what the structure leaves out: T_n, K_n and tau_e are consistent. K_n follows
 //! from the innovation: `K_n = sigma/g(T_n)`.
 //!
-//! The order m is given or chosen by BIC over a range; m from 1 on has the same number of
-//! parameters, so that the loss decides.
+//! The order m is given or chosen by BIC over a range; for m of 1 and more the number of parameters is the same, so
+//! that the loss is decisive.
 //!
 //! Source: L. Ljung, *System Identification*, 1999, sections 4.3 (grey boxes) and 7.2; T. Bohlin,
 //! *Practical Grey-box Process Identification*, 2006.
 //!
 //! | module | contents |
 //! |---|---|
-//! | `options` | [`GreyBox`]: what may be chosen, by fields and by names |
+//! | `options` | [`GreyBox`]: the options, by fields and by names |
 //! | `estimator` | the fit |
 //! | `layout` | order and bounds of the physical parameters |
-//! | `parametrisation` | what the criterion needs to know of physical parameters |
+//! | `parametrisation` | interface of the criterion to physical parameters |
 //! | `objective` | the criterion in physical parameters, and its derivatives |
-//! | `starts` | where the searches start |
-//! | `result` | the fit with its uncertainty |
+//! | `starts` | starts of the searches |
+//! | `result` | the fit with its standard errors |
 
 mod estimator;
 pub(crate) mod layout;

@@ -25,17 +25,16 @@ use super::parametrisation::{HeldSamples, Mapped, Parametrisation};
 pub(crate) struct PhysicalCriterion<'a, P> {
     pub layout: P,
     pub data: Vec<Data<'a>>,
-    /// The values of each input in addition to e, record by record.
+    /// The values of each further input, record by record.
     pub further: Vec<Vec<&'a [f64]>>,
     pub initial: InitialState,
     pub first: usize,
-    /// Sample in which each delay of [`Parametrisation::delays`] is held; by the delay itself where there is
-    /// none.
+    /// Sample in which each delay of [`Parametrisation::delays`] is held; `None` determines it from the delay itself.
     pub samples: Option<Vec<usize>>,
     pub limits: Vec<(f64, f64)>,
-    /// Prior knowledge before the data, in units of the residuals; none if there is nothing.
+    /// Prior knowledge, in units of the residuals; empty if there is none.
     pub penalty: Vec<Penalty>,
-    /// Common parts of else was measured of the operator that all records.
+    /// Additional measurements of the operator of all records.
     pub additional: Option<AdditionalTerm<'a>>,
 }
 
@@ -43,7 +42,7 @@ pub(crate) struct PhysicalCriterion<'a, P> {
 #[derive(Clone)]
 pub(crate) struct AdditionalTerm<'a> {
     pub criterion: Arc<dyn Objective + Send + Sync + 'a>,
-    /// How many elements of eta it is of.
+    /// Number of elements of eta on which it depends.
     pub elements: usize,
     pub weight: f64,
 }
@@ -78,19 +77,19 @@ pub(crate) struct Penalty {
     /// True for `g = ln eta_i` of a positive element, false for eta_i itself.
     pub logarithmic: bool,
     pub mean: f64,
-    /// `1/s^2`.
+    /// Precision `1/s^2`.
     pub precision: f64,
-    /// v.
+    /// Variance v.
     pub variance: f64,
 }
 
 impl Penalty {
-    /// The same next to innovations of this variance.
+    /// Returns the same penalty for innovations of this variance.
     pub fn weighted(self, variance: f64) -> Self {
         Self { variance, ..self }
     }
 
-    /// `g(eta_i)` and its derivative.
+    /// Returns `g(eta_i)` and its derivative.
     fn value_and_slope(&self, eta: &[f64]) -> (f64, f64) {
         let x = eta[self.place];
         if self.logarithmic {
@@ -112,7 +111,7 @@ impl Penalty {
         self.weight() * (self.mean - value).powi(2)
     }
 
-    /// `v g'(eta_i)^2/s^2`, its element of the matrix P that is next to `psi' psi`.
+    /// Returns `v g'(eta_i)^2/s^2`, its element of the matrix P that is added to `psi' psi`.
     pub fn curvature(&self, eta: &[f64]) -> f64 {
         let (_, slope) = self.value_and_slope(eta);
         self.weight() * slope * slope
@@ -144,7 +143,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         }
     }
 
-    /// Additional measurements, at eta: its part of the criterion; zeros if there is nothing.
+    /// Returns the contribution of the additional measurements to the criterion at eta; zeros if there are none.
     pub fn additional_at(&self, eta: &[f64], workspace: &mut Workspace) -> Linearisation {
         let mut own = Linearisation::empty(eta.len());
         if let Some(additional) = &self.additional {
@@ -167,12 +166,12 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         (0..self.data.len()).map(of_record).sum()
     }
 
-    /// The criterion of one record in theta.
+    /// Returns the criterion of one record in theta.
     pub fn of_record(&self, mapped: &Mapped, record: usize) -> Criterion<'a> {
         self.with_data((mapped.orders, &mapped.further), record, self.data[record])
     }
 
-    /// The same with another e and u of as many samples.
+    /// Returns the same with another e and u of the same length.
     pub fn with_data<'b>(
         &self,
         (orders, further): (hoid_model::Orders, &[InputOrders]),
@@ -204,9 +203,8 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         self.layout.map(eta, record, held).ok()
     }
 
-    /// The gains that are best for the other parameters, and the sum of squares there: the residual
-    /// is affine in K_e and K_e_dot. Only for one set of parameters common to all records, with
-    /// K_e_dot as coordinate.
+    /// Sets the gains that are best for the other parameters, and returns the sum of squares there: the residual is
+    /// affine in K_e and K_e_dot. Only for one set of parameters common to all records, with K_e_dot as coordinate.
     pub fn best_gains(&self, eta: &mut [f64], workspace: &mut Workspace) -> Option<f64> {
         eta[..2].fill(0.0);
         if !self.is_feasible(eta) {
@@ -226,8 +224,8 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         (value.is_finite() && eta.iter().all(|v| v.is_finite())).then_some(value)
     }
 
-    /// Searches from eta. The loss has kinks where a delay is a whole number of samples, and a
-    /// search may end in one; then it is finished inside each of the samples that meet there.
+    /// Searches from eta. The loss has kinks where a delay is an integer number of samples, and a search may end in
+    /// one; then it is continued inside each of the samples that meet there.
     pub fn search(
         &self,
         eta: Vec<f64>,
@@ -242,7 +240,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         Some(self.search_by_samples(minimum, options, workspace))
     }
 
-    /// Moves from sample to sample as long as the loss falls.
+    /// Moves from sample to sample as long as the loss decreases.
     fn search_by_samples(&self, minimum: Minimum, options: &SearchOptions, workspace: &mut Workspace) -> Minimum {
         let (delays, ts) = (self.layout.delays(), self.layout.sample_time().s());
         let begin = self.layout.first_sample_begins();
@@ -266,7 +264,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
             minimise(&within, eta, options, None, workspace)
         };
         let mut best = inside(&samples, &minimum, workspace).unwrap_or(minimum);
-        // Each move lowers the loss; the limit only guards against rounding.
+        // Each move decreases the loss; the limit only guards against rounding.
         for _ in 0..100 {
             let mut moved = false;
             for (k, &i) in delays.iter().enumerate() {
@@ -299,13 +297,13 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         best
     }
 
-    /// Elements of eta with a variance: not fixed, and not held at a bound of the user. A kink of
-    /// the loss is no bound.
+    /// Returns the elements of eta with a variance: not fixed, and not at a bound of the user. A kink of the loss is no
+    /// bound.
     pub fn free(&self, eta: &[f64], descent: &[f64]) -> Vec<usize> {
         crate::optimize::free_parameters(self, eta, descent)
     }
 
-    /// Polynomials of a record at eta.
+    /// Returns the polynomials of a record at eta.
     pub fn model_of(&self, eta: &[f64], record: usize) -> Result<Mapped, IdentError> {
         Ok(self.layout.map(eta, record, HeldSamples::default())?)
     }

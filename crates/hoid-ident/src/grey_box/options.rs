@@ -1,5 +1,5 @@
 //! Options of the operator with a remnant of order m: the fields of [`GreyBox`], and the names under which texts set
-//! them. An option is declared here and nowhere else.
+//! them. Each option is declared only here.
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
@@ -9,21 +9,20 @@ use crate::{
     shared_options as shared,
 };
 
-/// Orders m of the remnant that are tried where none is given.
+/// Orders m of the remnant that are tried by default.
 const DEFAULT_ORDERS: RangeInclusive<usize> = 1..=4;
 
-/// Quantities to be estimated in physical parameters, and how.
+/// Estimator in physical parameters, with its options.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GreyBox {
-    /// Orders m of the remnant filter to choose from, 0 (white) to 4.
+    /// Candidate orders m of the remnant filter, 0 (white) to 4.
     pub order: RangeInclusive<usize>,
     /// Shortest and longest delay tau_e in s. Default 0.05 to 0.6.
     pub delay_range_s: (f64, f64),
     /// Fixed and bounded parameters by name ([`GREY_BOX_NAMES`](super::GREY_BOX_NAMES)). T_L or
     /// K_e_dot, not both.
     pub constraints: BTreeMap<String, Constraint>,
-    /// Names of the parameters that each record has for itself; all others are common to the
-    /// records.
+    /// Names of the parameters that are individual to each record; all others are common to the records.
     pub individual: Vec<String>,
     /// Initial states of each record. Default: estimated.
     pub initial_state: InitialState,
@@ -41,7 +40,7 @@ impl Default for GreyBox {
 }
 
 impl GreyBox {
-    /// A grey box with the default options.
+    /// Creates a grey box with the default options.
     pub fn new(order: RangeInclusive<usize>) -> Self {
         Self {
             order,

@@ -1,4 +1,4 @@
-//! Requirements of the criterion on physical parameters: which polynomials they give.
+//! Interface of the criterion to physical parameters: the polynomials as functions of them.
 
 use std::ops::Range;
 
@@ -6,18 +6,17 @@ use hoid_model::{ModelError, Orders, SampleTime};
 
 use crate::criterion::further_input::InputOrders;
 
-/// Orders and theta of one record at one eta, and the derivatives of theta: a column for each slot
-/// of the record.
+/// Orders and theta of one record at one eta, and the derivatives of theta: a column for each slot of the record.
 #[derive(Debug, Clone)]
 pub(crate) struct Mapped {
     pub orders: Orders,
-    /// Orders of inputs in addition to e, whose coefficients follow in theta.
+    /// Orders of further inputs, whose coefficients follow in theta.
     pub further: Vec<InputOrders>,
     pub theta: Vec<f64>,
     pub columns: Vec<Vec<f64>>,
 }
 
-/// The samples in which delays are held, where the caller has chosen them.
+/// The samples in which delays are held, if the caller has chosen them.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct HeldSamples<'s> {
     /// Places of the delays in eta.
@@ -26,7 +25,7 @@ pub(crate) struct HeldSamples<'s> {
 }
 
 impl HeldSamples<'_> {
-    /// The sample of the delay at this place.
+    /// Returns the sample of the delay at this place.
     pub fn of(&self, place: usize) -> Option<usize> {
         let index = self.delays.iter().position(|&delay| delay == place)?;
         self.samples.get(index).copied()
@@ -34,8 +33,8 @@ impl HeldSamples<'_> {
 }
 
 impl Mapped {
-    /// Covariance of theta by rows, `J C J'`, from that of eta; the slots of the record are at
-    /// these places of eta.
+    /// Returns the covariance of theta by rows, `J C J'`, from that of eta; the slots of the record are at these places
+    /// of eta.
     pub fn covariance_of_theta(&self, of_eta: &[f64], p: usize, places: &[usize]) -> Vec<f64> {
         let columns = &self.columns;
         let of = |row: usize, other: usize| -> f64 {
@@ -57,29 +56,29 @@ impl Mapped {
 
 /// Physical parameters eta of one or several records.
 pub(crate) trait Parametrisation: Clone {
-    /// Place in eta of each slot of a record.
+    /// Returns the place in eta of each slot of a record.
     fn positions(&self, record: usize) -> &[usize];
-    /// Lower and upper bound of each element of eta.
+    /// Returns lower and upper bound of each element of eta.
     fn limits(&self) -> &[(f64, f64)];
-    /// Places of the delays in eta.
+    /// Returns the places of the delays in eta.
     fn delays(&self) -> Vec<usize>;
-    /// Place in eta of the delay of a record.
+    /// Returns the place in eta of the delay of a record.
     fn delay_of(&self, record: usize) -> usize;
-    /// Time between two samples.
+    /// Returns the time between two samples.
     fn sample_time(&self) -> SampleTime;
-    /// Delay at which the sample 0 starts, in samples: the model of a smooth error acts half a sample later.
+    /// Delay at which sample 0 starts, in samples: the model of a smooth error responds half a sample later.
     fn first_sample_begins(&self) -> f64 {
         0.0
     }
-    /// Orders of the polynomials at this delay of the first coefficient of B.
+    /// Returns the orders of the polynomials at this delay of the first coefficient of B.
     fn orders(&self, nk: usize) -> Orders;
-    /// Places in eta of the polynomials C that must be stable and have no limits of their own.
+    /// Returns the places in eta of the polynomials C that must be stable and have no limits of their own.
     fn stable_blocks(&self) -> Vec<Range<usize>>;
-    /// Orders of the inputs in addition to e, at the shortest delay; none by default.
+    /// Returns the orders of the further inputs, at the shortest delay; none by default.
     fn further(&self) -> Vec<InputOrders> {
         Vec::new()
     }
-    /// The polynomials of one record, its delays in these samples.
+    /// Returns the polynomials of one record, with its delays in these samples.
     ///
     /// # Errors
     /// [`ModelError`] for an eta without a model.

@@ -11,25 +11,25 @@ use crate::{Fit, Termination};
 
 use super::layout::{DELAY, LEAD, Layout, Lead, TIME_CONSTANT};
 
-/// One order m of the remnant filter that was tried.
+/// A candidate order m of the remnant filter.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct OrderCandidate {
     /// Order m.
     pub order: usize,
-    /// Its figures, all on the same samples, or why it could not be fitted.
+    /// Its criteria, all on the same samples, or the reason why it could not be fitted.
     pub outcome: Result<OrderFigures, String>,
 }
 
-/// Criterion for orders.
+/// Criteria of an order.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct OrderFigures {
     /// Loss V.
     pub loss: f64,
     /// Akaike's criterion.
     pub aic: f64,
-    /// Schwarz's criterion, which decides.
+    /// Schwarz's criterion, by which the order is chosen.
     pub bic: f64,
-    /// True when the search converged.
+    /// True if the search converged.
     pub converged: bool,
 }
 
@@ -40,7 +40,7 @@ pub struct GreyBoxFit {
     pub(crate) eta: Vec<f64>,
     /// Covariance of eta by rows; zero for parameters that are fixed or at a bound.
     pub(crate) covariance: Option<Vec<f64>>,
-    /// Elements of eta with a variance of their own.
+    /// Elements of eta with a variance.
     pub(crate) free: Vec<usize>,
     /// Number of parameters that were not fixed.
     pub(crate) parameters: usize,
@@ -49,19 +49,19 @@ pub struct GreyBoxFit {
 }
 
 impl GreyBoxFit {
-    /// Order m of the remnant filter; 0 is white noise.
+    /// Returns the order m of the remnant filter; 0 is white noise.
     pub fn order(&self) -> usize {
         self.layout.order
     }
 
-    /// All orders that were tried, the one of this fit among them.
+    /// Returns all orders that were tried, including that of this fit.
     pub fn candidates(&self) -> &[OrderCandidate] {
         &self.candidates
     }
 
-    /// Name, value and standard error of each parameter that was fitted, in the coordinates of the
-    /// fit: K_e, K_e_dot (s) or T_L (s) where that is constrained, omega_nm (rad/s),
-    /// zeta_nm, tau_e (s), T_n (s). Individual parameters carry the number of their record.
+    /// Returns name, value and standard error of each fitted parameter, in the coordinates of the fit: K_e, K_e_dot (s)
+    /// or T_L (s) if that is constrained, omega_nm (rad/s), zeta_nm, tau_e (s), T_n (s). Individual parameters contain
+    /// the number of their record.
     pub fn parameters(&self) -> Vec<(String, Estimate)> {
         self.layout
             .names
@@ -71,8 +71,8 @@ impl GreyBoxFit {
             .collect()
     }
 
-    /// Covariance of [`GreyBoxFit::parameters`] by rows, zero for parameters that are fixed or at a
-    /// bound; `None` for an exact fit.
+    /// Returns the covariance of [`GreyBoxFit::parameters`] by rows, zero for parameters that are fixed or at a bound;
+    /// `None` for an exact fit.
     pub fn covariance(&self) -> Option<&[f64]> {
         self.covariance.as_deref()
     }
@@ -85,8 +85,8 @@ impl GreyBoxFit {
         }
     }
 
-    /// An estimate of `value` whose gradient is `by_gain` for K_e and `by_lead` for the second
-    /// coordinate.
+    /// Returns an estimate of `value` with the derivatives `by_gain` with respect to K_e and `by_lead` with respect to
+    /// the second coordinate.
     fn of_gains(&self, record: usize, value: f64, by_gain: f64, by_lead: f64) -> Estimate {
         let places = &self.layout.positions[record];
         let used = |place: usize, by: f64| by != 0.0 && self.free.contains(&place);
@@ -101,11 +101,11 @@ impl GreyBoxFit {
         }
     }
 
-    /// The operator of a record, with standard errors. `record` counts the records of the fit from
-    /// 0, here and below; a number beyond them means the last.
+    /// Returns the operator of a record, with standard errors. `record` is the index in the records of the fit, here
+    /// and below; beyond the last record it means the last.
     ///
     /// # Errors
-    /// [`NotConvertible::ZeroGain`] when K_e is zero, so that there is no T_L.
+    /// [`NotConvertible::ZeroGain`] if K_e is zero, so that there is no T_L.
     pub fn operator(&self, record: usize) -> Result<OperatorEstimate, NotConvertible> {
         let record = self.known(record);
         let slots = self.layout.of_record(&self.eta, record);
@@ -132,7 +132,7 @@ impl GreyBoxFit {
         })
     }
 
-    /// The operator of a record without uncertainty.
+    /// Returns the operator of a record without standard errors.
     ///
     /// # Errors
     /// As [`GreyBoxFit::operator`].
@@ -140,10 +140,10 @@ impl GreyBoxFit {
         Ok(self.operator(record)?.parameters())
     }
 
-    /// T_n and K_n of a record, the remnant held over each sample; `None` for m = 0, where the
-    /// remnant is white with the standard deviation of the innovation.
+    /// Returns T_n and K_n of a record, with the remnant held over each sample; `None` for m = 0, where the remnant is
+    /// white with the standard deviation of the innovation.
     ///
-    /// `K_n = sigma/g(T_n)`; sigma is known to `sigma^2/(2 n)` and uncorrelated with T_n (Gaussian
+    /// `K_n = sigma/g(T_n)`; sigma has the variance `sigma^2/(2 n)` and is uncorrelated with T_n (Gaussian
     /// innovations).
     pub fn remnant(&self, record: usize) -> Option<RemnantEstimate> {
         if self.layout.order == 0 {
@@ -168,10 +168,9 @@ impl GreyBoxFit {
         })
     }
 
-    /// The same model as polynomials, for prediction, simulation and the frequency response with
-    /// its bands: Box-Jenkins with three coefficients in B. Its covariance is `J P J'` and
-    /// singular, as theta has more elements than eta; parameters, criteria, operator and remnant
-    /// are those of this fit.
+    /// Returns the same model as polynomials, for prediction, simulation and the frequency response with its bands:
+    /// Box-Jenkins with three coefficients in B. Its covariance is `J P J'` and singular, as theta has more elements
+    /// than eta; parameters, criteria, operator and remnant are those of this fit.
     pub fn polynomial_fit(&self, record: usize) -> &Fit {
         &self.fits[self.known(record)]
     }
@@ -180,33 +179,33 @@ impl GreyBoxFit {
         record.min(self.fits.len() - 1)
     }
 
-    /// The figures that all records share.
+    /// Returns the fit with the values common to all records.
     fn whole(&self) -> &Fit {
         &self.fits[0]
     }
 
-    /// Loss `V = sum eps^2 / n` over the n residuals that count.
+    /// Returns the loss `V = sum eps^2 / n` over the n residuals that count.
     pub fn loss(&self) -> f64 {
         self.whole().loss()
     }
 
-    /// Unbiased innovation variance `sum eps^2 / (n - p - s)` with p parameters and s estimated
-    /// initial states.
+    /// Returns the unbiased innovation variance `sum eps^2 / (n - p - s)` with p parameters and s estimated initial
+    /// states.
     pub fn innovation_variance(&self) -> f64 {
         self.whole().innovation_variance()
     }
 
-    /// Number n of residuals.
+    /// Returns the number n of residuals.
     pub fn residual_count(&self) -> usize {
         self.whole().residual_count()
     }
 
-    /// Number s of initial states that were estimated, over all records.
+    /// Returns the number s of estimated initial states, over all records.
     pub fn state_count(&self) -> usize {
         self.whole().state_count()
     }
 
-    /// Number p of parameters that were not fixed.
+    /// Returns the number p of parameters that were not fixed.
     pub fn parameter_count(&self) -> usize {
         self.parameters
     }
@@ -216,7 +215,7 @@ impl GreyBoxFit {
         self.whole().termination()
     }
 
-    /// The best start.
+    /// Returns the name of the best start.
     pub fn start(&self) -> &str {
         self.whole().start()
     }

@@ -1,12 +1,11 @@
-//! Where the search in physical parameters starts.
+//! Starts of the search in physical parameters.
 //!
 //! 1. `grid`: delays every 0.04 s over their range with a typical neuromuscular system, then at the
 //!    best of them frequencies and dampings in the range of human operators. The residual is affine
 //!    in K_e and K_e_dot, so that both are eliminated at each point; the noise model is that of one
 //!    T_n. The best points by loss are starts.
-//! 2. `box-jenkins`: the operator that a Box-Jenkins fit at the delay of the best point converts
-//!    to, where it does.
-//! 3. `order m - 1`: the minimum of the order before, when several orders are tried.
+//! 2. `box-jenkins`: the operator to which a Box-Jenkins fit at the delay of the best point is converted, if possible.
+//! 3. `order m - 1`: the minimum of the previous order, if several orders are tried.
 //!
 //! For each order the T_n of a start is the best of a few.
 
@@ -19,14 +18,13 @@ use super::{
     objective::PhysicalCriterion,
 };
 
-/// Spacing of the delays, s: a fraction of the period of the highest frequencies that people
-/// respond to.
+/// Spacing of the delays, s: a fraction of the period of the highest frequencies to which people respond.
 const GRID_DELAY_S: f64 = 0.04;
 /// Neuromuscular frequency with which the delays are ranked, rad/s.
 const DEFAULT_OMEGA: f64 = 11.0;
 /// Damping ratio with which the delays are ranked.
 const DEFAULT_ZETA: f64 = 0.4;
-/// Delays at which the other frequencies and dampings are tried.
+/// Number of delays at which the other frequencies and dampings are tried.
 const BEST_DELAYS: usize = 2;
 /// Neuromuscular frequencies of the grid, rad/s.
 const GRID_OMEGA: [f64; 3] = [6.0, 11.0, 20.0];
@@ -35,18 +33,17 @@ const GRID_ZETA: [f64; 3] = [0.25, 0.7, 1.3];
 /// Time constants of the remnant, s; the first ranks the grid.
 /// Below half a sample a filter of third order has another minimum.
 pub(crate) const GRID_TIME_CONSTANT_S: [f64; 6] = [0.1, 0.004, 0.012, 0.03, 0.06, 0.3];
-/// Least number of delays over a range that is not a point.
+/// Least number of delays over a range of positive length.
 const FEWEST_DELAYS: usize = 3;
 
-/// A start with its name: `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, T_n]`, the same for all
-/// records.
+/// A start with its name: `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, T_n]`, the same for all records.
 #[derive(Debug, Clone)]
 pub(crate) struct Start {
     pub label: String,
     pub slots: [f64; SLOTS],
 }
 
-/// The same data with one set of parameters for all records and K_e_dot as coordinate.
+/// Returns the same data with one set of parameters for all records and K_e_dot as coordinate.
 pub(crate) fn scout<'a>(criterion: &PhysicalCriterion<'a, Layout>, order: usize) -> PhysicalCriterion<'a, Layout> {
     let of_slot = |slot: usize| {
         let bounds = criterion
@@ -78,8 +75,8 @@ pub(crate) fn scout<'a>(criterion: &PhysicalCriterion<'a, Layout>, order: usize)
     PhysicalCriterion::new(layout, criterion.data.clone(), criterion.initial, criterion.first)
 }
 
-/// The best points of the grid, with the gains that are best for them: so many with a lead, and the
-/// best without one where it is better.
+/// Returns the best points of the grid, with the gains that are best for them: the given number with a lead, and the
+/// best without a lead if it is better.
 pub(crate) fn grid(criterion: &PhysicalCriterion<'_, Layout>, starts: usize, workspace: &mut Workspace) -> Vec<Start> {
     let scout = scout(criterion, criterion.layout.order.min(1));
     let bounded = |slot: usize, value: f64| value.clamp(scout.limits[slot].0, scout.limits[slot].1);
@@ -120,8 +117,8 @@ pub(crate) fn grid(criterion: &PhysicalCriterion<'_, Layout>, starts: usize, wor
     leading(&points, starts)
 }
 
-/// The first few with a lead, and the first of all: a lag in the place of the lead, with a shorter
-/// delay, imitates the phase of an operator and makes a local minimum of its own.
+/// Returns the first few with a lead, and the first of all: a lag instead of the lead, with a shorter delay, imitates
+/// the phase of an operator and causes a local minimum.
 fn leading(points: &[(Start, f64)], n: usize) -> Vec<Start> {
     let has_lead = |s: &Start| s.slots[0] * s.slots[LEAD] >= 0.0;
     let mut chosen: Vec<Start> = points
@@ -135,7 +132,7 @@ fn leading(points: &[(Start, f64)], n: usize) -> Vec<Start> {
     chosen
 }
 
-/// The operator of a Box-Jenkins fit at this delay.
+/// Returns the operator of a Box-Jenkins fit at this delay.
 pub(crate) fn box_jenkins(
     records: &[Record],
     nearest: &Start,
@@ -162,7 +159,7 @@ pub(crate) fn box_jenkins(
     })
 }
 
-/// The start as an eta of this criterion, with the best T_n of a few for its order.
+/// Returns the start as an eta of this criterion, with the best of a few T_n for its order.
 pub(crate) fn complete(
     criterion: &PhysicalCriterion<'_, Layout>,
     start: &Start,
@@ -187,7 +184,7 @@ pub(crate) fn complete(
         }
     }
     if layout.lead == Lead::Time {
-        // A start without K_e has no lead time; one second is one.
+        // A start without K_e has no lead time; one second is used.
         slots[LEAD] = if slots[0] == 0.0 { 1.0 } else { slots[LEAD] / slots[0] };
     }
     layout.spread(&slots)

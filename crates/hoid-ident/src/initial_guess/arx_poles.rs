@@ -1,5 +1,5 @@
-//! Poles by linear least squares: of an ARX model, of one of high order, and by the iteration of
-//! Steiglitz and McBride.
+//! Poles by linear least squares: from an ARX model, from one of high order, and by the iteration of Steiglitz and
+//! McBride.
 
 use hoid_core::{
     filter::{divide_in_place, fir},
@@ -9,10 +9,10 @@ use hoid_model::{Orders, polynomial::reflected_inside};
 
 use crate::criterion::{Criterion, Data, InitialState, Workspace, first_residual};
 
-/// Steps of Steiglitz and McBride.
+/// Number of steps of Steiglitz and McBride.
 const STEIGLITZ_MCBRIDE_STEPS: usize = 4;
 
-/// A of an ARX fit with as many poles as F has, unstable ones reflected into the circle.
+/// Returns A of an ARX fit with as many poles as F has, with unstable ones reflected into the circle.
 pub(crate) fn arx_poles(criterion: &Criterion<'_>, data: &[Data<'_>], workspace: &mut Workspace) -> Option<Vec<f64>> {
     let orders = Orders {
         na: criterion.orders.nf,
@@ -35,7 +35,7 @@ pub(crate) fn arx_poles(criterion: &Criterion<'_>, data: &[Data<'_>], workspace:
     reflected_inside(&theta[..orders.na])
 }
 
-/// F of the noise-free response of an ARX model of high order.
+/// Returns F of the noise-free response of an ARX model of high order.
 pub(crate) fn reduced_arx(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Option<Vec<f64>> {
     let o = criterion.orders;
     let orders = Orders {
@@ -78,7 +78,7 @@ pub(crate) fn reduced_arx(criterion: &Criterion<'_>, workspace: &mut Workspace) 
     steiglitz_mcbride(&clean, f, workspace)
 }
 
-/// Coefficients that the high-order ARX model has more in A and in B.
+/// Number of additional coefficients of the high-order ARX model in A and in B.
 const HIGHER: usize = 8;
 
 pub(crate) fn steiglitz_mcbride(

@@ -1,14 +1,13 @@
-//! Starts from all over the region of stability, for records that have many minima: short ones, and
-//! models with more coefficients than the operator's.
+//! Starts from the whole region of stability, for records with many minima: short ones, and models with more
+//! coefficients than the operator's.
 //!
-//! Given F, C and D the residual is affine in B; given F, C and B it is affine in D. So two grids
-//! that has no information about the data, one of F and one of C, and least squares for the rest,
-//! reach every kind of minimum: slow real poles next to each other, a resonance, C and D that nearly
-//! cancel each other at any frequency.
+//! Given F, C and D the residual is affine in B; given F, C and B it is affine in D. So two grids that do not depend on
+//! the data, one of F and one of C, and least squares for the rest reach every kind of minimum: adjacent slow real
+//! poles, a resonance, C and D that nearly cancel at any frequency.
 //!
-//! **Systems**, B and F: that of the minimum that is known; those of refined instrumental variables
-//! with autoregressive noise of two orders ([`crate::iv::refined_system`]); and the best places of
-//! a grid of poles ([`super::pole_grid::anywhere`]), ranked with an autoregression for their noise.
+//! **Systems**, B and F: that of the known minimum; those of refined instrumental variables with autoregressive noise
+//! of two orders ([`crate::iv::refined_system`]); and the best places of a grid of poles
+//! ([`super::pole_grid::anywhere`]), ranked with an autoregression for their noise.
 //!
 //! **Noise models** of each system: C from a grid of its roots, D by least squares, and B once more
 //! with them. Those with the smallest loss are starts.
@@ -24,9 +23,9 @@ use crate::{
     optimize::Objective,
 };
 
-/// Places of the grid of poles that are taken.
+/// Number of places of the grid of poles that are used.
 const PLACES: usize = 8;
-/// Noise models of a system that is fitted, and of one of the grid.
+/// Number of noise models for a fitted system, and for one of the grid.
 const NOISE_MODELS: (usize, usize) = (4, 1);
 /// Orders of the autoregression of the instrumental variables.
 const IV_NOISE: [usize; 2] = [2, 6];
@@ -41,7 +40,7 @@ struct System {
     noise_models: usize,
 }
 
-/// The starts, each complete, the best first; `known` is a minimum.
+/// Returns the starts, each complete, the best first; `known` is a minimum.
 pub(crate) fn broad_starts(criterion: &Criterion<'_>, known: &[f64], workspace: &mut Workspace) -> Vec<Start> {
     let o = criterion.orders;
     let fitted = |label, b: &[f64], f: &[f64]| System {
@@ -64,7 +63,7 @@ pub(crate) fn broad_starts(criterion: &Criterion<'_>, known: &[f64], workspace: 
     starts
 }
 
-/// The places of the grid of poles with the smallest loss, each with an autoregression of its own.
+/// Returns the places of the grid of poles with the smallest loss, each with its own autoregression.
 fn best_places(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<System> {
     let o = criterion.orders;
     let coloured = o.nc + o.nd > 0;
@@ -107,7 +106,7 @@ fn best_places(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Syst
     places.iter().take(PLACES).map(system).collect()
 }
 
-/// A system with the noise models that suit it best.
+/// Returns a system with its best noise models.
 fn with_noise_models(criterion: &Criterion<'_>, system: &System, workspace: &mut Workspace) -> Vec<Start> {
     let o = criterion.orders;
     let mut starts = Vec::new();

@@ -3,8 +3,8 @@
 
 use hoid_model::{Complex64, Orders, polynomial};
 
-/// Theta with the roots of C drawn towards the origin, `c_i rho^i`, and with pairs of them turned
-/// off the real axis: starts for a search that ended on the unit circle.
+/// Returns theta with the roots of C moved towards the origin, `c_i rho^i`, and with pairs of them turned off the real
+/// axis: starts for a search that ended on the unit circle.
 pub(crate) fn with_c_drawn_inside(o: &Orders, theta: &[f64]) -> Vec<Vec<f64>> {
     let block = o.na + o.nb..o.na + o.nb + o.nc;
     let c = &theta[block.clone()];
@@ -30,5 +30,5 @@ pub(crate) fn with_c_drawn_inside(o: &Orders, theta: &[f64]) -> Vec<Vec<f64>> {
     all
 }
 
-/// Factors by which roots on the circle are drawn inside.
+/// Factors by which roots on the circle are moved inwards.
 const DRAWN: [f64; 5] = [0.98, 0.95, 0.9, 0.8, 0.6];

@@ -1,13 +1,12 @@
-//! A start from the low-passed record: few samples, and a loss with few minima.
+//! A start from the low-pass filtered record, which has few samples and a loss with few minima.
 //!
-//! Input and output pass the same moving average over K samples and are taken every K samples; the
-//! system between them is, at low frequencies, the same with its poles raised to the power K. There
-//! the search runs to its end from each of a few poles of the grid for about 1/K of the cost, and
-//! the poles of the minimum that it finds, taken back by the K-th root, start the search on the
-//! record itself. The delay becomes a fraction of a sample, so that B gets one coefficient more.
+//! Input and output are filtered by the same moving average over K samples and decimated by K; at low frequencies the
+//! system between them is the same with its poles raised to the power K. There the search runs to its end from each of
+//! a few poles of the grid for about 1/K of the cost, and the K-th roots of the poles of the resulting minimum are the
+//! start of the search on the record itself. The delay becomes a fraction of a sample, so that B has one additional
+//! coefficient.
 //!
-//! Only a start: where the system is fast compared with K samples it is a bad one, and others are
-//! tried as well.
+//! It is only a start: for a system that is fast compared with K samples it is a bad one, and others are tried as well.
 
 use hoid_model::{Complex64, Orders, SampleTime, polynomial, polynomial_model::monic};
 
@@ -19,37 +18,36 @@ use crate::{
     optimize::{Objective, SearchMethod, SearchOptions},
 };
 
-/// Samples that each record keeps at least.
+/// Least number of samples that each record keeps.
 const SAMPLES_LEFT: usize = 800;
 /// Largest K.
 const LARGEST_FACTOR: usize = 8;
-/// Coefficients of D that a start needs at most.
+/// Largest number of coefficients of D in a start.
 const LARGEST_ND: usize = 2;
-/// Poles of the grid from which the search runs.
+/// Number of poles of the grid from which a search runs.
 const SEARCHED: usize = 2;
-/// The search on the averaged record.
+/// Limits of the search on the averaged record.
 const SEARCH: SearchOptions = SearchOptions {
     method: SearchMethod::LevenbergMarquardt,
     max_iterations: 30,
     tolerance: 1e-6,
 };
 
-/// `|ln z|` of a pole of the averaged record below which it lies well inside what the average
-/// leaves (its Nyquist frequency is pi).
+/// `|ln z|` of a pole of the averaged record below which it is well inside the remaining band (its Nyquist frequency is
+/// pi).
 const SLOW: f64 = 1.3;
 
-/// The poles that the averaged record gives.
+/// The poles from the averaged record.
 #[derive(Debug, Default)]
 pub(crate) struct SlowPoles {
-    /// Polynomials F, best first; none if the records are short or the model has no poles in F
-    /// alone.
+    /// Polynomials F, best first; empty if the records are short or the model does not have its poles in F alone.
     pub f: Vec<Vec<f64>>,
-    /// True when all poles of the best one are slow compared with the average, so that it
-    /// determines nearly all that the record does.
+    /// True if all poles of the best one are slow compared with the average, so that it determines nearly as much as
+    /// the record does.
     pub complete: bool,
 }
 
-/// Proposals for F.
+/// Returns proposals for F.
 pub(crate) fn slow_poles(criterion: &Criterion<'_>, sample_time: SampleTime, workspace: &mut Workspace) -> SlowPoles {
     let Some(averaged) = AveragedRecords::of(criterion, sample_time) else {
         return SlowPoles::default();
@@ -75,7 +73,7 @@ pub(crate) struct AveragedRecords {
 }
 
 impl AveragedRecords {
-    /// `None` if the records are too short, or the model has no poles in F alone.
+    /// Returns `None` if the records are too short, or the model does not have its poles in F alone.
     pub fn of(criterion: &Criterion<'_>, sample_time: SampleTime) -> Option<Self> {
         let shortest = criterion.data.iter().map(|d| d.u.len()).min().unwrap_or(0);
         let factor = (shortest / SAMPLES_LEFT).min(LARGEST_FACTOR);
@@ -115,15 +113,15 @@ impl AveragedRecords {
     }
 }
 
-/// The search on the averaged records: the places of the pole grid are ranked with one noise model,
-/// that of the first of them, and the best are searched from.
+/// The search on the averaged records: the places of the pole grid are ranked with one noise model, that of the first
+/// of them, and searches start from the best.
 pub(crate) struct Continuation<'c> {
     low: &'c Criterion<'c>,
     factor: usize,
     grid: Vec<Vec<f64>>,
-    /// The noise model of the ranking, once it is known.
+    /// The noise model of the ranking, when it is known.
     noise: Option<Vec<f64>>,
-    /// The place of the grid that is tried, and its number.
+    /// The current place of the grid, and its number.
     trial: Option<Start>,
     tried: usize,
     ranked: Vec<Start>,
@@ -131,7 +129,7 @@ pub(crate) struct Continuation<'c> {
 }
 
 impl<'c> Continuation<'c> {
-    /// On these records, of which `low` is the criterion.
+    /// Creates the search on these records, of which `low` is the criterion.
     pub fn new(averaged: &AveragedRecords, low: &'c Criterion<'c>) -> Self {
         let grid = pole_grid(low.orders.nf, averaged.sample_time);
         let mut continuation = Self {
@@ -148,7 +146,7 @@ impl<'c> Continuation<'c> {
         continuation
     }
 
-    /// To the next place of the grid, and from the last to the searches.
+    /// Continues with the next place of the grid, and after the last with the searches.
     fn go_on(&mut self) {
         let o = &self.low.orders;
         let start = |noise: &[f64], f: &[f64], left| {
@@ -168,7 +166,7 @@ impl<'c> Continuation<'c> {
         }
     }
 
-    /// What it has come to.
+    /// Returns the result.
     pub fn slow(self) -> SlowPoles {
         let o = &self.low.orders;
         let mut minima = self.searches.map(|searches| searches.minima).unwrap_or_default();
@@ -235,7 +233,7 @@ impl LinearisationClient for Continuation<'_> {
     }
 }
 
-/// Means of consecutive groups of samples; a remainder at the end is left out.
+/// Returns the means of consecutive groups of samples; a remainder at the end is left out.
 fn averaged(x: &[f64], factor: usize) -> Vec<f64> {
     let scale = 1.0 / factor as f64;
     x.chunks_exact(factor)
@@ -243,8 +241,8 @@ fn averaged(x: &[f64], factor: usize) -> Vec<f64> {
         .collect()
 }
 
-/// The polynomial whose roots are the principal K-th roots; `None` if a root has none that is real
-/// with it (on the closed negative axis).
+/// Returns the polynomial whose roots are the principal K-th roots; `None` if a root is on the closed negative axis, so
+/// that the result would not be real.
 fn root_of_poles(f: &[f64], factor: usize) -> Option<Vec<f64>> {
     let k = factor as f64;
     let roots: Option<Vec<Complex64>> = polynomial::roots(&monic(f))?

@@ -1,29 +1,25 @@
-//! Starts of the Box-Jenkins search, so that the user need not guess.
+//! Automatic starts of the Box-Jenkins search.
 //!
-//! The poles decide: given F, the model is linear in B, and given B and F the noise model is a
-//! linear autoregression. So each start is a proposal for F that is completed by linear least
-//! squares:
+//! The poles are decisive: given F, the model is linear in B, and given B and F the noise model is a linear
+//! autoregression. So each start is a proposal for F that is completed by linear least squares:
 //!
 //! 1. `low-pass continuation`: the minimum on the averaged record
 //!    ([`crate::initial_guess::continuation`]), searched from the pole grid.
-//! 2. `pole grid`, where the record is too short for that: for two poles and more, neuromuscular
-//!    frequencies from 3 to 24 rad/s with damping 0.25 and 0.7, the range of human operators,
-//!    through the exact zero-order hold.
+//! 2. `pole grid`, if the record is too short for that: for two poles and more, neuromuscular frequencies from 3 to 24
+//!   rad/s with damping 0.25 and 0.7, the range of human operators, through the exact zero-order hold.
 //! 3. `steiglitz-mcbride`: ARX, and again on input and output filtered by 1/F of the step before, a
 //!    few times (K. Steiglitz and L. E. McBride, *IEEE Trans. Automatic Control* 10 (1965)
 //!    461-464). The `arx` poles themselves, badly biased where the noise poles are not those of the
 //!    system (m0 = 1: a2 near 0), only where that fails.
-//! 4. `high-order arx`: an ARX model with a given number of poles that the noise has some of its
-//!    own, and the poles of its noise-free response by Steiglitz and McBride (B. Wahlberg,
-//!    *Automatica* 25 (1989) 829-841, in its simplest form).
+//! 4. `high-order arx`: an ARX model with additional poles for the noise, and the poles of its noise-free response by
+//!   Steiglitz and McBride (B. Wahlberg, *Automatica* 25 (1989) 829-841, in its simplest form).
 //! 5. `instruments`: ARX, instrumental variables twice, the residual, C and D from it
 //!    ([`crate::iv`]).
 //!
-//! The last three only where the poles of the first are not all slow compared with its average:
-//! there it determines nearly all that the record does. The proposals are ranked by their loss with
-//! the initial states eliminated; the search runs from the best of them, and the best minimum wins.
-//! Short records and larger models have more minima than these find: there others are tried
-//! afterwards ([`crate::initial_guess::broad`]).
+//! The last three are used only if the poles of the first are not all slow compared with its average: otherwise it
+//! determines nearly as much as the record does. The proposals are ranked by their loss with the initial states
+//! eliminated; the search runs from the best of them, and the best minimum is used. Short records and larger models
+//! have more minima than these find: for them others are tried afterwards ([`crate::initial_guess::broad`]).
 
 use hoid_model::{Orders, SampleTime, polynomial::reflected_inside};
 
@@ -41,10 +37,10 @@ use crate::{
     optimize::Objective,
 };
 
-/// Proposals that are completed with a noise model of their own.
+/// Number of proposals that are completed with their own noise model.
 const COMPLETED: usize = 4;
 
-/// The starts, with the remaining unknowns.
+/// Returns the starts, with the remaining unknowns.
 pub(crate) fn initial_guesses(
     criterion: &Criterion<'_>,
     sample_time: SampleTime,
@@ -54,7 +50,7 @@ pub(crate) fn initial_guesses(
     initial_guesses_beside(slow, criterion, sample_time, workspace)
 }
 
-/// As [`initial_guesses`], with the poles that the averaged record has given.
+/// As [`initial_guesses`], with the poles from the averaged record.
 pub(crate) fn initial_guesses_beside(
     slow: SlowPoles,
     criterion: &Criterion<'_>,
@@ -111,8 +107,7 @@ fn from_poles(
     starts
 }
 
-/// Proposals for F with A, B and a noise model of their own: to be found, or found where A or C
-/// takes part.
+/// Returns proposals for F with their own A, B and noise model: to be found, or already found if the model has A or C.
 fn completed(criterion: &Criterion<'_>, proposals: Vec<(String, Vec<f64>)>, workspace: &mut Workspace) -> Vec<Start> {
     let o = &criterion.orders;
     let in_steps = o.na + o.nc == 0 && criterion.initial != InitialState::Backcast;
@@ -128,8 +123,7 @@ fn completed(criterion: &Criterion<'_>, proposals: Vec<(String, Vec<f64>)>, work
         .collect()
 }
 
-/// The pole grid, best first: all are ranked with the noise model of the first one, which costs one
-/// pass each.
+/// Returns the pole grid, best first: all are ranked with the noise model of the first one, which costs one pass each.
 fn ranked_grid(
     criterion: &Criterion<'_>,
     sample_time: SampleTime,
@@ -154,10 +148,9 @@ fn ranked_grid(
     ranked.into_iter().take(count).map(|(label, f, _)| (label, f)).collect()
 }
 
-/// Theta and sum of squares for a given F: A and B by least squares, the noise model by
-/// autoregression of the residual, and A and B once more with that noise model. With A in the model
-/// that is repeated: A and the noise model depend on each other (generalised least squares; D. W.
-/// Clarke, *IFAC Symposium on Identification*, Prague 1967).
+/// Returns theta and sum of squares for a given F: A and B by least squares, the noise model by autoregression of the
+/// residual, and A and B once more with that noise model. If the model has A, this is repeated: A and the noise model
+/// depend on each other (generalised least squares; D. W. Clarke, *IFAC Symposium on Identification*, Prague 1967).
 fn complete(criterion: &Criterion<'_>, f: &[f64], workspace: &mut Workspace) -> Option<(Vec<f64>, f64)> {
     let o = criterion.orders;
     let linear = o.na + o.nb;

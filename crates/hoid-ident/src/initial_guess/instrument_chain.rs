@@ -3,9 +3,8 @@
 //! IV estimate, instruments and estimate once more, the residual of that system, a long
 //! autoregression of it, and C and D by regression on past residuals and past innovations.
 //!
-//! Consistent in an open loop for any noise; in a closed loop biased by as much as the input
-//! follows the noise, which is little where the loop has a delay longer than the memory of the
-//! noise. About ten passes over the data.
+//! Consistent in an open loop for any noise; in a closed loop it is biased as far as the input follows the noise, which
+//! is little if the loop has a delay longer than the memory of the noise. About ten passes over the data.
 
 use hoid_model::Orders;
 
@@ -17,8 +16,8 @@ use crate::{
     optimize::Objective,
 };
 
-/// Theta for the orders of the criterion; `None` where A and F are both there (the chain does not
-/// distinguish their poles), where there is no input, and where the data do not carry it.
+/// Returns theta for the orders of the criterion; `None` if the model has both A and F (the chain does not distinguish
+/// their poles), without an input, and if the data are not sufficient.
 pub(crate) fn instrument_chain(criterion: &Criterion<'_>) -> Option<Vec<f64>> {
     let o = criterion.orders;
     if o.nb == 0 || (o.na > 0 && o.nf > 0) {

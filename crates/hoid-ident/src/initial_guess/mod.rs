@@ -1,13 +1,13 @@
-//! Where a search starts if no start is given: the poles decide.
+//! Automatic starts of a search: the poles are decisive.
 //!
 //! | module | contents |
 //! |---|---|
-//! | `guesses` | the starts of a criterion, from the proposals of the others |
+//! | `guesses` | the starts of a criterion, from the proposals of the other modules |
 //! | `continuation` | poles of the averaged record |
 //! | `pole_grid`, `arx_poles` | poles in the range of human operators; poles by linear least squares |
-//! | `shared_poles` | models whose A is next to a noise model or next to F |
+//! | `shared_poles` | models with A and a noise model, or with A and F |
 //! | `instrument_chain` | instrumental variables, and C and D of the residual |
-//! | `broad` | starts from all over the region of stability, for records with many minima |
+//! | `broad` | starts from the whole region of stability, for records with many minima |
 //! | `c_drawn_inside` | starts for a search that ended on the unit circle |
 
 pub mod arx_poles;

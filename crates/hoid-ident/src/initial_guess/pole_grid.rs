@@ -1,6 +1,6 @@
-//! Poles that has no information about the data: in the range of human operators, F of an
-//! operator's neuromuscular system at a few frequencies and dampings, through the exact zero-order
-//! hold; and all over the unit disc, whatever the sample time.
+//! Poles that do not depend on the data: in the range of human operators, F of an operator's neuromuscular system at a
+//! few frequencies and dampings, through the exact zero-order hold; and over the whole unit disc, whatever the sample
+//! time.
 
 use hoid_model::{Complex64, SampleTime, polynomial};
 
@@ -11,7 +11,7 @@ const GRID_ZETA: [f64; 2] = [0.25, 0.7];
 /// Further poles of the grid for nf > 2: fast ones, which matter least.
 const EXTRA_POLE: f64 = 0.3;
 
-/// F of each place of the grid, with its name.
+/// Returns F of each place of the grid, with its name.
 pub(crate) fn pole_grid(nf: usize, sample_time: SampleTime) -> Vec<(String, Vec<f64>)> {
     GRID_OMEGA
         .into_iter()
@@ -26,12 +26,12 @@ pub(crate) fn pole_grid(nf: usize, sample_time: SampleTime) -> Vec<(String, Vec<
         .collect()
 }
 
-/// Real poles of the grid over the disc: closer to each other where they are slow.
+/// Real poles of the grid over the disc: closer together for slow ones.
 const REAL_POLES: [f64; 7] = [0.985, 0.95, 0.88, 0.7, 0.3, -0.5, -0.95];
 /// Angles of its pairs in rad, each with every radius.
 const ANGLES: [f64; 8] = [0.05, 0.1, 0.2, 0.4, 0.8, 1.3, 2.0, 2.6];
 const RADII: [f64; 2] = [0.98, 0.85];
-/// The third pole for nf > 2: slow, as the lag of an operator, or fast.
+/// The third pole for nf > 2: slow, like the lag of an operator, or fast.
 const THIRD_POLES: [f64; 2] = [0.95, EXTRA_POLE];
 
 /// Real roots of the grid of C.
@@ -40,7 +40,7 @@ const REAL_ZEROS: [f64; 6] = [0.98, 0.8, 0.3, -0.3, -0.8, -0.98];
 const ZERO_ANGLES: [f64; 7] = [0.1, 0.3, 0.7, 1.2, 1.7, 2.2, 2.7];
 const ZERO_RADIUS: f64 = 0.9;
 
-/// F with its poles all over the unit disc: slow and fast, real and in pairs.
+/// Returns F with poles over the whole unit disc: slow and fast, real and in pairs.
 pub(crate) fn anywhere(nf: usize) -> Vec<Vec<f64>> {
     let two = real_and_pairs(nf, &REAL_POLES, &ANGLES, &RADII);
     let third = if nf > 2 { &THIRD_POLES[..] } else { &THIRD_POLES[..1] };
@@ -57,7 +57,7 @@ pub(crate) fn anywhere(nf: usize) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// C with its roots all over the unit disc, close to the circle too; more than two are zero.
+/// Returns C with roots over the whole unit disc, also close to the circle; roots beyond two are zero.
 pub(crate) fn noise_zeros(nc: usize) -> Vec<Vec<f64>> {
     real_and_pairs(nc, &REAL_ZEROS, &ZERO_ANGLES, &[ZERO_RADIUS])
         .into_iter()
@@ -68,8 +68,8 @@ pub(crate) fn noise_zeros(nc: usize) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Every two of the real roots, one twice too, and every pair; single roots where there is one
-/// alone, and the empty set where there is none.
+/// Returns every two of the real roots, repetitions included, and every pair; single roots for a count of one, and the
+/// empty set for zero.
 fn real_and_pairs(count: usize, real: &[f64], angles: &[f64], radii: &[f64]) -> Vec<Vec<Complex64>> {
     let at = |x: f64| Complex64::new(x, 0.0);
     match count {

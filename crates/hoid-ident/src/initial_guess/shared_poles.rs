@@ -1,9 +1,8 @@
-//! Starts for models whose A is next to a noise model or next to F: which poles belong to A?
+//! Starts for models with A and a noise model, or with A and F: assignment of the poles.
 //!
-//! A belongs to the system and to the noise, F to the system and D to the noise alone, and the loss
-//! has a minimum at many a confusion of them: ARARX with a1 = -0.65, a2 = 0.11, d1 = -0.93 ends 40
-//! % too high from least squares, the pole of D in A. So the poles come from fits that has no
-//! information about the division, and every way to deal them out is a start:
+//! A belongs to the system and to the noise, F to the system and D to the noise only, and the loss has a minimum for
+//! many wrong assignments: ARARX with a1 = -0.65, a2 = 0.11, d1 = -0.93 ends 40 % too high from least squares, with the
+//! pole of D in A. So the poles come from fits that do not depend on the assignment, and every assignment is a start:
 //!
 //! - the poles of the system, A F, from instruments, which no coloured noise biases in an open loop
 //!   ([`crate::iv`]): any na of them are A, the rest F, and the noise model follows from what is
@@ -12,7 +11,7 @@
 //!   without its common factor: any nd of them are D, any nf of the rest F, and A and B follow by
 //!   least squares.
 //!
-//! A few steps of the search from each show which of them lead down.
+//! A few steps of the search from each show which of them decrease the loss.
 
 use hoid_model::{Complex64, Orders, polynomial, polynomial_model::monic};
 
@@ -24,20 +23,19 @@ use crate::{
     optimize::{SearchOptions, minimise},
 };
 
-/// Starts that are tried by a few steps, the best by their loss.
+/// Number of starts that are tried by a few steps, the best by their loss.
 const TRIED: usize = 8;
 /// Steps of the search from each.
 const STEPS: usize = 8;
-/// Poles, or pairs of them, that are dealt out at most.
+/// Largest number of poles, or pairs of them, that are assigned.
 const MAX_GROUPS: usize = 6;
 
-/// True if A is next to other polynomials that could take its poles.
+/// True if the model has A together with other polynomials that could contain its poles.
 pub(crate) fn concerns(o: &Orders) -> bool {
     o.na > 0 && o.nb > 0 && o.nc + o.nd + o.nf > 0
 }
 
-/// The best starts of both kinds and of `others`, after a few steps of the search, with their sums
-/// of squares.
+/// Returns the best starts of both kinds and of `others`, after a few steps of the search, with their sums of squares.
 pub(crate) fn initial_guesses(criterion: &Criterion<'_>, others: Vec<Start>, workspace: &mut Workspace) -> Vec<Start> {
     let mut starts = others;
     starts.extend(from_instruments(criterion, workspace));
@@ -115,8 +113,8 @@ fn from_long_arx(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<St
     starts
 }
 
-/// A start with given A, B and F: the noise model from the residual, and A and B once more with
-/// that noise model.
+/// Returns a start with given A, B and F: the noise model from the residual, and A and B once more with that noise
+/// model.
 fn start(
     label: &str,
     criterion: &Criterion<'_>,
@@ -144,7 +142,7 @@ fn coefficients(roots: &[Complex64]) -> Vec<f64> {
     polynomial::from_roots(roots)[1..].to_vec()
 }
 
-/// All ways to choose `count` of these poles, conjugates together: the chosen ones and the rest.
+/// Returns all ways to choose `count` of these poles, conjugates together: the chosen ones and the rest.
 fn dealt(poles: &[Complex64], count: usize) -> Vec<(Vec<Complex64>, Vec<Complex64>)> {
     let mut groups: Vec<&[Complex64]> = Vec::new();
     let mut left = poles;

@@ -5,26 +5,26 @@ use hoid_model::Structure;
 use super::equation::IvProblem;
 use crate::{IdentError, Termination, criterion::Criterion};
 
-/// A method: each is in a file of its own and is listed in [`IvMethod`](super::IvMethod).
+/// A method: each has its own file and is listed in [`IvMethod`](super::IvMethod).
 pub(super) struct Algorithm {
     /// Short name, as in options and tables.
     pub name: &'static str,
-    /// Its definition, in a line without a full stop.
+    /// Description, in a line without a full stop.
     pub help: &'static str,
-    /// Where it comes from.
+    /// Source in the literature.
     pub source: &'static str,
-    /// The structure that it fits, alone.
+    /// The only structure that it fits.
     pub structures: &'static [Structure; 1],
-    /// Theta, its covariance, and how the iteration ended.
+    /// Computes theta, its covariance, and the termination of the iteration.
     pub solve: fn(&IvProblem<'_>, &Criterion<'_>, IterationLimits) -> Result<IvSolution, IdentError>,
 }
 
-/// When a refined method ends.
+/// Termination criteria of a refined method.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct IterationLimits {
     /// Largest number of iterations.
     pub max_iterations: usize,
-    /// Largest step of the last iteration, as a share of the standard errors.
+    /// Largest step of the last iteration, relative to the standard errors.
     pub tolerance: f64,
 }
 
@@ -32,7 +32,7 @@ pub(super) struct IterationLimits {
 pub(super) struct IvSolution {
     /// Theta in the order of [`Orders::parameter_names`](hoid_model::Orders::parameter_names).
     pub theta: Vec<f64>,
-    /// Covariance by rows, where the method has one.
+    /// Covariance by rows, if the method has one.
     pub covariance: Option<Vec<f64>>,
     pub termination: Termination,
 }

@@ -5,14 +5,14 @@ use crate::linalg::least_squares::{add_scaled, dot};
 /// Columns over the rows of all records, one after the other.
 pub(crate) type Columns = Vec<Vec<f64>>;
 
-/// Part of a column that must be its own, in amplitude, for it not to count as a combination of
-/// those before it. Twice orthogonalised columns keep 1e-15.
+/// Least independent part of a column, in amplitude; below it the column counts as a combination of previous ones.
+/// Columns orthogonalised twice are accurate to 1e-15.
 const OWN_PART: f64 = 1e-10;
-/// Longest invented past in samples.
+/// Longest artificial past in samples.
 const PAST: usize = 256;
 
-/// The signal after an invented past, and the length of that past: reflected at the first sample
-/// and faded in, so that what is simulated from it starts without a jump.
+/// Returns the signal after an artificial past, and the length of that past: reflected at the first sample and faded
+/// in, so that simulations from it start without a jump.
 pub(super) fn with_past(x: &[f64]) -> (Vec<f64>, usize) {
     let length = PAST.min(x.len().saturating_sub(1));
     let fade = |k: usize| 0.5 + 0.5 * (std::f64::consts::PI * k as f64 / (length + 1) as f64).cos();
@@ -21,8 +21,7 @@ pub(super) fn with_past(x: &[f64]) -> (Vec<f64>, usize) {
     (extended, length)
 }
 
-/// Orthonormal basis of the columns by Gram-Schmidt, twice, and the indices of the columns that
-/// have a part of their own.
+/// Orthonormal basis of the columns by Gram-Schmidt, twice, and the indices of the linearly independent columns.
 pub(super) fn orthonormal(columns: &[Vec<f64>]) -> (Columns, Vec<usize>) {
     let mut q: Columns = Vec::new();
     let mut kept = Vec::new();
@@ -46,7 +45,7 @@ pub(super) fn orthonormal(columns: &[Vec<f64>]) -> (Columns, Vec<usize>) {
     (q, kept)
 }
 
-/// A residual cut into its records.
+/// Splits a residual into its records.
 pub(super) fn cut(residual: &[f64], rows: &[usize]) -> Columns {
     let mut at = 0;
     rows.iter()

@@ -2,9 +2,9 @@
 //!
 //! For a residual with the covariance matrix R, independent of Z, `(Z' Phi)^-1 Z' R Z (Phi' Z)^-1`
 //! (T. Söderström and P. Stoica, *Instrumental Variable Methods for System Identification*, 1983,
-//! ch. 5). R is that of a long autoregression `D r = eps` of the residual:
-//! `Z' R Z = lambda (H'Z)' (H'Z)`, with H' the filter 1/D run backwards in time. Where the filter
-//! has made the residual white it is Ljung's (15.29), `lambda (Z'Z)^-1` for Z = Phi.
+//! ch. 5). R is that of a long autoregression `D r = eps` of the residual: `Z' R Z = lambda (H'Z)' (H'Z)`, with H' the
+//! filter 1/D run backwards in time. If the filter has made the residual white, it is Ljung's (15.29),
+//! `lambda (Z'Z)^-1` for Z = Phi.
 
 use hoid_core::filter::{divide_in_place, multiply};
 use hoid_model::polynomial::reflected_inside;
@@ -32,13 +32,13 @@ fn coloured_noise(residual: &[Vec<f64>], parameters: usize) -> (Vec<f64>, f64) {
         total += dot(whole, whole);
         rows += whole.len();
     }
-    // Degrees of freedom that the parameters have taken, as for the innovation variance.
+    // Degrees of freedom used by the parameters, as for the innovation variance.
     let freedom = n as f64 / n.saturating_sub(parameters).max(1) as f64;
     (d, total / rows.max(1) as f64 * freedom)
 }
 
-/// `(Z' Phi)^-1 lambda K' K (Phi' Z)^-1` by rows, where K is Z with the spectrum of the residual
-/// applied to those columns that do not depend on it. `None` where `Z' Phi` has no inverse.
+/// Returns `(Z' Phi)^-1 lambda K' K (Phi' Z)^-1` by rows, where K is Z with the spectrum of the residual applied to the
+/// columns that are independent of it. `None` if `Z' Phi` is singular.
 pub(super) fn covariance(
     z: &[Vec<f64>],
     phi: &[Vec<f64>],
@@ -47,7 +47,7 @@ pub(super) fn covariance(
 ) -> Option<Vec<f64>> {
     let p = z.len();
     let (d, lambda) = coloured_noise(residual, p);
-    // Unit columns: the units of the parameters do not reach the inverse.
+    // Unit columns: the units of the parameters have no effect on the inverse.
     let length = |column: &Vec<f64>| dot(column, column).sqrt();
     let (of_z, of_phi): (Vec<f64>, Vec<f64>) = (z.iter().map(length).collect(), phi.iter().map(length).collect());
     let k: Columns = z

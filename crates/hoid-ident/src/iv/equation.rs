@@ -1,9 +1,9 @@
 //! The filtered equation, its instruments and its solution.
 //!
 //! With poles `f_1 .. f_n` (of A or F) the equation reads
-//! `u(t) = -f_1 u(t-1) - .. + b_0 e(t-nk) + .. + r(t)`; a filter L is applied to each of its
-//! columns, at rest at the first row. The instruments are the same columns made of the noise-free
-//! input x and of `(B/F) q^-nk x`, under the same filter.
+//! `u(t) = -f_1 u(t-1) - .. + b_0 e(t-nk) + .. + r(t)`; a filter L is applied to each of its columns, at rest at the
+//! first row. The instruments are the same columns with the noise-free input x and with `(B/F) q^-nk x`, under the same
+//! filter.
 //!
 //! **Solution.** `Z = Q T` with orthonormal Q (Gram-Schmidt, twice), then `Q' Phi theta = Q' y` by
 //! QR with column pivoting: the condition of Z does not enter twice, and the rank is decided as for
@@ -35,8 +35,7 @@ pub(crate) struct Prefilter<'p> {
 }
 
 impl Prefilter<'_> {
-    /// The filtered signal from the first sample at which D has all its samples; 1/(C F) is at rest
-    /// there.
+    /// Filters the signal from the first sample at which D has all its samples; 1/(C F) is at rest there.
     fn apply(&self, x: &[f64]) -> Vec<f64> {
         let mut y = vec![0.0; x.len()];
         multiply(self.d, x, &mut y);
@@ -50,14 +49,14 @@ impl Prefilter<'_> {
 /// A noise-free input.
 #[derive(Debug, Clone)]
 pub(crate) struct Source<'a> {
-    /// The input of each record, whole.
+    /// The whole input of each record.
     pub inputs: Vec<Cow<'a, [f64]>>,
-    /// Samples in which instruments are made of it, counted through all records.
+    /// Samples for which it gives instruments, counted through all records.
     pub samples: Range<usize>,
 }
 
 impl<'a> Source<'a> {
-    /// The measured inputs, for all samples.
+    /// Returns the measured inputs, for all samples.
     pub fn measured(data: &[Data<'a>]) -> Vec<Self> {
         vec![Self {
             inputs: data.iter().map(|d| Cow::Borrowed(d.e)).collect(),
@@ -66,14 +65,13 @@ impl<'a> Source<'a> {
     }
 }
 
-/// Data, noise-free inputs and orders. The system is a vector `[f_1 .. f_n, b_0 .. ]`, with A in
-/// place of F for ARX.
+/// Data, noise-free inputs and orders. The system is a vector `[f_1 .. f_n, b_0 .. ]`, with A instead of F for ARX.
 pub(crate) struct IvProblem<'a> {
     pub poles: usize,
     pub nb: usize,
     pub nk: usize,
     pub data: Vec<Data<'a>>,
-    /// Noise-free inputs; each serves in its own rows.
+    /// Noise-free inputs; each is used for its own rows.
     pub sources: Vec<Source<'a>>,
     /// First row of each record.
     pub first: usize,
@@ -88,7 +86,7 @@ pub(crate) struct Equation {
 }
 
 impl<'a> IvProblem<'a> {
-    /// The equation of these orders; na and nf are not both positive.
+    /// Creates the problem for these orders; na and nf are not both positive.
     pub fn new(orders: &Orders, data: Vec<Data<'a>>, sources: Vec<Source<'a>>) -> Self {
         let letter = if orders.na > 0 { 'a' } else { 'f' };
         let poles = orders.na + orders.nf;
@@ -107,7 +105,7 @@ impl<'a> IvProblem<'a> {
         }
     }
 
-    /// The same equation for other signals.
+    /// Returns the same problem for other signals.
     pub fn of<'b>(&self, data: Vec<Data<'b>>, sources: Vec<Source<'b>>) -> IvProblem<'b> {
         IvProblem {
             poles: self.poles,
@@ -120,7 +118,7 @@ impl<'a> IvProblem<'a> {
         }
     }
 
-    /// Rows of each record under a filter whose D has this order.
+    /// Returns the number of rows of each record for a filter whose D has this order.
     pub fn rows(&self, order_of_d: usize) -> Vec<usize> {
         self.data
             .iter()
@@ -128,7 +126,7 @@ impl<'a> IvProblem<'a> {
             .collect()
     }
 
-    /// Filtered columns `[-u(t-i), e(t-nk-j)]` of these outputs and inputs.
+    /// Returns the filtered columns `[-u(t-i), e(t-nk-j)]` of these outputs and inputs.
     fn columns(&self, filter: Prefilter<'_>, signals: &[(&[f64], &[f64])]) -> Columns {
         let shifted = |lag: usize, input: bool| {
             let mut column = Vec::new();
@@ -147,7 +145,7 @@ impl<'a> IvProblem<'a> {
             .collect()
     }
 
-    /// `(B/F) q^-nk x` of a system with stable F and a noise-free input x.
+    /// Returns `(B/F) q^-nk x` of a system with stable F and a noise-free input x.
     fn simulate(&self, system: &[f64], x: &[f64]) -> Vec<f64> {
         let (f, b) = system.split_at(self.poles);
         let (extended, past) = with_past(x);
@@ -158,8 +156,8 @@ impl<'a> IvProblem<'a> {
         output
     }
 
-    /// The filtered equation with instruments from the noise-free inputs and what this system (with
-    /// stable F) makes of them.
+    /// Returns the filtered equation with instruments from the noise-free inputs and the output that this system (with
+    /// stable F) simulates from them.
     pub fn equation(&self, filter: Prefilter<'_>, system: &[f64]) -> Equation {
         let measured: Vec<(&[f64], &[f64])> = self.data.iter().map(|d| (d.u, d.e)).collect();
         let mut equation = Equation {
@@ -199,7 +197,7 @@ impl<'a> IvProblem<'a> {
         z
     }
 
-    /// Rows of a range of samples that is counted through all records.
+    /// Returns the rows of a range of samples that is counted through all records.
     fn rows_of(&self, samples: &Range<usize>, order_of_d: usize) -> Vec<Range<usize>> {
         let (mut sample, mut row) = (0, 0);
         let mut found = Vec::new();
@@ -220,7 +218,7 @@ impl<'a> IvProblem<'a> {
             .collect()
     }
 
-    /// Initial-state responses of 1/(C F) in each record, with its rows.
+    /// Returns the initial-state responses of 1/(C F) in each record, with its rows.
     fn initial_state_responses(&self, filter: Prefilter<'_>) -> Vec<(InitialStateResponses, usize)> {
         let poles = product(&monic(filter.c), &monic(filter.f));
         let past = InitialHistory {
@@ -238,10 +236,10 @@ impl<'a> IvProblem<'a> {
             .collect()
     }
 
-    /// The prediction error `eps = (D/C) (u - (B/F) q^-nk e)` of a system with stable F, 1/(C F) at
-    /// rest at the first row, and its negative gradient psi for F and B, where `filter` is
-    /// `D/(C F)` with the same F: from `F C eps = D (F u - B q^-nk e)`,
-    /// `psi_fi = -(D/(C F)) u(t-i) + (1/F) eps(t-i)` and `psi_bj = (D/(C F)) e(t-nk-j)`.
+    /// Returns the prediction error `eps = (D/C) (u - (B/F) q^-nk e)` of a system with stable F, with 1/(C F) at rest
+    /// at the first row, and its negative gradient psi for F and B, where `filter` is `D/(C F)` with the same F: from
+    /// `F C eps = D (F u - B q^-nk e)`, `psi_fi = -(D/(C F)) u(t-i) + (1/F) eps(t-i)` and
+    /// `psi_bj = (D/(C F)) e(t-nk-j)`.
     pub fn prediction_error(&self, filter: Prefilter<'_>, system: &[f64]) -> (Vec<f64>, Columns) {
         let measured: Vec<(&[f64], &[f64])> = self.data.iter().map(|d| (d.u, d.e)).collect();
         let mut psi = self.columns(filter, &measured);
@@ -263,7 +261,7 @@ impl<'a> IvProblem<'a> {
         (eps, psi)
     }
 
-    /// Least squares on the filtered equation.
+    /// Solves the filtered equation by least squares.
     pub fn least_squares(&self, filter: Prefilter<'_>) -> Result<Vec<f64>, IdentError> {
         let measured: Vec<(&[f64], &[f64])> = self.data.iter().map(|d| (d.u, d.e)).collect();
         let free = self.initial_state_responses(filter);
@@ -283,7 +281,7 @@ impl<'a> IvProblem<'a> {
         Ok(solved.solution())
     }
 
-    /// Orthonormal basis of the instruments.
+    /// Returns an orthonormal basis of the instruments.
     ///
     /// # Errors
     /// [`IdentError::SingularInstruments`].
@@ -300,7 +298,7 @@ impl<'a> IvProblem<'a> {
         Ok(q)
     }
 
-    /// Solution of `Z' Phi theta = Z' y`.
+    /// Solves `Z' Phi theta = Z' y`.
     ///
     /// # Errors
     /// [`IdentError::SingularInstruments`].
@@ -331,10 +329,10 @@ impl<'a> IvProblem<'a> {
         }
     }
 
-    /// The system with its poles inside the unit circle, and whether they had to be moved.
+    /// Returns the system with its poles inside the unit circle, and whether they had to be moved.
     ///
     /// # Errors
-    /// [`IdentError::NoFiniteLoss`] where the roots cannot be found.
+    /// [`IdentError::NoFiniteLoss`] if the roots cannot be found.
     pub fn stabilised(&self, system: &[f64]) -> Result<(Vec<f64>, bool), IdentError> {
         let mut stable = reflected_inside(&system[..self.poles]).ok_or(IdentError::NoFiniteLoss)?;
         let moved = stable != system[..self.poles];
@@ -344,7 +342,7 @@ impl<'a> IvProblem<'a> {
 }
 
 impl Equation {
-    /// `y - Phi theta`.
+    /// Returns `y - Phi theta`.
     pub fn residual(&self, theta: &[f64]) -> Vec<f64> {
         let mut r = self.y.clone();
         for (column, t) in self.phi.iter().zip(theta) {

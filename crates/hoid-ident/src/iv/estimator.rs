@@ -23,21 +23,21 @@ const EXACT: f64 = 1e-11;
 /// An estimator by instrumental variables.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InstrumentalVariable {
-    /// The method; it decides the structure.
+    /// The method, which determines the structure.
     pub method: IvMethod,
     /// The orders.
     pub orders: Orders,
-    /// Components of the instruments.
+    /// The instruments.
     pub instruments: Instruments,
     /// Largest number of iterations of the refined methods. Default 100.
     pub max_iterations: usize,
-    /// The refined methods have settled when an iteration moves theta by less than this share of
-    /// its standard errors. Default 1e-4.
+    /// The refined methods have converged when an iteration moves theta by less than this share of its standard errors.
+    /// Default 1e-4.
     pub tolerance: f64,
 }
 
 impl InstrumentalVariable {
-    /// An estimator with the default options and simulated instruments.
+    /// Creates an estimator with the default options and simulated instruments.
     pub fn new(method: IvMethod, orders: Orders) -> Self {
         Self {
             method,
@@ -48,7 +48,7 @@ impl InstrumentalVariable {
         }
     }
 
-    /// Fits one model to all records: a common theta, initial states of each for the residuals.
+    /// Fits one model to all records: a common theta, and initial states of each record for the residuals.
     ///
     /// # Errors
     /// [`IdentError`]; how an iteration ended is part of the fit.
@@ -122,8 +122,7 @@ impl InstrumentalVariable {
         })
     }
 
-    /// Refuses fewer rows of the filtered equation than parameters and initial states of the
-    /// filter.
+    /// Refuses problems with fewer rows of the filtered equation than parameters and initial states of the filter.
     fn check_rows(&self, problem: &IvProblem<'_>, records: &[Record]) -> Result<(), IdentError> {
         let o = &self.orders;
         let states = o.nf + o.nc;

@@ -5,17 +5,15 @@
 //!
 //! `L_0 = sqrt(1 - p^2) / (1 - p q^-1)`,  `L_k = L_{k-1} (q^-1 - p) / (1 - p q^-1)`
 //!
-//! whose weights are found by least squares (B. Wahlberg, *IEEE Trans. Automatic Control* 36 (1991)
-//! 551-562). A few dozen of them span the seconds that a loop remembers, where a finite impulse
-//! response would need hundreds of lags; the expansion is always stable; and for a sum of sinusoids
-//! it is the projection on their lines.
+//! whose weights are computed by least squares (B. Wahlberg, *IEEE Trans. Automatic Control* 36 (1991) 551-562). A few
+//! dozen of them cover the memory of a loop of some seconds, for which a finite impulse response would need hundreds of
+//! lags; the expansion is always stable; and for a sum of sinusoids it is the projection on their lines.
 //!
-//! The sum is made of f_t alone, so that the noise can reach it only through the weights: the noise
-//! of the record at the very lines of f_t, which is a good part of it where noise and f_t are both
-//! slow. So the record is cut into blocks, and the instruments of a block are made with weights
-//! from the other blocks (split-sample instruments, J. D. Angrist and A. B. Krueger, *J. Business
-//! Econ. Stat.* 13 (1995) 225-235), whose noise is independent of that in the block. Poor weights
-//! then cost variance, not bias.
+//! The sum depends on f_t alone, so that the noise can affect it only through the weights: by the noise of the record
+//! at the lines of f_t, which is a considerable part of it if noise and f_t are both slow. Therefore the record is cut
+//! into blocks, and the instruments of a block are computed with weights from the other blocks (split-sample
+//! instruments, J. D. Angrist and A. B. Krueger, *J. Business Econ. Stat.* 13 (1995) 225-235), whose noise is
+//! independent of that in the block. Poor weights then cost variance, not bias.
 //!
 //! The construction of instruments from an external signal is that of M. Gilson, H. Garnier, P. C.
 //! Young and P. Van den Hof, *IET Control Theory Appl.* 5 (2011) 1147-1154; they use the known
@@ -37,19 +35,19 @@ use super::{
     equation::Source,
 };
 
-/// Time constants of the filters in samples; the one with the smallest rest is taken.
+/// Time constants of the filters in samples; the one with the smallest residual is used.
 const TIME_CONSTANTS: [f64; 3] = [4.0, 16.0, 64.0];
-/// Number of filters, where the records are long enough.
+/// Number of filters, if the records are long enough.
 const FILTERS: usize = 24;
-/// Samples for each filter.
+/// Least number of samples per filter.
 const SAMPLES_EACH: usize = 10;
-/// Blocks whose input is made with weights from the others.
+/// Number of blocks whose input is computed with weights from the others.
 const BLOCKS: usize = 4;
-/// Pull of the weights to zero, against filters whose output lies in one block alone. The scale of
-/// an instrument does not matter.
+/// Ridge of the weights, against filters whose output is in one block alone. The scale of an instrument does not
+/// matter.
 const RIDGE: f64 = 0.02;
 
-/// The external signal of each record.
+/// Returns the external signal of each record.
 ///
 /// # Errors
 /// [`IdentError::NoChannel`], [`IdentError::NoExcitation`].
@@ -88,8 +86,8 @@ pub(super) fn signals<'a>(records: &'a [Record], name: &str) -> Result<Vec<&'a [
     Ok(found)
 }
 
-/// The part of each input that follows the external signals, once for each block of samples with
-/// weights from the others.
+/// Returns the part of each input that follows the external signals, once for each block of samples with weights from
+/// the others.
 pub(super) fn noise_free<'a>(external: &[&[f64]], data: &[Data<'a>]) -> Vec<Source<'a>> {
     let inputs: Vec<&[f64]> = data.iter().map(|d| d.e).collect();
     let lengths: Vec<usize> = inputs.iter().map(|e| e.len()).collect();
@@ -112,7 +110,7 @@ pub(super) fn noise_free<'a>(external: &[&[f64]], data: &[Data<'a>]) -> Vec<Sour
         .collect()
 }
 
-/// Weights of least squares on the samples outside of a block, drawn a little to zero.
+/// Returns least squares weights on the samples outside of a block, shrunk slightly towards zero.
 fn weights_of_others(basis: &[Vec<f64>], whole: &[f64], target: &[f64], block: Range<usize>) -> Option<Vec<f64>> {
     let p = basis.len();
     let mut gram = vec![0.0; p * p];
@@ -130,7 +128,7 @@ fn weights_of_others(basis: &[Vec<f64>], whole: &[f64], target: &[f64], block: R
     solve_symmetric(&gram, &right)
 }
 
-/// The part of each target that follows its driving signal, through one filter for all records.
+/// Returns the part of each target that follows its driving signal, through one filter for all records.
 pub(super) fn following(driving: &[&[f64]], targets: &[&[f64]]) -> Vec<Vec<f64>> {
     let lengths: Vec<usize> = targets.iter().map(|t| t.len()).collect();
     let target = targets.concat();
@@ -147,8 +145,8 @@ fn combination(basis: &[Vec<f64>], weights: &[f64], samples: usize) -> Vec<f64> 
     sum
 }
 
-/// Orthonormal basis of the filters' outputs, over all records, with the time constant that
-/// explains most of the targets.
+/// Returns an orthonormal basis of the outputs of the filters, over all records, with the time constant that explains
+/// most of the targets.
 fn best_basis(driving: &[&[f64]], targets: &[&[f64]]) -> Vec<Vec<f64>> {
     let target = targets.concat();
     let filters = FILTERS.min(target.len() / SAMPLES_EACH).max(1);
@@ -163,7 +161,7 @@ fn best_basis(driving: &[&[f64]], targets: &[&[f64]]) -> Vec<Vec<f64>> {
     best.1
 }
 
-/// Outputs of the filters with the pole p, over all records.
+/// Returns the outputs of the filters with the pole p, over all records.
 fn laguerre(driving: &[&[f64]], p: f64, filters: usize) -> Vec<Vec<f64>> {
     let mut columns: Vec<Vec<f64>> = vec![Vec::new(); filters];
     for x in driving {
@@ -192,7 +190,7 @@ mod tests {
     #[test]
     fn filters_are_orthonormal() {
         let mut impulse = vec![0.0; 4000];
-        // After the samples that the invented past is made of.
+        // After the samples from which the artificial past is computed.
         impulse[300] = 1.0;
         let columns = laguerre(&[&impulse], 0.9, 12);
         for (i, a) in columns.iter().enumerate() {

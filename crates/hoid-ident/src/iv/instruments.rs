@@ -1,26 +1,26 @@
-//! Components of the instruments.
+//! The choice of instruments.
 
 use std::fmt;
 
 use hoid_model::Record;
 
-/// Channel of the forcing function in a record that has one.
+/// Channel of the forcing function in a record.
 pub const FORCING_CHANNEL: &str = "f_t";
 
-/// Components of the instruments.
+/// The choice of instruments.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Instruments {
-    /// The input itself and the output that the model simulates from it. For an open loop: in a
-    /// closed one the input carries the noise, and the estimate is biased.
+    /// The input itself and the output that the model simulates from it. For an open loop: in a closed loop the input
+    /// contains the noise, and the estimate is biased.
     #[default]
     Simulated,
-    /// The part of the input that follows this channel, which the noise does not reach: the forcing
-    /// function f_t or a known disturbance. For a closed loop.
+    /// The part of the input that follows this channel, which is independent of the noise: the forcing function f_t or
+    /// a known disturbance. For a closed loop.
     External(String),
 }
 
 impl Instruments {
-    /// As users write them: `simulated`, or the name of a channel.
+    /// Parses the text of users: `simulated`, or the name of a channel.
     pub fn of_text(text: &str) -> Self {
         match text {
             "simulated" => Self::Simulated,
@@ -28,8 +28,8 @@ impl Instruments {
         }
     }
 
-    /// The forcing function f_t where all records have it: in a closed loop it is the signal that
-    /// the noise does not reach. Else those that are simulated.
+    /// Returns the forcing function f_t if all records have it: in a closed loop it is independent of the noise.
+    /// Otherwise simulated instruments.
     pub fn default_for(records: &[Record]) -> Self {
         if records.iter().all(|r| r.channel(FORCING_CHANNEL).is_some()) {
             Self::External(FORCING_CHANNEL.to_owned())

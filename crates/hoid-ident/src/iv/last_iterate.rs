@@ -1,4 +1,4 @@
-//! Where an iteration of instrumental variables ended.
+//! The last iterate of instrumental variables.
 
 use crate::{Termination, linalg::least_squares::dot};
 
@@ -12,7 +12,7 @@ pub(super) struct NoiseModel {
 }
 
 impl NoiseModel {
-    /// The filter `D/(C F)` with these poles.
+    /// Returns the filter `D/(C F)` with these poles.
     pub fn prefilter<'p>(&'p self, f: &'p [f64]) -> Prefilter<'p> {
         Prefilter {
             d: &self.d,
@@ -22,7 +22,7 @@ impl NoiseModel {
     }
 }
 
-/// Where the iteration ended.
+/// The last iterate.
 pub(super) struct LastIterate {
     pub system: Vec<f64>,
     pub noise: NoiseModel,
@@ -32,7 +32,7 @@ pub(super) struct LastIterate {
 }
 
 impl LastIterate {
-    /// Mean square of the filtered residual.
+    /// Returns the mean square of the filtered residual.
     pub fn variance(&self) -> f64 {
         let residual = self.equation.residual(&self.system);
         dot(&residual, &residual) / residual.len() as f64

@@ -1,14 +1,12 @@
 //! Instrumental variables.
 //!
-//! The equation `y = Phi theta + r` of a model that is linear in theta (A or F of the denominator,
-//! and B) gives a biased least squares estimate where r is correlated with the regressors, as past
-//! outputs always are and, in a closed loop, inputs too. With instruments Z that follow the
-//! regressors but not the noise,
+//! The equation `y = Phi theta + r` of a model that is linear in theta (A or F of the denominator, and B) gives a
+//! biased least squares estimate if r is correlated with the regressors, as past outputs always are and, in a closed
+//! loop, inputs too. With instruments Z that follow the regressors but not the noise,
 //!
 //! `Z' Phi theta = Z' y` (L. Ljung, *System Identification*, 1999, eq. 7.118)
 //!
-//! is consistent whatever the noise. The methods differ in their instruments and in the filter that
-//! is applied to the equation:
+//! is consistent whatever the noise is. The methods differ in their instruments and in the filter of the equation:
 //!
 //! | method | model | filter |
 //! |---|---|---|
@@ -16,30 +14,27 @@
 //! | [`IvMethod::Sriv`] | `u = (B/F) q^-nk e + eps` | 1/F, repeated |
 //! | [`IvMethod::RivBj`] | `u = (B/F) q^-nk e + (C/D) eps` | D/(C F), repeated |
 //!
-//! and instruments are made of an input that holds no noise: e itself in an open loop, and the part
-//! of e that follows an external signal such as the forcing function f_t in a closed one
-//! ([`Instruments`]).
+//! and instruments are computed from an input without noise: e itself in an open loop, and the part of e that follows
+//! an external signal such as the forcing function f_t in a closed loop ([`Instruments`]).
 //!
-//! **Pre-history.** Rows of the filtered equation are used from the first sample at which all of
-//! `D (F u - B q^-nk e)` lies inside the record. What is then unknown, the free response of 1/(C
-//! F), is projected out of every column, record by record. Signals that are simulated for the
-//! instruments get an invented past (the record reflected at its first sample, faded in); it does
-//! not matter for consistency, only for how well the instruments follow the regressors: a jump at
-//! the start, raised by D, would outweigh all that follows. Several records add up, row by row,
-//! with a common theta.
+//! **Pre-history.** Rows of the filtered equation are used from the first sample at which all of `D (F u - B q^-nk e)`
+//! is inside the record. The remaining unknown, the free response of 1/(C F), is projected out of every column, record
+//! by record. Signals that are simulated for the instruments get an artificial past (the record reflected at its first
+//! sample, faded in); it has no effect on consistency, only on how well the instruments follow the regressors: a jump
+//! at the start, amplified by D, would outweigh the rest. Several records add up, row by row, with a common theta.
 //!
 //! | module | contents |
 //! |---|---|
 //! | `estimator` | options, and the fit |
-//! | `methods` | the methods, a file each, and their list |
-//! | `instruments`, `external_signal` | what the instruments are made of |
+//! | `methods` | the methods, one file each, and their list |
+//! | `instruments`, `external_signal` | the instruments |
 //! | `refined` | the iteration of the refined methods |
-//! | `last_iterate` | where an iteration ended |
-//! | `own_poles` | its nonlinear form, for where it does not settle |
+//! | `last_iterate` | the last iterate |
+//! | `own_poles` | its nonlinear form, used if it does not converge |
 //! | `refined_system` | that iteration as a start of the prediction error method |
 //! | `noise_free` | noise-free signals for other estimators |
-//! | `simulation_error` | what a system leaves of the output |
-//! | `algorithm` | what a method gives to the estimator, and gets from it |
+//! | `simulation_error` | the part of the output that a system does not explain |
+//! | `algorithm` | the interface between a method and the estimator |
 //! | `equation` | the filtered equation, its instruments and its solution |
 //! | `columns` | columns over the rows of all records |
 //! | `covariance` | the covariance of an estimate, for a residual of any colour |

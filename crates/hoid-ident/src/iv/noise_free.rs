@@ -1,4 +1,4 @@
-//! Noise-free signals of a closed loop for estimators next to the methods of this folder.
+//! Noise-free signals of a closed loop for other estimators.
 
 use std::ops::Range;
 
@@ -10,13 +10,13 @@ use crate::{IdentError, criterion::Data};
 
 /// The part of e that follows an excitation, for a range of samples.
 pub(crate) struct NoiseFreeInput {
-    /// The part in each record, whole.
+    /// The whole part in each record.
     pub inputs: Vec<Vec<f64>>,
-    /// Samples whose noise is not in it, counted through all records.
+    /// Samples whose noise does not affect it, counted through all records.
     pub samples: Range<usize>,
 }
 
-/// The parts of e that follow this channel, made with weights of other samples
+/// Returns the parts of e that follow this channel, computed with weights of other samples
 /// ([`super::external_signal`]).
 ///
 /// # Errors
@@ -32,7 +32,7 @@ pub(crate) fn noise_free_inputs(records: &[Record], channel: &str) -> Result<Vec
     Ok(made.into_iter().map(of).collect())
 }
 
-/// `(B/F) q^-nk e` after an invented past, with theta of a Box-Jenkins model.
+/// Returns `(B/F) q^-nk e` after an artificial past, with theta of a Box-Jenkins model.
 pub(crate) fn simulated_output(orders: &Orders, theta: &[f64], e: &[f64]) -> Vec<f64> {
     let b = &theta[..orders.nb];
     let f = &theta[theta.len() - orders.nf..];

@@ -1,28 +1,27 @@
-//! The equation solved for its own poles, where the iteration of the refined methods does not
-//! settle.
+//! Nonlinear form of the equation, in which F has its own poles, for cases in which the iteration of the refined
+//! methods does not converge.
 //!
-//! The iteration solves `Z' L (F u - B q^-nk e) = 0` for F and B with the 1/F of the iteration before in L. Where F has
-//! a pole so slow that the record hardly distinguishes it from one on the unit circle, as the lag of an operator is, or
-//! where the model is too small, that equation is solved by a pole outside the circle; reflected inside, it leads to
-//! the same again. What is searched for is a zero of
+//! The iteration solves `Z' L (F u - B q^-nk e) = 0` for F and B with 1/F of the previous iteration in L. If F has a
+//! pole so slow that the record hardly distinguishes it from one on the unit circle, such as the lag of an operator, or
+//! if the model is too small, that equation is solved by a pole outside the circle; reflected inside, it leads to the
+//! same result again. The alternative is a zero of
 //!
 //! `g(theta) = Z' eps(theta)`,  `eps = (D/C) (u - (B/F) q^-nk e)`,
 //!
-//! which is the same at a fixed point, but has F stable by itself. So with Z, C and D of a system fixed,
-//! `|Q' eps(theta)|^2`, Q an orthonormal basis of Z, is minimised over B and stable F (damped Gauss-Newton, along the
-//! border of stability where that is in the way: [`crate::optimize`]). Then Z, C and D are made again, until they no
-//! longer move theta ([`Extrapolation`] helps where that creeps or swings). Where g has no zero in the region of
-//! stability, the smallest value lies on its border, and the termination reports it.
+//! which is the same at a fixed point, but has a stable F. So with Z, C and D of a system fixed, `|Q' eps(theta)|^2`, Q
+//! an orthonormal basis of Z, is minimised over B and stable F (damped Gauss-Newton, along the border of stability if
+//! necessary: [`crate::optimize`]). Then Z, C and D are computed again, until theta no longer changes
+//! ([`Extrapolation`] helps if the convergence is slow or oscillates). If g has no zero in the region of stability, the
+//! smallest value is on its border, and the termination reports it.
 //!
-//! **Where that has no end.** For a model that is smaller than the operator, eps is correlated with
-//! some of the instruments that other systems make, and theta may follow its own instruments without
-//! ever meeting them. Instruments need not come from the estimate itself: any auxiliary model gives
-//! a consistent one. So the estimate is then the zero of `Z' eps(theta)` for the Z, C and D whose
-//! zero is closest to the system that made them, and it counts as converged where these two differ
-//! by less than half a standard error.
+//! **Without convergence.** For a model that is smaller than the operator, eps is correlated with some of the
+//! instruments that other systems give, and theta may follow its own instruments without ever reaching them.
+//! Instruments need not come from the estimate itself: any auxiliary model gives a consistent estimate. So the estimate
+//! is then the zero of `Z' eps(theta)` for the Z, C and D whose zero is closest to the system from which they were
+//! computed, and it counts as converged if these two differ by less than half a standard error.
 //!
-//! psi is the exact derivative with 1/(C F) at rest at the first row; what is unknown there is
-//! orthogonal to Z, from which the responses to it are projected out.
+//! psi is the exact derivative with 1/(C F) at rest at the first row; the unknown state there is orthogonal to Z, from
+//! which its responses are projected out.
 //!
 //! This is the nonlinear form of the optimal instrumental variable estimate (T. Söderström and P.
 //! Stoica, *Instrumental Variable Methods for System Identification*, 1983, ch. 6; P. C. Young,
@@ -47,20 +46,19 @@ use crate::{
 
 /// Limits of the search with given instruments.
 const SEARCH_STEPS: usize = 30;
-/// Iterations that the extrapolation remembers, and what keeps their combination small.
+/// Number of iterations that the extrapolation uses, and the ridge of their combination.
 const REMEMBERED: usize = 5;
 const RIDGE: f64 = 1e-10;
 /// The search with given instruments ends at this part of the tolerance.
 const INNER: f64 = 1e-2;
-/// Radius from which on a pole lies on the unit circle.
+/// Radius from which on a pole counts as being on the unit circle.
 const ON_CIRCLE: f64 = 1.0 - 1e-7;
-/// A step of this many standard errors, over all parameters, carries no information about the
-/// operator.
+/// A step of this many standard errors, over all parameters, carries no information about the operator.
 const IMMATERIAL: f64 = 0.5;
-/// The iteration has no end where so many steps in turn have not shortened it by this factor.
+/// Number of successive steps without this reduction after which the iteration counts as divergent.
 const PATIENCE: usize = 12;
 const GAIN: f64 = 0.9;
-/// A step longer than the shortest one by this factor comes from an extrapolation too far.
+/// Ratio to the shortest step above which a step results from an excessive extrapolation.
 const ASTRAY: f64 = 10.0;
 
 /// `|Q' eps(theta)|^2` for given instruments and noise model.
@@ -68,7 +66,7 @@ struct GivenInstruments<'p, 'a> {
     problem: &'p IvProblem<'a>,
     noise: &'p NoiseModel,
     q: Columns,
-    /// Definition of the sum of squares of the output: smaller values than 1e-26 of it are zero.
+    /// Sum of squares of the output: values below 1e-26 of it count as zero.
     power: f64,
 }
 
@@ -104,7 +102,7 @@ impl Objective for GivenInstruments<'_, '_> {
     }
 }
 
-/// Iterates from a system with stable F; `noise_of` gives the noise model that belongs to a system.
+/// Iterates from a system with stable F; `noise_of` returns the noise model for a system.
 ///
 /// # Errors
 /// [`IdentError::SingularInstruments`], [`IdentError::NoFiniteLoss`].
@@ -165,7 +163,7 @@ pub(super) fn solve_for_own_poles(
             return Ok(last);
         }
         system = match &nearest {
-            // The extrapolation has led diverged.
+            // The extrapolation has diverged.
             Some((least, near)) if moved > ASTRAY * least => {
                 extrapolation = Extrapolation::default();
                 near.system.clone()
@@ -176,7 +174,7 @@ pub(super) fn solve_for_own_poles(
     }
 }
 
-/// How an iteration has ended whose next step has this length in standard errors.
+/// Returns the reason for the end of an iteration whose next step has this length in standard errors.
 fn reason(moved: f64, tolerance: f64, f: &[f64]) -> Reason {
     if moved > IMMATERIAL {
         Reason::IterationLimit
@@ -189,9 +187,9 @@ fn reason(moved: f64, tolerance: f64, f: &[f64]) -> Reason {
     }
 }
 
-/// The next point of a fixed-point iteration from the last few, by the combination of their steps
-/// that is shortest (D. G. Anderson, *J. ACM* 12 (1965) 547-560): the iteration may creep or swing
-/// where the model is too small for the noise to leave the instruments.
+/// Next point of a fixed-point iteration from the last few, by the combination of their steps with the smallest norm
+/// (D. G. Anderson, *J. ACM* 12 (1965) 547-560): the iteration may converge slowly or oscillate if the model is too
+/// small for instruments without noise.
 #[derive(Default)]
 struct Extrapolation {
     /// Point and step of the last iteration, and the differences of both between iterations.
@@ -236,12 +234,12 @@ fn minus(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
-/// `Z'Z` by rows.
+/// Returns `Z'Z` by rows.
 fn products(z: &Columns) -> Vec<f64> {
     z.iter().flat_map(|a| z.iter().map(move |b| dot(a, b))).collect()
 }
 
-/// `v' M v`.
+/// Returns `v' M v`.
 fn squared_length(m: &[f64], v: &[f64]) -> f64 {
     m.chunks_exact(v.len()).zip(v).map(|(row, x)| x * dot(row, v)).sum()
 }

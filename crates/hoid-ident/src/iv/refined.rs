@@ -1,14 +1,14 @@
-//! The iteration that the refined methods share.
+//! The common iteration of the refined methods.
 //!
 //! Given a system, its noise-free output is simulated, the filter `D/(C F)` is built, and the
 //! filtered equation gives the next system, until an iteration moves it by less than the tolerance:
 //! with `delta` the step and sigma the standard deviation of the filtered residual,
 //! `|Z delta| <= tolerance sigma`, which is a distance in standard errors.
 //!
-//! **Start.** Input and output are replaced by the parts of them that follow the noise-free input
-//! (Laguerre expansion), and a few iterations of K. Steiglitz and L. E. McBride (*IEEE Trans.
-//! Automatic Control* 10 (1965) 461-464) on these give a system that is close in open and closed
-//! loop alike. Least squares on the data themselves serves where that fails.
+//! **Start.** Input and output are replaced by the parts of them that follow the noise-free input (Laguerre expansion),
+//! and a few iterations of K. Steiglitz and L. E. McBride (*IEEE Trans. Automatic Control* 10 (1965) 461-464) on these
+//! give a system that is close in both open and closed loop. If this fails, least squares on the data themselves is
+//! used.
 
 use crate::{
     IdentError, Reason, Termination,
@@ -24,18 +24,17 @@ use super::{
     own_poles::solve_for_own_poles,
 };
 
-/// Iterations of the start.
+/// Number of iterations of the start.
 const START_ROUNDS: usize = 5;
-/// Iterations after which only half of each step is taken, should the iteration swing.
+/// Number of iterations after which only half of each step is taken, against oscillations.
 const FULL_STEPS: usize = 20;
-/// A zero of the equation whose residual is larger than the smallest one by this factor is another
-/// one than that of the operator.
+/// Ratio of the residual of a zero to the smallest one above which it is not the zero of the operator.
 const FAR: f64 = 1.15;
 /// Steps below this share of the output are rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// Iterates, and where that does not settle continues in the nonlinear form ([`super::own_poles`]);
-/// `noise_of` gives the noise model that belongs to a system.
+/// Iterates, and continues in the nonlinear form if this does not converge ([`super::own_poles`]); `noise_of` returns
+/// the noise model for a system.
 pub(super) fn settle(
     limits: IterationLimits,
     problem: &IvProblem<'_>,
@@ -46,7 +45,7 @@ pub(super) fn settle(
     if plain.termination.converged() || limits.max_iterations <= FULL_STEPS {
         return Ok(plain);
     }
-    // From where it has come to; where that leads far away, from its best system and from its start.
+    // From the last iterate; if that leads far away, from its best system and from its start.
     let mut spent = plain.termination.iterations;
     let starts = [
         plain.system.clone(),
@@ -58,7 +57,7 @@ pub(super) fn settle(
         let found = solve_for_own_poles(limits, problem, from, &mut noise_of)?;
         spent += found.termination.iterations;
         let variance = found.variance();
-        // The estimating equation has several zeros; that of the operator has about the smallest residual met.
+        // The estimating equation has several zeros; that of the operator has about the smallest residual found.
         let far = variance > FAR * whitest.variance;
         let class = match found.termination.reason {
             Reason::Settled | Reason::InstrumentsHeld if !far => 0.0,
@@ -73,14 +72,14 @@ pub(super) fn settle(
         }
     }
     if rank.0 == 2.0 {
-        // Another zero of the equation, far from what the data are like.
+        // Another zero of the equation, which does not fit the data.
         best.termination.reason = Reason::IterationLimit;
     }
     best.termination.iterations = spent;
     Ok(best)
 }
 
-/// The system with the smallest filtered residual that an iteration met.
+/// The system with the smallest filtered residual of an iteration.
 struct Whitest {
     variance: f64,
     system: Option<Vec<f64>>,
@@ -95,7 +94,7 @@ impl Default for Whitest {
     }
 }
 
-/// The iteration alone; `noise_of` gives the noise model that belongs to a system.
+/// The iteration only; `noise_of` returns the noise model for a system.
 fn iterate(
     limits: IterationLimits,
     problem: &IvProblem<'_>,
@@ -186,7 +185,7 @@ fn of_noise_free_parts(problem: &IvProblem<'_>) -> Result<Vec<f64>, IdentError> 
     Ok(system)
 }
 
-/// The iteration alone, for a start.
+/// The iteration only, for a start.
 pub(super) fn plain_iteration(
     limits: IterationLimits,
     problem: &IvProblem<'_>,

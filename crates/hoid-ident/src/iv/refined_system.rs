@@ -1,9 +1,9 @@
 //! A system by refined instrumental variables, as a start of the prediction error method.
 //!
-//! The iteration of RIV-BJ ([`super::refined`]) with instruments from the measured input and a
-//! noise model that is a plain autoregression: no search runs inside of it. It need not settle; a
-//! start is good when it is near. Consistent in an open loop for any noise, and in a closed one
-//! biased by what the input follows of the noise, as every start that is made of the input alone.
+//! The iteration of RIV-BJ ([`super::refined`]) with instruments from the measured input and an autoregression as noise
+//! model: it contains no search. It need not converge; a start only has to be near. It is consistent in an open loop
+//! for any noise, and in a closed loop biased as far as the input follows the noise, like every start from the input
+//! alone.
 
 use super::{
     algorithm::IterationLimits,
@@ -20,8 +20,8 @@ const LIMITS: IterationLimits = IterationLimits {
     tolerance: 1e-2,
 };
 
-/// `[f_1 .., b_0 ..]` with an autoregression of order `nd` for the noise; `None` where A is there,
-/// where there is no input, and where the data do not carry it.
+/// Returns `[f_1 .., b_0 ..]` with an autoregression of order `nd` for the noise; `None` if the model has A, without an
+/// input, and if the data are not sufficient.
 pub(crate) fn refined_system(criterion: &Criterion<'_>, nd: usize) -> Option<Vec<f64>> {
     let o = criterion.orders;
     if o.na > 0 || o.nb == 0 || o.nf == 0 {

@@ -1,4 +1,4 @@
-//! The output that a system leaves unexplained: the disturbance, of which the noise model is made.
+//! The output that a system does not explain: the disturbance, from which the noise model is estimated.
 
 use hoid_model::Orders;
 
@@ -7,7 +7,7 @@ use crate::{
     criterion::{Criterion, Workspace, first_residual},
 };
 
-/// `u - (B/F) q^-nk e` of each record, the initial states of 1/F eliminated.
+/// Returns `u - (B/F) q^-nk e` of each record, with the initial states of 1/F eliminated.
 pub(super) fn simulation_error(theta: &[f64], criterion: &Criterion<'_>) -> Vec<Vec<f64>> {
     let orders = Orders {
         nc: 0,

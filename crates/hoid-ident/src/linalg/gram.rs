@@ -2,14 +2,14 @@
 
 use std::ops::Range;
 
-/// `sum x x'` over rows x, of which the lower triangle is kept.
+/// Sum `sum x x'` over rows x, of which the lower triangle is stored.
 pub(crate) struct Gram {
     size: usize,
     sums: Vec<f64>,
 }
 
 impl Gram {
-    /// No rows yet, of this many columns.
+    /// Creates an empty sum for this number of columns.
     pub fn new(size: usize) -> Self {
         Self {
             size,
@@ -27,12 +27,12 @@ impl Gram {
         }
     }
 
-    /// The sum of the products of two columns.
+    /// Returns the sum of the products of two columns.
     pub fn at(&self, i: usize, j: usize) -> f64 {
         self.sums[i.max(j) * self.size + i.min(j)]
     }
 
-    /// The matrix of some columns by rows, and their products with another column.
+    /// Returns the matrix of some columns by rows, and their products with another column.
     pub fn system(&self, columns: Range<usize>, with: usize) -> (Vec<f64>, Vec<f64>) {
         let pairs = columns.clone().flat_map(|i| columns.clone().map(move |j| (i, j)));
         let matrix = pairs.map(|(i, j)| self.at(i, j)).collect();

@@ -1,4 +1,4 @@
-//! The inverse of an information matrix, and which parameters it leaves open.
+//! The inverse of an information matrix, and the parameters that it does not determine.
 //!
 //! `psi' psi` is scaled to a unit diagonal, so that units do not matter, and inverted by its
 //! eigenvalues: one that is zero up to rounding belongs to a combination of parameters that the
@@ -8,12 +8,11 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 use crate::IdentError;
 
-/// Eigenvalue of the information matrix (scaled to a unit diagonal) below which a combination of
-/// parameters counts as not determined by the data. Rounding leaves about 1e-15 times the number of
-/// parameters.
+/// Eigenvalue of the information matrix (scaled to a unit diagonal) below which a combination of parameters counts as
+/// undetermined by the data. Rounding leaves about 1e-15 times the number of parameters.
 const SINGULAR: f64 = 1e-13;
 
-/// Inverse of the information matrix (by rows) of the named parameters.
+/// Returns the inverse of the information matrix (by rows) of the named parameters.
 ///
 /// # Errors
 /// [`IdentError::SingularInformation`] with the parameters that are not determined.
@@ -54,8 +53,8 @@ pub(crate) fn inverse_information(gram: &[f64], names: &[String]) -> Result<Vec<
     Ok(inverse)
 }
 
-/// The inverse for the free parameters alone; rows and columns of the others are zero, as those
-/// parameters have no variance.
+/// Returns the inverse for the free parameters only; rows and columns of the others are zero, as those parameters have
+/// no variance.
 ///
 /// # Errors
 /// As [`inverse_information`].
@@ -83,7 +82,7 @@ pub(crate) fn inverse_of_free(gram: &[f64], free: &[usize], names: &[String]) ->
 mod tests {
     use super::*;
 
-    /// `J' J` by rows of a Jacobian given by columns.
+    /// Returns `J' J` by rows for a Jacobian given by columns.
     fn gram(columns: &[Vec<f64>]) -> Vec<f64> {
         let product = |a: &Vec<f64>, b: &Vec<f64>| a.iter().zip(b).map(|(x, y)| x * y).sum();
         columns

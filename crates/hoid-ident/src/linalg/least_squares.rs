@@ -7,12 +7,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Relative size of a diagonal element of R below which a column counts as dependent on those
-/// before it. Rounding alone leaves about 1e-15; regressors that determine their coefficients to a
-/// few digits lie above 1e-10.
+/// Relative size of a diagonal element of R below which a column counts as dependent on previous ones. Rounding alone
+/// leaves about 1e-15; regressors that determine their coefficients to a few digits are above 1e-10.
 pub(crate) const RANK_TOLERANCE: f64 = 1e-12;
 
-/// `X P = Q R` and `Q' y`, all that is needed of the data afterwards.
+/// `X P = Q R` and `Q' y`, which contain all necessary information of the data.
 #[derive(Debug)]
 pub(crate) struct LeastSquares {
     /// Upper triangle by columns, in pivoted order, of the scaled columns.
@@ -27,8 +26,8 @@ pub(crate) struct LeastSquares {
 }
 
 impl LeastSquares {
-    /// Factors the columns (each `rows` long, one after the other) together with the right-hand
-    /// side. Both are overwritten.
+    /// Factors the columns (each `rows` long, one after the other) together with the right-hand side. Both are
+    /// overwritten.
     pub fn factor(columns: &mut [f64], y: &mut [f64]) -> Self {
         let rows = y.len();
         let p = columns.len().checked_div(rows).unwrap_or(0);
@@ -45,8 +44,8 @@ impl LeastSquares {
         let mut rank = 0;
         let steps = p.min(rows);
         for k in 0..steps {
-            // Rest of each column computed afresh: downdating the norms loses digits exactly where
-            // the rank is decided.
+            // Residual norm of each column computed anew: downdating the norms loses digits exactly where the rank is
+            // decided.
             let rest = |j: usize, columns: &[f64]| {
                 let tail = &columns[j * rows + k..(j + 1) * rows];
                 dot(tail, tail)
@@ -107,12 +106,12 @@ impl LeastSquares {
         self.pivots.len()
     }
 
-    /// True when every column is independent of the others.
+    /// True if every column is independent of the others.
     pub fn has_full_rank(&self) -> bool {
         self.rank == self.columns()
     }
 
-    /// The least-squares solution; call only with full rank.
+    /// Returns the least-squares solution; call only with full rank.
     pub fn solution(&self) -> Vec<f64> {
         let p = self.columns();
         let scaled = self.back_substitute(&self.qty[..p]);
@@ -123,7 +122,7 @@ impl LeastSquares {
         theta
     }
 
-    /// `(X' X)^-1` by rows; call only with full rank.
+    /// Returns `(X' X)^-1` by rows; call only with full rank.
     pub fn inverse_gram(&self) -> Vec<f64> {
         let p = self.columns();
         // Columns of R^-1, then R^-1 R^-T.
@@ -156,7 +155,7 @@ impl LeastSquares {
         x
     }
 
-    /// Reports which columns depend on which, by name.
+    /// Describes which columns depend on which, by name.
     pub fn describe_dependence(&self, names: &[String]) -> String {
         let p = self.columns();
         let sentences: Vec<String> = (self.rank..p)
@@ -185,8 +184,8 @@ impl LeastSquares {
     }
 }
 
-/// Solution of the positive definite system `gram x = rhs` (gram by rows) by Cholesky, scaled to a
-/// unit diagonal. `None` when it is not positive definite.
+/// Solves the positive definite system `gram x = rhs` (gram by rows) by Cholesky, scaled to a unit diagonal. `None` if
+/// it is not positive definite.
 pub(crate) fn solve_symmetric(gram: &[f64], rhs: &[f64]) -> Option<Vec<f64>> {
     let p = rhs.len();
     let scale: Vec<f64> = (0..p).map(|i| gram[i * p + i].sqrt()).collect();
@@ -205,7 +204,7 @@ pub(crate) fn add_scaled(y: &mut [f64], k: f64, x: &[f64]) {
     }
 }
 
-/// Sum of products, in eight fixed partial sums: fast, and the same bits on every machine.
+/// Sum of products, in eight fixed partial sums: fast, and bitwise identical on every machine.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));

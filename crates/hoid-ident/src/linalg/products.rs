@@ -1,13 +1,12 @@
 //! Sums of products of many columns, in one pass over each.
 //!
-//! A normal matrix needs the product of each pair of its columns. One column against four others at
-//! a time reads five numbers for four products, where single products read eight; and a column that
-//! is the one before it, a sample later, needs no pass: `sum x(t-1) y(t-1)` over a span is
-//! `sum x(t) y(t)` except for the samples at both ends.
+//! A normal matrix needs the product of each pair of its columns. One column with four others at a time reads five
+//! numbers for four products, while single products read eight; and a column that is the previous one delayed by one
+//! sample needs no pass: `sum x(t-1) y(t-1)` over a span is `sum x(t) y(t)` except for the samples at both ends.
 //!
-//! Each product has partial sums of a fixed number and order, in registers that are chosen when the
-//! program runs ([`hoid_lanes::with_four_lanes`]): the bits are the same whatever the registers,
-//! whatever is summed alongside, and in whatever stretches the record is read.
+//! Each product has partial sums of a fixed number and order, in registers that are chosen at run time
+//! ([`hoid_lanes::with_four_lanes`]): the result is bitwise independent of the registers, of other sums computed
+//! together with it, and of the stretches in which the record is read.
 
 use std::ops::Range;
 
@@ -15,9 +14,9 @@ use hoid_lanes::{FourLaneTask, FourLanes, with_four_lanes};
 
 use crate::linalg::least_squares::add_scaled;
 
-/// Samples that are read at a time: those of all columns stay in the nearest memory. A multiple of
-/// eight, the most partial sums of a product. For residuals the number is part of the last digits,
-/// since their sums are closed after each stretch.
+/// Number of samples that are read at a time, so that those of all columns remain in the first-level cache. A multiple
+/// of eight, the largest number of partial sums of a product. For residuals the last digits depend on it, since their
+/// sums are completed after each stretch.
 const STRETCH: usize = 512;
 
 /// Products of one column with four, two or one other.
@@ -26,12 +25,12 @@ struct Tile<F> {
     x: usize,
     ys: [usize; 4],
     count: usize,
-    /// FourLanes partial sums of each product. A product alone has eight, in the first two.
+    /// FourLanes partial sums of each product. A single product has eight, in the first two.
     sums: [F; 4],
 }
 
 impl<F: FourLanes> Tile<F> {
-    /// Tiles for the products of x with each of ys, nothing summed yet.
+    /// Creates tiles for the products of x with each of ys, with zero sums.
     fn cover(x: usize, mut ys: &[usize], zero: F, tiles: &mut Vec<Self>) {
         while !ys.is_empty() {
             let count = match ys.len() {
@@ -52,8 +51,8 @@ impl<F: FourLanes> Tile<F> {
         }
     }
 
-    /// Adds the products over the whole blocks of a stretch. Named sums, because those of an array
-    /// are kept in memory.
+    /// Adds the products over the whole blocks of a stretch. The sums have names because those of an array are kept in
+    /// memory.
     #[inline(always)]
     fn add<'a>(&mut self, column: impl Fn(usize) -> &'a [f64]) {
         let x = column(self.x);
@@ -88,8 +87,8 @@ impl<F: FourLanes> Tile<F> {
         self.sums = [s0, s1, s2, s3];
     }
 
-    /// The product of x with the k-th of ys over whole columns: the sums, and anything after the
-    /// last whole block.
+    /// Returns the product of x with the k-th of ys over whole columns: the sums, plus the samples after the last whole
+    /// block.
     #[inline(always)]
     fn total<'a>(&self, k: usize, column: impl Fn(usize) -> &'a [f64]) -> f64 {
         let (x, y) = (column(self.x), column(self.ys[k]));
@@ -103,7 +102,7 @@ impl<F: FourLanes> Tile<F> {
     }
 }
 
-/// The partial sums in a fixed order.
+/// Adds the partial sums in a fixed order.
 #[inline(always)]
 fn in_order<F: FourLanes>(sums: F) -> f64 {
     let s = sums.to_array();
@@ -120,7 +119,7 @@ fn eights(x: &[f64]) -> &[[[f64; 4]; 2]] {
     fours(x).as_chunks().0
 }
 
-/// Where the stretches of n samples start and end.
+/// Returns start and end of the stretches of n samples.
 fn stretches(n: usize) -> impl Iterator<Item = Range<usize>> {
     (0..n).step_by(STRETCH).map(move |from| from..n.min(from + STRETCH))
 }
@@ -153,7 +152,7 @@ fn squares<F: FourLanes>(x: &[f64], mean: f64, zero: F) -> f64 {
     sums.as_flattened().iter().sum::<f64>() + tail.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>()
 }
 
-/// Variance around the common mean of some spans.
+/// Variance about the common mean of some spans.
 pub(crate) fn variance(spans: &[&[f64]]) -> f64 {
     with_four_lanes(Variance(spans))
 }
@@ -182,14 +181,14 @@ impl FourLaneTask for Variance<'_, '_> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lagged<'a> {
     pub values: &'a [f64],
-    /// True when this is the column before it, one sample later.
+    /// True if this is the previous column delayed by one sample.
     pub follows: bool,
 }
 
 /// The symmetric matrix of the products of all columns, by rows.
 ///
-/// A column that follows none leads: it is multiplied with all columns at once. What is left are
-/// pairs of columns that both follow, which come from the pair before them.
+/// A column that does not follow another is multiplied with all columns at once. The remaining pairs are columns that
+/// both follow, whose product results from that of the previous pair.
 pub(crate) fn gram(columns: &[Lagged<'_>]) -> Vec<f64> {
     with_four_lanes(Gram(columns))
 }
@@ -206,7 +205,7 @@ impl FourLaneTask for Gram<'_, '_> {
         let (mut tiles, mut others) = (Vec::with_capacity(p), Vec::with_capacity(p));
         for (i, _) in columns.iter().enumerate().filter(|(_, column)| !column.follows) {
             others.clear();
-            // Leaders before this one have met it already.
+            // Previous leading columns have been multiplied with it already.
             others.extend((0..p).filter(|j| *j >= i || columns[*j].follows));
             Tile::cover(i, &others, zero, &mut tiles);
         }
@@ -246,12 +245,11 @@ fn ends(columns: &[Lagged<'_>], i: usize, j: usize) -> f64 {
     columns[i].values[0] * columns[j].values[0] - x[last] * y[last]
 }
 
-/// Which columns follow in the regression that is made most often: an output with two lags, an
-/// input with two.
+/// Columns that follow in the most frequent regression: an output with two lags, an input with two.
 const TWO_OF_EACH: [bool; 5] = [false, true, true, false, true];
 
-/// The tiles of such a regression in one pass, which reads five numbers for nine products; tile by
-/// tile it would read twelve.
+/// The tiles of such a regression in one pass, which reads five numbers for nine products; tile by tile it would read
+/// twelve.
 #[inline(always)]
 fn add_two_of_each<F: FourLanes>(tiles: &mut [Tile<F>], columns: [&[f64]; 5]) {
     // u with the first four columns, u with the last, e with the last four.
@@ -296,7 +294,7 @@ pub(crate) struct ResidualProducts {
 }
 
 impl ResidualProducts {
-    /// None yet, of p columns.
+    /// Creates zero sums for p columns.
     pub fn new(p: usize) -> Self {
         Self {
             squares: 0.0,
@@ -304,8 +302,7 @@ impl ResidualProducts {
         }
     }
 
-    /// Adds those of `y - sum_k factors_k x_k`, of which a stretch at a time is in memory. The
-    /// first column is y.
+    /// Adds those of `y - sum_k factors_k x_k`, of which one stretch at a time is in memory. The first column is y.
     pub fn add(&mut self, columns: &[Lagged<'_>], factors: &[f64]) {
         with_four_lanes(Residuals {
             columns,
@@ -328,7 +325,7 @@ impl FourLaneTask for Residuals<'_, '_> {
     fn run<F: FourLanes>(self, zero: F) {
         let Self { columns, factors, of } = self;
         let inputs: Vec<usize> = (1..columns.len()).collect();
-        // The residual is in the place of y.
+        // The residual is stored in place of y.
         let mut tiles = Vec::with_capacity(columns.len());
         Tile::cover(0, &[0], zero, &mut tiles);
         Tile::cover(0, &inputs, zero, &mut tiles);
@@ -361,8 +358,7 @@ impl FourLaneTask for Residuals<'_, '_> {
     }
 }
 
-/// Power and products of the residuals of four inputs over a whole stretch, which never leave the
-/// registers.
+/// Power and products of the residuals of four inputs over a whole stretch, which are kept in registers.
 #[inline(always)]
 fn of_four_inputs<F: FourLanes>(columns: [&[f64]; 5], factors: [f64; 4], zero: F) -> (f64, [f64; 4]) {
     let [y, a, b, c, d] = columns;

@@ -1,11 +1,11 @@
-//! Searches from several starts, driven from outside: what they need of the criterion is given to
-//! them, so that the searches of several records can run side by side.
+//! Searches from several starts by reverse communication: the caller evaluates the criterion, so that the searches of
+//! several records can run in parallel lanes.
 //!
 //! | module | contents |
 //! |---|---|
-//! | `start` | a start of a search, and which of its polynomials are still to be found |
+//! | `start` | a start of a search, with its unknown polynomials |
 //! | `searches` | the searches from the best starts, and the lowest minimum |
-//! | `linearisation_client` | what is driven: one theta after the other, and the linearisation there |
+//! | `linearisation_client` | the interface: one theta after the other, and the linearisation there |
 
 mod linearisation_client;
 mod searches;

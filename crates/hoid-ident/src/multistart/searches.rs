@@ -1,12 +1,12 @@
 //! Searches from several starts of one criterion, one linearisation after the other.
 //!
-//! First what is left to find of each start, then the search from the best of them, and from the
-//! next ones. A start that proves to lie in the basin of a minimum that is known is left out, and a
-//! search that comes close to one without a promise to end lower is stopped.
+//! First the unknown polynomials of each start, then the search from the best of them, and from the next ones. A start
+//! in the basin of a known minimum is left out, and a search that comes close to one without a predicted lower end is
+//! stopped.
 //!
-//! The searches do not evaluate the criterion themselves: they name the theta at which they need
-//! its linearisation and are updated with it (reverse communication), so that those of several
-//! records can run side by side ([`crate::pem::batched`]).
+//! The searches do not evaluate the criterion themselves: they return the theta at which they need its linearisation
+//! and are updated with it (reverse communication), so that those of several records can run in parallel lanes
+//! ([`crate::pem::batched`]).
 
 use hoid_model::Orders;
 
@@ -26,19 +26,18 @@ pub(crate) struct MultiStart<'s> {
     objective: &'s dyn Objective,
     orders: Orders,
     options: &'s SearchOptions,
-    /// Starts from which there is a search at most.
+    /// Largest number of starts from which a search runs.
     most: usize,
-    /// The starts; once nothing is left to find of them, those whose turn is still to come, the
-    /// best last.
+    /// The starts; when all of them are complete, those that have not been used, the best last.
     starts: Vec<Start>,
-    /// The present search, with the label of its start.
+    /// The current search, with the label of its start.
     searching: Option<(String, GaussNewton<'s>)>,
     /// The minima, each with its start.
     pub minima: Vec<(String, Minimum)>,
 }
 
 impl<'s> MultiStart<'s> {
-    /// From these starts, the best of which are searched from.
+    /// Creates searches from the best of these starts.
     pub fn new(
         objective: &'s dyn Objective,
         orders: Orders,
@@ -61,7 +60,7 @@ impl<'s> MultiStart<'s> {
         searches
     }
 
-    /// Theta at which the linearisation is needed next; `None` when all searches have ended.
+    /// Returns theta at which the linearisation is needed next; `None` when all searches have ended.
     pub fn evaluation_point(&self) -> Option<&[f64]> {
         match &self.searching {
             Some((_, descent)) => Some(descent.evaluation_point()),
@@ -69,7 +68,7 @@ impl<'s> MultiStart<'s> {
         }
     }
 
-    /// The polynomial with respect to which derivatives are needed; `None` for all.
+    /// Returns the polynomial with respect to which derivatives are needed; `None` for all.
     pub fn block(&self) -> Option<Block> {
         self.incomplete().and_then(|at| self.starts[at].next_block())
     }
@@ -97,7 +96,7 @@ impl<'s> MultiStart<'s> {
         }
     }
 
-    /// The first start of which something is still to be found.
+    /// Returns the first start that is not complete.
     fn incomplete(&self) -> Option<usize> {
         self.starts.iter().position(|start| start.next_block().is_some())
     }
@@ -111,7 +110,7 @@ impl<'s> MultiStart<'s> {
         self.begin();
     }
 
-    /// Starts at the next start.
+    /// Starts the search from the next start.
     fn begin(&mut self) {
         while let (None, Some(Start { label, theta, .. })) = (&self.searching, self.starts.pop()) {
             let known = self.best().map(|minimum| minimum.at.sum_of_squares);
@@ -125,7 +124,7 @@ impl<'s> MultiStart<'s> {
         self.minima.iter().map(|(_, minimum)| minimum).min_by(lowest)
     }
 
-    /// The lowest minimum and its start.
+    /// Returns the lowest minimum and its start.
     pub fn lowest(self) -> Option<(String, Minimum)> {
         let lowest =
             |a: &(String, Minimum), b: &(String, Minimum)| a.1.at.sum_of_squares.total_cmp(&b.1.at.sum_of_squares);

@@ -1,4 +1,4 @@
-//! A start of the search, and what is still to be found of it.
+//! A start of the search, with its unknown polynomials.
 
 use hoid_model::Orders;
 
@@ -13,15 +13,14 @@ use crate::{
 pub(crate) struct Start {
     pub label: String,
     pub theta: Vec<f64>,
-    /// The sum of squares there, once nothing is left to find; not finite where a regression was
-    /// singular.
+    /// The sum of squares there, when the start is complete; not finite if a regression was singular.
     pub value: f64,
-    /// Polynomials that are still to be found, the next one last.
+    /// Polynomials that are still unknown, the next one last.
     left: Vec<Block>,
 }
 
 impl Start {
-    /// Of which nothing is left to find.
+    /// Creates a complete start.
     pub fn complete(label: &str, theta: Vec<f64>, value: f64) -> Self {
         Self {
             label: label.to_owned(),
@@ -31,8 +30,8 @@ impl Start {
         }
     }
 
-    /// With B and the noise model still to be found for its F, without A and C: B with white noise,
-    /// D of the residual, and B once more with that noise model.
+    /// Creates a start whose B and noise model are still unknown for its F, without A and C: B with white noise, D of
+    /// the residual, and B once more with that noise model.
     pub fn of_poles(label: &str, o: &Orders, f: &[f64]) -> Self {
         let left = if o.nd > 0 {
             vec![Block::B, Block::D, Block::B]
@@ -42,7 +41,7 @@ impl Start {
         Self::to_be_found(label, [&vec![0.0; o.nb + o.nd], f].concat(), left)
     }
 
-    /// With some polynomials still to be found, the next one last.
+    /// Creates a start with some unknown polynomials, the next one last.
     pub fn to_be_found(label: &str, theta: Vec<f64>, left: Vec<Block>) -> Self {
         Self {
             label: label.to_owned(),
@@ -52,7 +51,7 @@ impl Start {
         }
     }
 
-    /// With a noise model of its own, and B once more with that.
+    /// Adds its own noise model, and B once more with that, to the unknown polynomials.
     pub fn with_own_noise(mut self, o: &Orders) -> Self {
         if o.nd > 0 {
             self.left = vec![Block::B, Block::D];
@@ -60,13 +59,13 @@ impl Start {
         self
     }
 
-    /// The polynomial that is to be found next.
+    /// Returns the next unknown polynomial.
     pub fn next_block(&self) -> Option<Block> {
         self.left.last().copied()
     }
 
-    /// Takes the criterion at theta. The residual is affine in B, and in D: one step of least
-    /// squares finds either with the rest as it is.
+    /// Updates the start with the criterion at theta. The residual is affine in B, and in D: one step of least squares
+    /// computes either for fixed other polynomials.
     pub fn update(&mut self, o: &Orders, there: &Linearisation) {
         let Some(block) = self.left.pop() else { return };
         let (p, place) = (self.theta.len(), block.place(o));

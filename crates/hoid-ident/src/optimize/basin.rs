@@ -1,11 +1,10 @@
-//! Whether a start leads to a minimum that is known.
+//! Test of whether a start leads to a known minimum.
 
 use super::objective::Minimum;
 use crate::linalg::least_squares::dot;
 
-/// True when a start of that loss lies in the basin of a minimum that is known: its loss is what
-/// the quadratic model around the minimum reports about it, so that a search from there would end
-/// in the same place.
+/// True if a start with this loss is in the basin of a known minimum: its loss agrees with the quadratic model about
+/// the minimum, so that a search from there would end in the same place.
 pub(crate) fn lies_in_basin(minimum: &Minimum, start: &[f64], sum_of_squares: f64) -> bool {
     let p = start.len();
     let delta: Vec<f64> = start.iter().zip(&minimum.theta).map(|(a, b)| a - b).collect();
@@ -16,5 +15,5 @@ pub(crate) fn lies_in_basin(minimum: &Minimum, start: &[f64], sum_of_squares: f6
     rise <= BASIN * minimum.at.sum_of_squares && (found - rise).abs() <= 0.1 * rise
 }
 
-/// Relative rise of the loss up to which a start is held against the quadratic model of a minimum.
+/// Relative increase of the loss up to which a start is compared with the quadratic model of a minimum.
 const BASIN: f64 = 0.05;

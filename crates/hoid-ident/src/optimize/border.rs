@@ -1,4 +1,4 @@
-//! Where a search ends, and how it continues along the border of stability.
+//! The end of a search, and its continuation along the border of stability.
 
 use super::{
     gauss_newton::GaussNewton,
@@ -9,9 +9,8 @@ use super::{
 };
 use crate::criterion::Workspace;
 
-/// Searches from `theta`. `None` when the start is unstable or its loss is not finite, or when the
-/// search comes close to `rival`, the sum of squares of a minimum that is known already, and is
-/// predicted to end no lower.
+/// Searches from `theta`. `None` if the start is unstable or its loss is not finite, or if the search comes close to
+/// `rival`, the sum of squares of a known minimum, and is not predicted to end lower.
 pub(crate) fn minimise(
     objective: &dyn Objective,
     theta: Vec<f64>,
@@ -25,8 +24,8 @@ pub(crate) fn minimise(
 }
 
 impl GaussNewton<'_> {
-    /// The minimum, once the search has ended for this reason; the automatic search may continue
-    /// along the border of stability.
+    /// Returns the minimum, when the search has ended for this reason; the automatic search may continue along the
+    /// border of stability.
     pub fn finish(mut self, reason: Reason, workspace: &mut Workspace) -> Option<Minimum> {
         let reason = if self.options.method == SearchMethod::Automatic && reason == Reason::NoDescent {
             self.follow_the_border(workspace)?
@@ -43,8 +42,8 @@ impl GaussNewton<'_> {
         })
     }
 
-    /// Continues in coordinates in which the border of stability is a bound. `None` if the loss is
-    /// not finite or the rival will not be beaten.
+    /// Continues in coordinates in which the border of stability is a bound. `None` if the loss is not finite or the
+    /// rival will not be reached.
     fn follow_the_border(&mut self, workspace: &mut Workspace) -> Option<Reason> {
         let Some((coordinates, kappa)) = StableCoordinates::of(self.objective, &self.theta) else {
             return Some(Reason::NoDescent);

@@ -1,5 +1,5 @@
-//! A damped Gauss-Newton search by reverse communication: it names the theta at which it needs the
-//! derivatives and is updated with them.
+//! A damped Gauss-Newton search by reverse communication: it returns the theta at which it needs the derivatives and is
+//! updated with them.
 
 use super::{
     objective::{Linearisation, Objective},
@@ -9,15 +9,14 @@ use super::{
 use crate::criterion::Workspace;
 use crate::linalg::least_squares::{dot, solve_symmetric};
 
-/// Relative decrease of the loss that a step predicts from which on the second derivative is learnt
-/// from the gradients.
+/// Predicted relative decrease of the loss below which the second derivative is estimated from the gradients.
 const NEAR: f64 = 1e-2;
 
-/// Relative decrease of the loss that its rounding may hide: filters with poles near the unit
-/// circle lose five of the sixteen digits.
+/// Relative decrease of the loss that may be hidden by its rounding: filters with poles near the unit circle lose five
+/// of the sixteen digits.
 const ROUNDING: f64 = 1e-10;
 
-/// A search that is driven from outside, so that several can run side by side.
+/// A search that is driven by its caller, so that several can run in parallel lanes.
 pub(crate) struct GaussNewton<'s> {
     pub(super) objective: &'s dyn Objective,
     pub(super) options: &'s SearchOptions,
@@ -30,39 +29,37 @@ pub(crate) struct GaussNewton<'s> {
     growth: f64,
     /// Decrease that the quadratic model predicts for the undamped step of this iteration.
     predicted_decrease: f64,
-    /// Difference of half the second derivative from the Gauss-Newton matrix, from the gradients of
-    /// the last steps; empty if that is not used.
+    /// Difference of half the second derivative from the Gauss-Newton matrix, from the gradients of the last steps;
+    /// empty if not used.
     secant: Vec<f64>,
     trial: Trial,
-    /// Where the derivatives are needed next.
+    /// Point at which the derivatives are needed next.
     evaluation_point: Vec<f64>,
 }
 
-/// Quantities decided by the next linearisation.
+/// The purpose of the next linearisation.
 enum Trial {
-    /// Whether the start is usable.
+    /// Test of whether the start is usable.
     Start,
-    /// A step of Levenberg and Marquardt, and the decrease that the quadratic model predicts for
-    /// it.
+    /// A step of Levenberg and Marquardt, with the decrease that the quadratic model predicts.
     Damped { predicted: f64 },
-    /// A share of a step that is halved until the loss falls.
+    /// A share of a step that is halved until the loss decreases.
     Share { delta: Vec<f64>, factor: f64 },
-    /// The step that is left when the search has converged.
+    /// The last step, after convergence.
     Last,
 }
 
-/// Whether a search continues.
+/// State of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Progress {
     /// It needs another linearisation.
     Continues,
-    /// It has ended; without a reason where the loss is not finite or the rival will not be beaten.
+    /// It has ended; without a reason if the loss is not finite or the rival will not be reached.
     Ended(Option<Reason>),
 }
 
 impl<'s> GaussNewton<'s> {
-    /// A search from `theta`, drawn inside the limits; `None` when the predictor does not exist
-    /// there.
+    /// Creates a search from `theta`, moved inside the limits; `None` if the predictor does not exist there.
     pub fn new(
         objective: &'s dyn Objective,
         mut theta: Vec<f64>,
@@ -91,17 +88,17 @@ impl<'s> GaussNewton<'s> {
         })
     }
 
-    /// Where the derivatives are needed.
+    /// Returns the point at which the derivatives are needed.
     pub fn evaluation_point(&self) -> &[f64] {
         &self.evaluation_point
     }
 
-    /// True while nothing is known about it but its start.
+    /// True before the first linearisation.
     pub fn is_at_its_start(&self) -> bool {
         matches!(self.trial, Trial::Start)
     }
 
-    /// Until it ends, alone.
+    /// Runs the search to its end.
     pub(super) fn run(&mut self, workspace: &mut Workspace) -> Option<Reason> {
         loop {
             let there = self.objective.linearise(&self.evaluation_point, workspace);
@@ -143,8 +140,7 @@ impl<'s> GaussNewton<'s> {
                 }
             }
             Trial::Last => {
-                // The predicted decrease is less than the rounding of the loss may hide, which must
-                // not decide about it.
+                // The predicted decrease is below the possible rounding of the loss, which must not decide.
                 if finite && there.sum_of_squares <= self.at.sum_of_squares * (1.0 + ROUNDING) {
                     self.move_to(there);
                 }
@@ -163,8 +159,7 @@ impl<'s> GaussNewton<'s> {
         self.at = there;
     }
 
-    /// Symmetric rank-one correction of the secant, so that `(H + S) s = g - g'` for the step s
-    /// just made.
+    /// Symmetric rank-one correction of the secant, so that `(H + S) s = g - g'` for the last step s.
     fn learn(&mut self, there: &Linearisation) {
         let p = self.theta.len();
         self.secant.resize(p * p, 0.0);
@@ -184,7 +179,7 @@ impl<'s> GaussNewton<'s> {
         let scale = |i: usize| there.gram[i * p + i];
         let size_of_step: f64 = (0..p).map(|i| scale(i) * step[i] * step[i]).sum();
         let size_of_missing: f64 = (0..p).map(|i| missing[i] * missing[i] / scale(i)).sum();
-        // Nearly orthogonal to the step: rounding would decide.
+        // Nearly orthogonal to the step: rounding would dominate.
         if along.is_nan() || along * along <= 1e-16 * size_of_step * size_of_missing {
             return;
         }
@@ -195,7 +190,7 @@ impl<'s> GaussNewton<'s> {
         }
     }
 
-    /// The first trial of the next step, or the end.
+    /// Returns the first trial of the next step, or the end.
     fn iterate(&mut self) -> Progress {
         if !self.at.sum_of_squares.is_finite() {
             return Progress::Ended(None);
@@ -237,7 +232,7 @@ impl<'s> GaussNewton<'s> {
         }
     }
 
-    /// Steps with more and more damping until one can be tried.
+    /// Increases the damping until a step can be tried.
     fn try_damped(&mut self) -> Progress {
         while self.mu <= 1e16 {
             let step = match &self.secant[..] {
@@ -250,7 +245,7 @@ impl<'s> GaussNewton<'s> {
             if let Some(step) = step.or_else(|| self.damped_step(self.mu, &[]))
                 && self.ask(&step.delta, 1.0)
             {
-                // Most trials are accepted: derivatives at once cost less than a second pass.
+                // Most trials are accepted: computing derivatives at once costs less than a second pass.
                 self.trial = Trial::Damped {
                     predicted: step.predicted,
                 };
@@ -266,7 +261,7 @@ impl<'s> GaussNewton<'s> {
         self.growth *= 2.0;
     }
 
-    /// Shares of a step, halved until one can be tried.
+    /// Halves the share of a step until it can be tried.
     fn try_share(&mut self, delta: Vec<f64>, mut factor: f64) -> Progress {
         while factor > 1e-12 {
             if self.ask(&delta, factor) {
@@ -284,13 +279,13 @@ impl<'s> GaussNewton<'s> {
         Progress::Ended(Some(if lost { Reason::SmallDecrease } else { Reason::NoDescent }))
     }
 
-    /// Makes theta after a step the next evaluation point; false if there is no predictor.
+    /// Makes theta after a step the next evaluation point; returns false if there is no predictor.
     fn ask(&mut self, delta: &[f64], factor: f64) -> bool {
         self.evaluation_point.clear();
         self.evaluation_point
             .extend(self.theta.iter().zip(delta).map(|(t, s)| t + factor * s));
         if let Some(limits) = self.objective.limits() {
-            // Against rounding: a step that was cut at a bound ends on it.
+            // Against rounding: a step that was cut at a bound ends exactly on it.
             for (t, (low, high)) in self.evaluation_point.iter_mut().zip(limits) {
                 *t = t.max(*low).min(*high);
             }
@@ -298,9 +293,8 @@ impl<'s> GaussNewton<'s> {
         self.objective.is_feasible(&self.evaluation_point)
     }
 
-    /// `(H + S + mu diag H)^-1 g` of the free parameters, cut where it meets a bound, and the
-    /// decrease of the sum of squares that the quadratic model predicts for it. `None` when the
-    /// matrix is not positive definite.
+    /// Returns `(H + S + mu diag H)^-1 g` of the free parameters, cut at the bounds, and the decrease of the sum of
+    /// squares that the quadratic model predicts for it. `None` if the matrix is not positive definite.
     fn damped_step(&self, mu: f64, secant: &[f64]) -> Option<Step> {
         let p = self.theta.len();
         let mut free = self.free();
@@ -336,7 +330,7 @@ impl<'s> GaussNewton<'s> {
         }
     }
 
-    /// `alpha (diag H)^-1 g` with the alpha that is best for the quadratic model.
+    /// Returns `alpha (diag H)^-1 g` with the best alpha for the quadratic model.
     fn scaled_gradient(&self) -> Option<Vec<f64>> {
         let p = self.theta.len();
         let mut delta = vec![0.0; p];
@@ -378,7 +372,7 @@ fn curvature(matrix: &[f64], delta: &[f64]) -> f64 {
     (0..p).map(|i| delta[i] * dot(&matrix[i * p..(i + 1) * p], delta)).sum()
 }
 
-/// Parameters that may move: neither fixed nor at a bound beyond which the loss falls.
+/// Returns the parameters that may move: neither fixed nor at a bound beyond which the loss decreases.
 pub(crate) fn free_parameters(objective: &dyn Objective, theta: &[f64], descent: &[f64]) -> Vec<usize> {
     let Some(limits) = objective.limits() else {
         return (0..theta.len()).collect();
@@ -391,7 +385,7 @@ pub(crate) fn free_parameters(objective: &dyn Objective, theta: &[f64], descent:
         .collect()
 }
 
-/// The share of a step that stays within the limits.
+/// Returns the share of a step that is within the limits.
 fn cut(theta: &[f64], delta: &[f64], limits: &[(f64, f64)]) -> f64 {
     let room = |((t, d), (low, high)): ((&f64, &f64), &(f64, f64))| match *d {
         d if d > 0.0 => (high - t) / d,

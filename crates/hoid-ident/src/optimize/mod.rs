@@ -10,26 +10,23 @@
 //! | steepest descent | `alpha (diag H)^-1 g`, alpha best for the quadratic model, halved until the loss falls |
 //! | automatic | Levenberg-Marquardt, near the minimum with a secant; where it finds no lower loss although the gradient is not zero, it continues in coordinates in which the border of stability is a bound ([`reflection_coefficients`]) |
 //!
-//! **The secant.** Gauss and Newton leave the part of the second derivative out that vanishes with
-//! white residuals of the right model. Where the model is not right (a delay that is off by a few
-//! samples) they converge by a constant factor a step only. Near the minimum a matrix S takes the
-//! place of what is left out, `(H + S) s = g(theta) - g(theta + s)` for each step s, by symmetric
-//! corrections of rank one (J. E. Dennis, D. M. Gay and R. E. Welsch, *ACM Trans. Mathematical
-//! Software* 7 (1981) 348-368, with the correction of C. G. Broyden, *Math. Computation* 21 (1967)
-//! 368-381). It decides about steps alone; a step with it that does not lower the loss is made
-//! without it.
+//! **The secant.** Gauss and Newton neglect the part of the second derivative that vanishes for white residuals of the
+//! right model. If the model is not right (a delay that is off by a few samples), they converge only by a constant
+//! factor per step. Near the minimum a matrix S replaces the neglected part, `(H + S) s = g(theta) - g(theta + s)` for
+//! each step s, by symmetric corrections of rank one (J. E. Dennis, D. M. Gay and R. E. Welsch, *ACM Trans.
+//! Mathematical Software* 7 (1981) 348-368, with the correction of C. G. Broyden, *Math. Computation* 21 (1967)
+//! 368-381). It affects only the steps; if a step with it does not decrease the loss, it is repeated without it.
 //!
-//! A step that makes the predictor unstable counts as one that does not lower the loss.
+//! A step to an unstable predictor counts as one that does not decrease the loss.
 //!
-//! **Limits.** A parameter with equal bounds is fixed. Else a step is cut where it meets a bound,
-//! and a parameter that rests at a bound while the loss falls outwards takes no part in it (an
-//! active set; J. Nocedal and S. J. Wright, *Numerical Optimization*, 2006, section 16.5).
+//! **Limits.** A parameter with equal bounds is fixed. Otherwise a step is cut at a bound, and a parameter at a bound
+//! beyond which the loss decreases is held there (an active set; J. Nocedal and S. J. Wright, *Numerical Optimization*,
+//! 2006, section 16.5).
 //!
-//! The search has converged when the undamped Gauss-Newton step of the free parameters predicts
-//! less than `tolerance` of relative decrease of the loss: `g' H^-1 g <= tolerance V`. In units of
-//! standard errors the distance left is about `sqrt(tolerance N)`, 1e-4 for the default and 8192
-//! samples; that last step is still taken. Where no step lowers the loss any more and the predicted
-//! decrease is as small as the rounding of the loss, it has converged as well.
+//! The search has converged when the undamped Gauss-Newton step of the free parameters predicts a relative decrease of
+//! the loss of less than `tolerance`: `g' H^-1 g <= tolerance V`. In units of standard errors the remaining distance is
+//! about `sqrt(tolerance N)`, 1e-4 for the default and 8192 samples; that last step is still taken. If no step
+//! decreases the loss and the predicted decrease is as small as the rounding of the loss, it has converged as well.
 
 pub mod basin;
 mod border;

@@ -1,4 +1,4 @@
-//! Requirements of a search on a model, and what it finds.
+//! Interface between a search and a model, and the result of a search.
 
 use std::ops::Range;
 
@@ -16,7 +16,7 @@ pub(crate) struct Linearisation {
 }
 
 impl Linearisation {
-    /// Nothing summed, over p parameters.
+    /// Creates zero sums over p parameters.
     pub fn empty(p: usize) -> Self {
         Self {
             sum_of_squares: 0.0,
@@ -38,28 +38,28 @@ impl Linearisation {
     }
 }
 
-/// A sum of squares over theta with its derivatives: what the search needs to know of a model. The
-/// search takes it as `dyn`: a call is nothing compared with a pass over a record, and it is
-/// compiled once for all models.
+/// A sum of squares over theta with its derivatives: the interface of the search to a model. The search uses it as
+/// `dyn`: the cost of a call is negligible compared with a pass over a record, and the search is compiled once for all
+/// models.
 pub(crate) trait Objective {
     /// True if the predictor exists: finite theta, stable polynomials.
     fn is_feasible(&self, theta: &[f64]) -> bool;
-    /// Sum of squares, `psi' eps` and `psi' psi` at a feasible theta; the workspace is room for
-    /// signals, kept from one linearisation to the next.
+    /// Returns sum of squares, `psi' eps` and `psi' psi` at a feasible theta; the workspace is memory for signals,
+    /// reused by the next linearisation.
     fn linearise(&self, theta: &[f64], workspace: &mut Workspace) -> Linearisation;
-    /// Sum of squares of the output, against which residuals count as zero.
+    /// Returns the sum of squares of the output, relative to which residuals count as zero.
     fn output_power(&self) -> f64;
-    /// Lower and upper bound of each parameter; equal bounds fix it. By default there are none.
+    /// Returns lower and upper bound of each parameter; equal bounds fix it. By default there are none.
     fn limits(&self) -> Option<&[(f64, f64)]> {
         None
     }
-    /// Places of the polynomials in theta that must be stable and have no limits of their own.
+    /// Returns the places of the polynomials in theta that must be stable and have no limits of their own.
     fn stable_blocks(&self) -> Vec<Range<usize>> {
         Vec::new()
     }
 }
 
-/// Where a search ended.
+/// Result of a search.
 #[derive(Debug, Clone)]
 pub(crate) struct Minimum {
     pub theta: Vec<f64>,

@@ -18,7 +18,7 @@ use crate::optimize::objective::{Linearisation, Objective};
 /// Largest reflection coefficient: a root this close to the circle is on it for any record.
 pub(crate) const BORDER: f64 = 1.0 - 1e-8;
 
-/// An objective in reflection coefficients in place of some of its polynomials.
+/// An objective in reflection coefficients instead of some of its polynomials.
 pub(crate) struct StableCoordinates<'o> {
     objective: &'o dyn Objective,
     blocks: Vec<Range<usize>>,
@@ -26,7 +26,7 @@ pub(crate) struct StableCoordinates<'o> {
 }
 
 impl<'o> StableCoordinates<'o> {
-    /// The coordinates, and theta in them. `None` when there is no polynomial to keep stable.
+    /// Returns the coordinates, and theta in them. `None` if there is no polynomial to keep stable.
     pub fn of(objective: &'o dyn Objective, theta: &[f64]) -> Option<(Self, Vec<f64>)> {
         let blocks = objective.stable_blocks();
         if blocks.is_empty() {
@@ -50,7 +50,7 @@ impl<'o> StableCoordinates<'o> {
         Some((coordinates, kappa))
     }
 
-    /// Back to theta.
+    /// Converts back to theta.
     pub fn theta(&self, kappa: &[f64]) -> Vec<f64> {
         let mut theta = kappa.to_vec();
         for block in &self.blocks {
@@ -59,7 +59,7 @@ impl<'o> StableCoordinates<'o> {
         theta
     }
 
-    /// True when a reflection coefficient lies at its bound.
+    /// True if a reflection coefficient is at its bound.
     pub fn is_on_border(&self, kappa: &[f64]) -> bool {
         let mut coefficients = self.blocks.iter().flat_map(|block| &kappa[block.clone()]);
         coefficients.any(|k| k.abs() >= BORDER)
@@ -120,7 +120,7 @@ impl Objective for StableCoordinates<'_> {
     }
 }
 
-/// `[p_1, ..., p_n]` from its reflection coefficients.
+/// Returns `[p_1, ..., p_n]` from its reflection coefficients.
 fn polynomial(k: &[f64]) -> Vec<f64> {
     let mut p: Vec<f64> = Vec::with_capacity(k.len());
     for &km in k {
@@ -133,7 +133,7 @@ fn polynomial(k: &[f64]) -> Vec<f64> {
     p
 }
 
-/// `dp_i/dk_j` by rows.
+/// Returns `dp_i/dk_j` by rows.
 fn polynomial_jacobian(k: &[f64]) -> Vec<f64> {
     let n = k.len();
     let mut jacobian = vec![0.0; n * n];
@@ -157,7 +157,7 @@ fn polynomial_jacobian(k: &[f64]) -> Vec<f64> {
     jacobian
 }
 
-/// Reflection coefficients by the recursion backwards; `None` for a polynomial that is not stable.
+/// Returns the reflection coefficients by the backward recursion; `None` for a polynomial that is not stable.
 fn reflection_coefficients(p: &[f64]) -> Option<Vec<f64>> {
     let mut p = p.to_vec();
     let mut k = vec![0.0; p.len()];

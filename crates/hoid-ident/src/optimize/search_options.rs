@@ -1,9 +1,9 @@
 //! Method and limits of a search.
 
-/// How a step is made.
+/// Method of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SearchMethod {
-    /// Levenberg-Marquardt, along the border of stability where that is in the way.
+    /// Levenberg-Marquardt, along the border of stability if necessary.
     #[default]
     Automatic,
     /// Gauss-Newton with halved steps.
@@ -21,7 +21,7 @@ hoid_model::named_choice!(SearchMethod, "search method", 4, {
 /// Method and limits of the search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchOptions {
-    /// How a step is made. Default automatic.
+    /// Method of a step. Default automatic.
     pub method: SearchMethod,
     /// Largest number of steps from each start. Default 100.
     pub max_iterations: usize,

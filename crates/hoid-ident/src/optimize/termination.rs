@@ -1,31 +1,30 @@
-//! How a search ended.
+//! Termination of a search.
 
 use std::fmt;
 
-/// How a search ended.
+/// Reason for the end of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum Reason {
     /// A linear problem, solved directly.
     Direct,
-    /// The next step promises no decrease that matters.
+    /// The next step predicts no relevant decrease.
     SmallDecrease,
-    /// The loss is smallest on the border of stability: a root of C or F lies on the unit circle.
+    /// The loss is smallest on the border of stability: a root of C or F is on the unit circle.
     Border,
     /// The residuals are zero up to rounding.
     ExactFit,
-    /// The limit of iterations was reached first.
+    /// The limit of iterations was reached.
     IterationLimit,
-    /// No step lowers the loss although the gradient is not zero; often the loss falls only across
-    /// the border of stability.
+    /// No step decreases the loss although the gradient is not zero; often the loss decreases only across the border of
+    /// stability.
     NoDescent,
-    /// An iteration of instrumental variables that moves the parameters no more.
+    /// An iteration of instrumental variables has converged.
     Settled,
-    /// An iteration of instrumental variables without an end, which moves the parameters by less
-    /// than half a standard error: they solve its equation for instruments that were then held.
+    /// An iteration of instrumental variables did not converge, and moves the parameters by less than half a standard
+    /// error: they solve its equation for instruments that were then fixed.
     InstrumentsHeld,
-    /// Instrumental variables ended with a pole outside the unit circle, which was then reflected
-    /// into it.
+    /// Instrumental variables ended with a pole outside the unit circle, which was then reflected into it.
     UnstableEstimate,
 }
 
@@ -51,17 +50,17 @@ impl fmt::Display for Reason {
     }
 }
 
-/// How a search ended, and after how many steps.
+/// Reason and number of steps of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Termination {
-    /// Why it ended.
+    /// The reason.
     pub reason: Reason,
-    /// Steps taken from the start that won.
+    /// Steps taken from the best start.
     pub iterations: usize,
 }
 
 impl Termination {
-    /// True when a minimum was reached.
+    /// True if a minimum was reached.
     pub fn converged(&self) -> bool {
         matches!(
             self.reason,
@@ -76,7 +75,7 @@ impl Termination {
 }
 
 impl fmt::Display for Termination {
-    /// The reason, and the number of steps where there was a search.
+    /// Formats the reason, and the number of steps if there was a search.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.reason, self.iterations) {
             (Reason::Direct, _) => write!(f, "{}", self.reason),

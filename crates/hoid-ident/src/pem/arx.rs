@@ -25,7 +25,7 @@ use crate::{
 /// refined, the solution keeps all digits but three, the covariance nine.
 const WELL_CONDITIONED: f64 = 1e7;
 
-/// Share of the residuals in the power of the output below which the fit counts as exact here.
+/// Share of the residuals in the power of the output below which the fit counts as exact.
 const EXACT: f64 = 1e-12;
 
 /// Solution of the regression with the data for its uncertainty.
@@ -37,7 +37,7 @@ struct Regression {
     pub inverse_gram: Vec<f64>,
 }
 
-/// The fit of a criterion whose residual is linear in theta.
+/// Fits a criterion whose residual is linear in theta.
 ///
 /// # Errors
 /// [`IdentError::SingularRegressors`].
@@ -111,7 +111,7 @@ fn regress(orders: &Orders, data: &[Data<'_>], first: usize) -> Result<Regressio
     })
 }
 
-/// The output, and the columns of Phi: u(t-1) .. u(t-na) without their sign, e(t-nk) ...
+/// Returns the output, and the columns of Phi: u(t-1) .. u(t-na) without their sign, e(t-nk) ...
 fn columns<'a>(orders: &Orders, data: &Data<'a>, first: usize) -> Vec<Lagged<'a>> {
     let n = data.u.len();
     let outputs = (0..=orders.na).map(|lag| Lagged {
@@ -125,7 +125,7 @@ fn columns<'a>(orders: &Orders, data: &Data<'a>, first: usize) -> Vec<Lagged<'a>
     outputs.chain(inputs).collect()
 }
 
-/// None if QR is to decide.
+/// Returns `None` if QR has to decide.
 fn by_normal_equations(orders: &Orders, data: &[Data<'_>], first: usize) -> Option<Regression> {
     let p = orders.na + orders.nb;
     if p == 0 || first < orders.first_regressed_sample() {
@@ -147,7 +147,7 @@ fn by_normal_equations(orders: &Orders, data: &[Data<'_>], first: usize) -> Opti
     });
     let factor = scaled.cholesky()?;
     let inverse = factor.inverse();
-    // Not <=: NaN is not a condition either.
+    // Not <=: NaN is not a valid condition either.
     let well_conditioned = p as f64 * inverse.trace() < WELL_CONDITIONED;
     if !well_conditioned {
         return None;
@@ -169,7 +169,7 @@ fn by_normal_equations(orders: &Orders, data: &[Data<'_>], first: usize) -> Opti
         theta[i] += correction[i];
         squares -= correction[i] * sign(i) * residuals.products[i];
     }
-    // An exact fit leaves the rounding of the residuals, which QR reports better.
+    // An exact fit leaves the rounding of the residuals, which is more accurate by QR.
     if !squares.is_finite() || squares < EXACT * power {
         return None;
     }

@@ -1,8 +1,8 @@
 //! The prediction-error criterion with constraints and priors.
 //!
-//! `N V(theta) = sum eps^2 + N sum_i w_i (theta_i - theta*_i)^2` (the regularised criterion of L.
-//! Ljung, *System Identification*, 1999, eq. 7.107), with bounds on each parameter, and on request
-//! only models that are stable from e to u.
+//! `N V(theta) = sum eps^2 + N sum_i w_i (theta_i - theta*_i)^2` (the regularised criterion of L. Ljung, *System
+//! Identification*, 1999, eq. 7.107), with bounds on each parameter, and optionally only models that are stable from e
+//! to u.
 
 use std::ops::Range;
 
@@ -22,12 +22,12 @@ pub(crate) struct ConstrainedCriterion<'c, 'a> {
     pub limits: Option<Vec<(f64, f64)>>,
     /// The guess for each parameter that has one, with its weight in the sum of squares.
     pub prior: Vec<(usize, Prior)>,
-    /// True when the roots of A must lie inside the unit circle as well.
+    /// True if the roots of A must be inside the unit circle as well.
     pub stable: bool,
 }
 
 impl ConstrainedCriterion<'_, '_> {
-    /// The sum of squared residuals without the prior.
+    /// Returns the sum of squared residuals without the prior.
     pub fn without_prior(&self, theta: &[f64], at: &Linearisation) -> f64 {
         at.sum_of_squares - self.penalty(theta)
     }

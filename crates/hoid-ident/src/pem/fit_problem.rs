@@ -22,7 +22,7 @@ pub(crate) struct FitProblem<'q, 'a> {
 }
 
 impl<'q, 'a> FitProblem<'q, 'a> {
-    /// From the start that was given, or from those that `own_starts` makes.
+    /// Creates the searches from the given start, or from those of `own_starts`.
     ///
     /// # Errors
     /// [`IdentError::BadStart`].
@@ -48,11 +48,10 @@ impl<'q, 'a> FitProblem<'q, 'a> {
         })
     }
 
-    /// The fit at the lowest minimum, once all searches have ended.
+    /// Returns the fit at the lowest minimum, when all searches have ended.
     ///
     /// # Errors
-    /// [`IdentError::NoFiniteLoss`] where no search came anywhere,
-    /// [`IdentError::SingularInformation`].
+    /// [`IdentError::NoFiniteLoss`] if no search was successful, [`IdentError::SingularInformation`].
     pub fn fit(self, workspace: &mut Workspace) -> Result<Fit, IdentError> {
         let Self {
             settings, constrained, ..
@@ -62,7 +61,7 @@ impl<'q, 'a> FitProblem<'q, 'a> {
             (start, minimum) = (label, lower);
         }
         if settings.start.is_none() && matches!(minimum.termination.reason, Reason::Border | Reason::NoDescent) {
-            // The loss often has a minimum on the border besides a lower one inside.
+            // The loss often has a lower minimum inside in addition to one on the border.
             let inside = with_c_drawn_inside(&settings.orders, &minimum.theta);
             let known = minimum.at.sum_of_squares;
             let others = inside
@@ -105,7 +104,7 @@ impl<'q, 'a> FitProblem<'q, 'a> {
     }
 }
 
-/// The start with a stable A where that was requested; `None` if the roots of A cannot be found.
+/// Returns the start with a stable A if that was requested; `None` if the roots of A cannot be found.
 fn stabilised(mut start: Start, constrained: &ConstrainedCriterion<'_, '_>) -> Option<Start> {
     if constrained.stable {
         let na = constrained.criterion.orders.na;
@@ -115,7 +114,7 @@ fn stabilised(mut start: Start, constrained: &ConstrainedCriterion<'_, '_>) -> O
     Some(start)
 }
 
-/// A start that was given, of the right length and with a predictor that exists.
+/// Checks a given start: its length, and the existence of the predictor.
 fn checked_start(theta: &[f64], constrained: &ConstrainedCriterion<'_, '_>) -> Result<Vec<f64>, IdentError> {
     let orders = constrained.criterion.orders;
     let bad = |reason: &str| IdentError::BadStart {

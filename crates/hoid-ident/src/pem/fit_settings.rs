@@ -11,7 +11,7 @@ use crate::{
     pem::constraints::ConstrainedCriterion,
 };
 
-/// The options of an estimator once they are checked and the automatic ones decided.
+/// The options of an estimator after the checks, with the automatic ones resolved.
 #[derive(Debug, Clone)]
 pub(crate) struct FitSettings {
     pub structure: Structure,
@@ -20,23 +20,23 @@ pub(crate) struct FitSettings {
     pub search: SearchOptions,
     /// Number of own starts from which the search runs to its end.
     pub starts: usize,
-    /// Start of the search instead of the own ones.
+    /// Start of the search, instead of the estimator's own starts.
     pub start: Option<Vec<f64>>,
     pub constraints: BTreeMap<String, Constraint>,
     pub priors: BTreeMap<String, Prior>,
     pub loss: Loss,
     /// True if u of each record has a level.
     pub level: bool,
-    /// True when A must be stable too.
+    /// True if A must be stable too.
     pub stable: bool,
 }
 
 impl FitSettings {
-    /// The criterion over these records, with residuals from sample `first` on at the earliest, and
-    /// their sample time.
+    /// Returns the criterion over these records, with residuals from sample `first` on at the earliest, and their
+    /// sample time.
     ///
     /// # Errors
-    /// [`IdentError`] where the records are not informative enough.
+    /// [`IdentError`] if the records are not informative enough.
     pub fn criterion<'r>(
         &self,
         records: &'r [Record],
@@ -65,7 +65,7 @@ impl FitSettings {
         Ok((criterion, sample_time))
     }
 
-    /// The criterion with the constraints and the priors.
+    /// Returns the criterion with the constraints and the priors.
     pub fn constrained<'c, 'a>(&self, criterion: &'c Criterion<'a>) -> ConstrainedCriterion<'c, 'a> {
         let names = self.orders.parameter_names();
         let unlimited = (f64::NEG_INFINITY, f64::INFINITY);
@@ -89,12 +89,12 @@ impl FitSettings {
         }
     }
 
-    /// True for the plain sum of squares: no constraint, no prior, no other loss.
+    /// True for the plain sum of squares: without constraints, priors or another loss.
     pub fn is_unconstrained(&self) -> bool {
         self.constraints.is_empty() && self.priors.is_empty() && self.loss == Loss::Quadratic && !self.stable
     }
 
-    /// True when least squares gives the fit in one step.
+    /// True if least squares gives the fit in one step.
     pub fn is_linear(&self) -> bool {
         self.structure.is_linear() && self.initial_state != InitialState::Backcast && self.is_unconstrained()
     }

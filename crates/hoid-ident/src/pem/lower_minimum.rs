@@ -1,13 +1,12 @@
-//! A lower minimum than the one that the default starts lead to, where there may be one.
+//! Search for a lower minimum than that of the default starts, for models and records that may have one.
 //!
-//! The starts that are tried are from all over the region of stability ([`crate::initial_guess::broad`]). A few steps
-//! of the search from each show which of them lead down; the best go on to the end, unless they come close to the
-//! minimum that is known without a promise to end lower. What is known stays as it is, to the last digit, where nothing
-//! lower is found.
+//! The starts cover the whole region of stability ([`crate::initial_guess::broad`]). A few steps of the search from
+//! each show which of them decrease the loss; the best are continued to the end, unless they come close to the known
+//! minimum without a predicted lower end. If nothing lower is found, the known result is unchanged to the last digit.
 //!
-//! **Where.** A record of some hundred samples has many minima, and a model with more coefficients
-//! than the operator's (nb, nf > 2, nc > 0, nd > 4) has them in longer records too. There the first few
-//! steps are taken on a part of the record, which costs the same however long the record is.
+//! **Conditions.** A record of some hundred samples has many minima, and a model with more coefficients than the
+//! operator's (nb, nf > 2, nc > 0, nd > 4) has them in longer records too. There the first few steps use a part of the
+//! record, whose cost does not depend on the length of the record.
 
 use super::{constraints::ConstrainedCriterion, fit_settings::FitSettings};
 use crate::{
@@ -17,24 +16,23 @@ use crate::{
     optimize::{Minimum, basin::lies_in_basin, minimise},
 };
 
-/// Residuals up to which every model is searched widely, and on which others take their first
-/// steps.
+/// Number of residuals up to which every model is searched widely, and of the part for the first steps of other models.
 const SPAN: usize = 1000;
-/// Coefficients of D that the operator's models have at most.
+/// Largest number of coefficients of D of the operator's models.
 const LARGEST_ND: usize = 4;
-/// Starts that take a few steps, the best by their loss.
+/// Number of starts for a few steps, the best by their loss.
 const TRIED: usize = 24;
-/// Steps of each.
+/// Number of steps from each of them.
 const STEPS: usize = 8;
-/// Starts of which the search runs to its end, on the whole record.
+/// Number of starts whose search runs to its end, on the whole record.
 const FINISHED: usize = 8;
-/// The same two of a record that is longer than the span.
+/// The same two numbers for a record that is longer than the span.
 const OF_LONG: [usize; 2] = [12, 3];
-/// Relative decrease of the loss from which on a minimum is another one.
+/// Relative decrease of the loss above which a minimum counts as another one.
 const LOWER: f64 = 1e-7;
 
-/// A lower minimum with the name of its start. With a start that was given, or with a single start,
-/// no other is searched for.
+/// Returns a lower minimum with the name of its start. With a given start, or with a single start, no other is searched
+/// for.
 pub(crate) fn lower_minimum(
     settings: &FitSettings,
     constrained: &ConstrainedCriterion<'_, '_>,
@@ -84,14 +82,13 @@ fn may_have_more_minima(criterion: &Criterion<'_>) -> bool {
     o.na == 0 && o.nb > 0 && o.nf > 0 && (larger || criterion.residuals() <= SPAN)
 }
 
-/// The criterion over the first samples, as many as [`SPAN`] residuals need: records from the first
-/// one on, the last of them cut.
+/// Returns the criterion over the first samples, as many as [`SPAN`] residuals need: records from the first one on, the
+/// last of them truncated.
 fn first_span<'a>(criterion: &Criterion<'a>) -> Criterion<'a> {
     let mut left = SPAN;
     let mut data = Vec::new();
     for d in &criterion.data {
-        // A piece with fewer residuals than this carries little information more than its initial
-        // states.
+        // A piece with fewer residuals than this carries little information beyond its initial states.
         if left < SPAN / 10 {
             break;
         }

@@ -1,5 +1,4 @@
-//! Fits by the prediction error: in one step where the residual is linear in theta, else by
-//! searches.
+//! Fits by the prediction error: in one step if the residual is linear in theta, otherwise by searches.
 
 use hoid_model::Record;
 
@@ -8,7 +7,7 @@ use crate::{
     optimize::Objective, pem::arx, pem::fit_problem::FitProblem, pem::fit_settings::FitSettings,
 };
 
-/// One model for all records, with residuals from sample `first` of each record on at the earliest.
+/// Fits one model to all records, with residuals from sample `first` of each record on at the earliest.
 ///
 /// # Errors
 /// [`IdentError`].

@@ -7,12 +7,12 @@
 //! 0.6745, from the residuals of the round before; it is held after [`SCALES`] rounds, so that the
 //! rounds settle.
 //!
-//! A bounded loss bounds the weight of a residual, and not the effect of a sample on the regressors: one sample of e
-//! that is wrong is in the response of the operator for seconds, with residuals that are large because theta is right,
-//! and theta gives way (F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw and W. A. Stahel, *Robust Statistics*, 1986,
-//! section 6.3: the influence is that of the residual times that of the position). So that the position is bounded too,
-//! the records come here with each sample of e and u held to its neighbours ([`crate::faults::resistant`], by the
-//! estimator); of a normal channel one sample in 16 000 is moved, and the efficiency is that of the loss.
+//! A bounded loss bounds the weight of a residual, and not the effect of a sample on the regressors: one wrong sample
+//! of e is in the response of the operator for seconds, with residuals that are large because theta is right, and theta
+//! is biased (F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw and W. A. Stahel, *Robust Statistics*, 1986, section 6.3:
+//! the influence is that of the residual times that of the position). To bound the position too, the estimator first
+//! limits each sample of e and u by its neighbours ([`crate::faults::resistant`]); in a normal channel one sample in 16
+//! 000 is moved, and the efficiency is that of the loss.
 //!
 //! Covariance (Huber, eq. 7.6.8, for residuals that are independent of the gradient):
 //! `s^2 kappa (psi' psi)^-1`, `kappa = mean(rho'^2) / mean(rho'')^2`, with the unweighted psi.
@@ -35,7 +35,7 @@ const SCALES: usize = 10;
 /// Largest number of rounds.
 const ROUNDS: usize = 50;
 
-/// Rounds end when theta moves by less than this share of its standard errors.
+/// The rounds end when theta moves by less than this share of its standard errors.
 const SETTLED: f64 = 1e-5;
 
 /// Weights of Huber's loss over the rounds.
@@ -47,7 +47,7 @@ struct Reweighting {
 }
 
 impl Reweighting {
-    /// Before the first round.
+    /// Returns the state before the first round.
     pub fn new(threshold: f64) -> Self {
         Self {
             threshold,
@@ -56,11 +56,11 @@ impl Reweighting {
         }
     }
 
-    /// Square roots of the weights for the next round, by the residuals of each record. `None` when
-    /// the residuals have no scale (half of them are zero).
+    /// Returns the square roots of the weights for the next round, from the residuals of each record. `None` if the
+    /// residuals have no scale (half of them are zero).
     pub fn next(&mut self, residuals: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
-        // A scale that is estimated in every round can alternate with the weights; held, each round lowers Huber's
-        // loss.
+        // A scale estimated in every round can alternate with the weights; with a fixed one, each round decreases
+        // Huber's loss.
         if self.round < SCALES {
             self.scale = median_absolute(residuals) / 0.674_489_750_196_081_7;
         }
@@ -70,7 +70,7 @@ impl Reweighting {
         (bound > 0.0).then(|| residuals.iter().map(|r| r.iter().map(weight).collect()).collect())
     }
 
-    /// Factor of `(psi' psi)^-1` in the covariance, by n - p degrees of freedom.
+    /// Returns the factor of `(psi' psi)^-1` in the covariance, with n - p degrees of freedom.
     pub fn variance(&self, residuals: &[Vec<f64>], unknowns: usize) -> f64 {
         let (mut n, mut inside, mut square) = (0_usize, 0_usize, 0.0);
         for r in residuals.iter().flatten().map(|r| r / self.scale) {
@@ -83,7 +83,7 @@ impl Reweighting {
     }
 }
 
-/// Rounds of reweighted searches from the minimum of the squares, which was found from `start`.
+/// Runs rounds of reweighted searches from the least squares minimum, which was found from `start`.
 ///
 /// # Errors
 /// [`IdentError::NoFiniteLoss`], [`IdentError::SingularInformation`].

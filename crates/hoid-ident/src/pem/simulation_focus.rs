@@ -1,7 +1,7 @@
-//! Fits whose system is to simulate well.
+//! Fits of models for simulation.
 //!
-//! First the system `B/(A F)`, by the output-error criterion: the simulation error is all that
-//! counts. Then C and D, by the prediction error with that system held.
+//! First the system `B/(A F)` is fitted by the output-error criterion, i.e. only by the simulation error. Then C and D
+//! are fitted by the prediction error with that system fixed.
 //!
 //! **Covariance.** The simulation error is `v = H eps` with `H = C/(A D)`, not white. With psi the
 //! gradient of the simulation error (initial states projected out) the estimate of the system has,
@@ -25,7 +25,7 @@ use crate::{
     pem::prediction_focus,
 };
 
-/// Fits a structure so that its system simulates well; `settings` are those of the structure.
+/// Fits a structure by the simulation error of its system; `settings` are those of the structure.
 ///
 /// # Errors
 /// [`IdentError`] of either fit.
@@ -78,7 +78,7 @@ pub(crate) fn fit(settings: &FitSettings, records: &[Record], first: usize) -> R
     })
 }
 
-/// Names of A become those of F, where the simulation has its poles; C and D have no part in it.
+/// Renames coefficients of A to those of F, which contains the poles in the simulation; C and D are left out.
 fn as_poles_of_f<T: Copy>(named: &BTreeMap<String, T>) -> BTreeMap<String, T> {
     named
         .iter()
@@ -87,13 +87,13 @@ fn as_poles_of_f<T: Copy>(named: &BTreeMap<String, T>) -> BTreeMap<String, T> {
         .collect()
 }
 
-/// Those named after a coefficient of C or D.
+/// Selects the entries of coefficients of C or D.
 fn of_noise_model<T: Copy>(named: &BTreeMap<String, T>) -> impl Iterator<Item = (String, T)> {
     let of_noise = named.iter().filter(|(name, _)| name.starts_with(['c', 'd']));
     of_noise.map(|(name, value)| (name.clone(), *value))
 }
 
-/// The system's coefficients, held at their values.
+/// Fixes the coefficients of the system at their values.
 fn hold(system: &PolynomialModel, orders: &Orders) -> Vec<(String, Constraint)> {
     let pole = if orders.na > 0 { 'a' } else { 'f' };
     let poles = (1..).zip(system.f()).map(|(i, f)| (format!("{pole}{i}"), *f));
@@ -104,7 +104,7 @@ fn hold(system: &PolynomialModel, orders: &Orders) -> Vec<(String, Constraint)> 
         .collect()
 }
 
-/// Covariance of theta; `None` when the noise model is not stable, or where there is no noise.
+/// Covariance of theta; `None` if the noise model is not stable, or if there is no noise.
 fn covariance(simulated: &Fit, fit: &Fit, records: &[Record], first: usize) -> Result<Option<Vec<f64>>, IdentError> {
     let (Some(_), Some(of_noise)) = (&simulated.covariance, &fit.covariance) else {
         return Ok(None);
@@ -158,7 +158,7 @@ fn covariance(simulated: &Fit, fit: &Fit, records: &[Record], first: usize) -> R
     Ok(Some(covariance))
 }
 
-/// `(C/D)` applied to x backwards in time.
+/// Applies `(C/D)` to x backwards in time.
 fn backwards(c: &[f64], d: &[f64], x: &[f64]) -> Vec<f64> {
     let mut reversed: Vec<f64> = x.iter().rev().copied().collect();
     divide_in_place(d, &mut reversed);

@@ -1,4 +1,4 @@
-//! An option of a batch estimator, declared once: the prior knowledge of it, what its text sets, what is printed of it.
+//! An option of a batch estimator, declared once: its setting, its parser, and its printed form.
 
 use hoid_model::SampleTime;
 
@@ -7,10 +7,10 @@ use crate::IdentError;
 
 /// Sets an option of an estimator from a text.
 type Set<E, X> = Box<dyn Fn(&mut E, &Setting, &str) -> Result<(), X>>;
-/// The value as text at a sample time; `None` for one that is not worth a line.
+/// The value as text at a sample time; `None` for one that is not printed.
 type Words<E> = Box<dyn Fn(&E, SampleTime) -> Option<String>>;
 
-/// An option of an estimator `E`, whose texts are refused by an `X`.
+/// An option of an estimator `E`, with errors of type `X` for invalid texts.
 pub struct BatchOption<E, X = IdentError> {
     /// Name, type, default, bounds, help.
     pub setting: Setting,
@@ -20,12 +20,12 @@ pub struct BatchOption<E, X = IdentError> {
 
 /// An estimator that declares its options.
 pub trait BatchOptions: Sized + 'static {
-    /// All of them, in the order in which they are set and printed.
+    /// Returns all options, in the order in which they are set and printed.
     fn options() -> Vec<BatchOption<Self>>;
 }
 
 impl<E: 'static, X: 'static> BatchOption<E, X> {
-    /// An option and its setter.
+    /// Creates an option with its setter.
     pub fn new(setting: Setting, set: impl Fn(&mut E, &Setting, &str) -> Result<(), X> + 'static) -> Self {
         Self {
             setting,
@@ -34,7 +34,7 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
         }
     }
 
-    /// Printed among the settings that were used, under this name.
+    /// Returns the option with a name under which it is printed among the settings in use.
     #[must_use]
     pub fn printed(self, name: &'static str, words: impl Fn(&E, SampleTime) -> Option<String> + 'static) -> Self {
         Self {
@@ -43,21 +43,21 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
         }
     }
 
-    /// Sets it from its text.
+    /// Sets the option from its text.
     ///
     /// # Errors
-    /// For a text that is not a value of it, or contradicts what was set before.
+    /// For a text that is not a valid value, or contradicts an option that was set before.
     pub fn set(&self, of: &mut E, text: &str) -> Result<(), X> {
         (self.set)(of, &self.setting, text)
     }
 
-    /// Its name and value as they are printed.
+    /// Returns its name and value as printed.
     pub fn words(&self, of: &E, sample_time: SampleTime) -> Option<(&'static str, String)> {
         let (name, words) = self.printed.as_ref()?;
         Some((*name, words(of, sample_time)?))
     }
 
-    /// The same with another reader of its texts.
+    /// Returns the same option with another parser.
     #[must_use]
     pub fn read_by(self, set: impl Fn(&mut E, &Setting, &str) -> Result<(), X> + 'static) -> Self {
         Self {
@@ -66,7 +66,7 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
         }
     }
 
-    /// The same option of the estimator that contains this one.
+    /// Returns the same option for the estimator that contains this one.
     pub fn within<W: 'static, Y: From<X> + 'static>(
         self,
         part: fn(&W) -> &E,

@@ -1,4 +1,4 @@
-//! Types of values, and what numbers may be.
+//! Types of values, and bounds of numbers.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use std::fmt;
 pub enum Kind {
     /// Yes or no.
     Flag,
-    /// A whole number.
+    /// An integer.
     Count,
     /// A number; `inf` if the bounds allow it.
     Number,
@@ -15,15 +15,15 @@ pub enum Kind {
     Memory,
     /// A number, or `off`.
     NumberOrOff,
-    /// A number, or the word alone for this one.
+    /// A number, or the name of the option alone, which means this number.
     NumberOrDefault(&'static str),
     /// A transfer function of s, as `90/(s(s+6))`.
     Element,
     /// `LO..HI`, two finite numbers in order.
     Span,
-    /// `LO..HI`, of which either end may be left out.
+    /// `LO..HI`, with either end optional.
     OpenSpan,
-    /// A whole number, or `LO..HI` to search.
+    /// An integer, or `LO..HI` for a search.
     Counts,
     /// A number, or `LO..HI`.
     NumberOrSpan,
@@ -33,14 +33,13 @@ pub enum Kind {
     Guess,
     /// One of these words.
     Choice(&'static [&'static str]),
-    /// A text, as the name of a channel.
+    /// A text, such as the name of a channel.
     Channel,
-    /// Names, as `K,T_L`.
+    /// Names, such as `K,T_L`.
     Names,
-    /// Known properties of a person: `population`, `none`, `NAME=CENTRE:SPREAD,..`, or a file of a
-    /// fit.
+    /// Prior knowledge of a person: `population`, `none`, `NAME=CENTRE:SPREAD,..`, or the file of a fit.
     Prior,
-    /// Values of a type by name, as `b0=256,f=inf`.
+    /// Values of a type by name, such as `b0=256,f=inf`.
     Named(&'static Kind),
 }
 
@@ -51,7 +50,7 @@ pub enum Bounds {
     Any,
     /// Any finite number.
     Finite,
-    /// More than zero, finite or not.
+    /// Above zero, finite or not.
     Positive,
     /// More than zero and finite.
     PositiveFinite,
@@ -66,7 +65,7 @@ pub enum Bounds {
 }
 
 impl Bounds {
-    /// True for a number within them.
+    /// True for a number within the bounds.
     pub fn hold(self, x: f64) -> bool {
         match self {
             Self::Any => !x.is_nan(),

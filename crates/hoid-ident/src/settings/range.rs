@@ -1,4 +1,4 @@
-//! Ranges as users write them: whole numbers that are searched, delays in samples and in seconds.
+//! Ranges as typed by users: integers to search, delays in samples and in seconds.
 
 use std::{fmt, ops::RangeInclusive, str::FromStr};
 
@@ -35,7 +35,7 @@ impl Value for RangeInclusive<usize> {
     }
 }
 
-/// A number that is not negative, or `LO..HI` of such numbers.
+/// A non-negative number, or `LO..HI` of such numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OneOrSpan(pub f64, pub f64);
 
@@ -63,23 +63,23 @@ impl Value for OneOrSpan {
     }
 }
 
-/// A delay as it is given: of b0 in samples, or the dead time in s.
+/// A given delay: of b0 in samples, or the dead time in s.
 #[derive(Debug, Clone, PartialEq)]
 pub enum DelayRange {
-    /// nk, the first and the last.
+    /// First and last nk.
     Samples(RangeInclusive<usize>),
-    /// tau_e, the shortest and the longest.
+    /// Shortest and longest tau_e.
     Seconds(f64, f64),
 }
 
 impl DelayRange {
-    /// The delay that was given in samples or in seconds, of which one is.
+    /// Returns the delay that was given, in samples or in seconds.
     pub fn given(nk: Option<&Self>, delay_s: Option<OneOrSpan>) -> Option<Self> {
         nk.cloned()
             .or(delay_s.map(|OneOrSpan(low, high)| Self::Seconds(low, high)))
     }
 
-    /// nk of both ends: tau_e = (nk - 1) Ts.
+    /// Returns nk of both ends: tau_e = (nk - 1) Ts.
     pub fn samples(&self, sample_time: SampleTime) -> RangeInclusive<usize> {
         match self {
             Self::Samples(range) => range.clone(),
@@ -97,7 +97,7 @@ impl fmt::Display for DelayRange {
     }
 }
 
-/// `N` or `LO..HI` in samples, or with an s after one or both ends in seconds.
+/// `N` or `LO..HI` in samples, or in seconds if one or both ends are followed by an s.
 impl Value for DelayRange {
     const KIND: Kind = Kind::Delay;
 
@@ -138,7 +138,7 @@ impl FromStr for DelayRange {
 impl FromStr for OneOrSpan {
     type Err = String;
 
-    /// For numbers that are not negative.
+    /// Parses non-negative numbers.
     fn from_str(text: &str) -> Result<Self, String> {
         let read = Self::read(text).map_err(|expected| format!("{text:?}: expected {expected}"))?;
         match read.0 >= 0.0 {

@@ -1,4 +1,4 @@
-//! Known properties of an option.
+//! Description of an option.
 
 use hoid_model::{NamedChoice, Structure};
 
@@ -11,22 +11,22 @@ use crate::IdentError;
 /// An option: name, type, unit, default, bounds, help.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
-    /// Name, with underscores: a keyword in Python, with hyphens a flag of the command line.
+    /// Name, with underscores: a keyword in Python, and with hyphens a flag of the command line.
     pub name: &'static str,
     /// Type of its value.
     pub kind: Kind,
     /// Unit of its value; empty if it has none.
     pub unit: &'static str,
-    /// Default as text, or as text; empty if nothing represents it.
+    /// Default as text, or a description of it; empty if there is none.
     pub default: String,
     /// Bounds of its numbers.
     pub bounds: Bounds,
-    /// Its behaviour, without a full stop.
+    /// Description, without a full stop.
     pub help: String,
 }
 
 impl Setting {
-    /// An option of the type of its default.
+    /// Creates an option of the type of its default.
     pub fn of<V: Value>(name: &'static str, default: &V) -> Self {
         Self {
             name,
@@ -38,7 +38,7 @@ impl Setting {
         }
     }
 
-    /// An option of a type that no value has by itself, without a default.
+    /// Creates an option of an explicit type, without a default.
     pub fn new(name: &'static str, kind: Kind, help: &str) -> Self {
         Self {
             name,
@@ -50,22 +50,22 @@ impl Setting {
         }
     }
 
-    /// With another name than its field.
+    /// Returns the option with a name other than that of its field.
     pub fn name(self, name: &'static str) -> Self {
         Self { name, ..self }
     }
 
-    /// With a unit.
+    /// Returns the option with a unit.
     pub fn unit(self, unit: &'static str) -> Self {
         Self { unit, ..self }
     }
 
-    /// With bounds.
+    /// Returns the option with bounds.
     pub fn bounds(self, bounds: Bounds) -> Self {
         Self { bounds, ..self }
     }
 
-    /// With a default as text.
+    /// Returns the option with a default as text.
     pub fn default(self, words: &str) -> Self {
         Self {
             default: words.to_owned(),
@@ -73,7 +73,7 @@ impl Setting {
         }
     }
 
-    /// With help: lines of a comment.
+    /// Returns the option with help: the lines of a comment.
     pub fn help(self, lines: &[&str]) -> Self {
         let lines: Vec<&str> = lines.iter().map(|line| line.trim()).collect();
         Self {
@@ -97,10 +97,10 @@ impl Setting {
 }
 
 impl Setting {
-    /// One of the words of a choice, with hyphens or underscores.
+    /// Reads one of the words of a choice, with hyphens or underscores.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] with the words that there are.
+    /// [`IdentError::BadOption`] with the available words.
     pub fn word<T: NamedChoice>(&self, text: &str) -> Result<T, IdentError> {
         T::of_name(&text.replace('_', "-")).map_err(|_| {
             let words: Vec<&str> = T::CHOICES.iter().map(|choice| choice.choice_name()).collect();
@@ -108,7 +108,7 @@ impl Setting {
         })
     }
 
-    /// Refuses a text, with the expected value.
+    /// Returns the error for an invalid text, with the expected value.
     pub fn refused(&self, text: &str, expected: &str) -> IdentError {
         IdentError::BadOption {
             option: self.name.to_owned(),
@@ -117,7 +117,7 @@ impl Setting {
         }
     }
 
-    /// Refuses it next to others, with the reason.
+    /// Returns the error for a contradiction with other options, with the reason.
     pub fn error(&self, reason: impl Into<String>) -> IdentError {
         IdentError::Option {
             name: self.name,
@@ -126,16 +126,16 @@ impl Setting {
     }
 }
 
-/// Known properties of an estimator or a recursive method.
+/// Description of an estimator or a recursive method.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MethodSpec {
     /// Name as typed.
     pub name: &'static str,
-    /// Its definition, in a line without a full stop.
+    /// Description, in a line without a full stop.
     pub help: &'static str,
-    /// Where it comes from in the literature.
+    /// Source in the literature.
     pub source: &'static str,
-    /// The structures that it serves.
+    /// The structures for which it is valid.
     pub structures: &'static [Structure],
     /// Its options.
     pub settings: Vec<Setting>,

@@ -1,4 +1,4 @@
-//! Types of values, each with its one reader.
+//! Types of values, each with a single parser.
 
 use std::collections::BTreeMap;
 
@@ -7,21 +7,21 @@ use hoid_core::{predictor::Regressor, recursion::Stable};
 use super::kind::Kind;
 use crate::{Constraint, Prior};
 
-/// A type of values: its name, how it is read and written.
+/// A type of values: its name, its parser, its text form.
 pub trait Value: Sized {
-    /// The type as users know it.
+    /// The type as known to users.
     const KIND: Kind;
 
-    /// Reads a text.
+    /// Parses a text.
     ///
     /// # Errors
     /// The expected value, as text.
     fn read(text: &str) -> Result<Self, String>;
 
-    /// The value as text; `None` for one that has no meaning.
+    /// Returns the value as text; `None` for an invalid one.
     fn text(&self) -> Option<String>;
 
-    /// The numbers in it, which bounds are held against.
+    /// Returns the numbers in it, for the check of the bounds.
     fn numbers(&self) -> Vec<f64> {
         Vec::new()
     }
@@ -64,7 +64,7 @@ impl Value for f64 {
     }
 
     fn text(&self) -> Option<String> {
-        // 1e6 and not 1000000.
+        // 1e6 instead of 1000000.
         let (plain, short) = (self.to_string(), format!("{self:e}"));
         Some(if short.len() < plain.len() { short } else { plain })
     }
@@ -125,7 +125,7 @@ impl Value for (f64, f64) {
     }
 }
 
-/// Bounds `LO..HI` of a parameter, of which either end may be left out.
+/// Bounds `LO..HI` of a parameter, with either end optional.
 impl Value for Constraint {
     const KIND: Kind = Kind::OpenSpan;
 
@@ -167,7 +167,7 @@ impl Value for Prior {
     }
 }
 
-/// Names after each other, as `K,T_L`.
+/// Names separated by commas, such as `K,T_L`.
 impl Value for Vec<String> {
     const KIND: Kind = Kind::Names;
 
@@ -184,7 +184,7 @@ impl Value for Vec<String> {
     }
 }
 
-/// `NAME=VALUE,NAME=VALUE`, each name once.
+/// Parses `NAME=VALUE,NAME=VALUE`, each name once.
 ///
 /// # Errors
 /// The expected value, as text.
@@ -231,7 +231,7 @@ impl<V: Value> Value for BTreeMap<String, V> {
     }
 }
 
-/// One of a list of words; others are read too.
+/// Parses one of a list of words; the words of a second list are accepted too.
 fn choice<T: Copy>(text: &str, words: &[(&str, T)], others: &[(&str, T)]) -> Result<T, String> {
     let plain = text.to_ascii_lowercase().replace('_', "-");
     let known = || words.iter().map(|(word, _)| *word).collect::<Vec<_>>().join(", ");
@@ -243,7 +243,7 @@ fn choice<T: Copy>(text: &str, words: &[(&str, T)], others: &[(&str, T)]) -> Res
         .ok_or_else(|| format!("one of {}", known()))
 }
 
-/// Makes an enum a choice of words.
+/// Implements the value of an enum as a choice of words.
 macro_rules! choices {
     ($target:ty { $($word:literal = $value:path),+ $(,)? } $(also { $($alias:literal = $other:path),+ })?) => {
         impl Value for $target {

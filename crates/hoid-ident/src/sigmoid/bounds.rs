@@ -1,4 +1,4 @@
-//! Within what the parameters of a change are searched for.
+//! Search ranges of the parameters of a change.
 
 use std::collections::BTreeMap;
 
@@ -7,36 +7,35 @@ use hoid_model::{Form, SampleTime, operator_family::Coordinate};
 use super::layout::{Element, Layout};
 use crate::{Constraint, IdentError, family::coordinates};
 
-/// Bounds of zeta_nm: beyond them the two poles have nothing to do with each other.
+/// Bounds of zeta_nm: beyond them the two poles are independent.
 const ZETA_LIMITS: (f64, f64) = (1e-4, 100.0);
-/// T_I that can be given, s: a shorter lag is none, a longer one an integration.
+/// Admissible T_I, s: a shorter lag is equivalent to none, a longer one to an integration.
 const LAG_LIMITS_S: (f64, f64) = (1e-3, 1e6);
 /// Largest omega_nm as a share of pi/Ts.
 const HIGHEST_FREQUENCY: f64 = 0.999;
-/// Share of the span at either end in which t_M is not searched by default: less of a record does
-/// not determine two gains.
+/// Share of the span at either end in which t_M is not searched by default: a shorter part of a record does not
+/// determine two gains.
 const ENDS: f64 = 0.05;
-/// Largest rate times the sample time: four fifths of the change take two samples (2 ln 9 = 4.4). A
-/// faster one looks the same, and its likelihood would be a staircase in t_M, with a step for each
-/// sample (here its slope varies by 2 % with the place of t_M between two samples, for twice the
-/// rate by 50 %).
+/// Largest rate times the sample time: four fifths of the change take two samples (2 ln 9 = 4.4). A faster change is
+/// indistinguishable, and its likelihood would be a staircase in t_M, with a step for each sample (here its slope
+/// varies by 2 % with the position of t_M between two samples, for twice the rate by 50 %).
 pub(crate) const FASTEST: f64 = 2.0;
-/// Largest rate times the sample time that can be given.
+/// Largest admissible rate times the sample time.
 const FASTEST_GIVEN: f64 = 10.0;
-/// Smallest rate times the span: nine tenths of the change fill it (2 ln 19 = 5.9), and its ends
-/// are hardly distinguished from a line.
+/// Smallest rate times the span: nine tenths of the change fill it (2 ln 19 = 5.9), and it is hardly distinguished from
+/// a line.
 const SLOWEST: f64 = 5.0;
 
-/// Quantities that determine bounds.
+/// Quantities that determine the bounds.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Frame {
     pub ts_s: f64,
-    /// Time that all records have in common, s.
+    /// Time span common to all records, s.
     pub span_s: (f64, f64),
     pub delay_range_s: (f64, f64),
 }
 
-/// Bounds of theta; G by its logarithm, T_I by its inverse.
+/// Returns the bounds of theta; of G for its logarithm, of T_I for its inverse.
 ///
 /// # Errors
 /// [`IdentError::UnknownParameter`], [`IdentError::BadOption`].
@@ -74,13 +73,12 @@ pub(crate) fn limits(
 
 type Range = (f64, f64);
 
-/// Where a parameter has a meaning at all, and where it is searched for unless the user specifies
-/// otherwise, in the units that are typed.
+/// Returns the admissible range of a parameter, and its default search range, in the units that are typed.
 fn ranges(layout: &Layout, frame: &Frame, element: Element) -> Result<(Range, Range), IdentError> {
     let (from, to) = frame.span_s;
     let span = to - from;
     let sample_time = SampleTime::new(frame.ts_s)?;
-    // As the family seeks it.
+    // The search range of the family.
     let of_family = |coordinate: Coordinate| {
         let all = coordinates::limits(layout.form, layout.neuromuscular, frame.delay_range_s, sample_time);
         let place = layout.coordinates().iter().position(|c| *c == coordinate);

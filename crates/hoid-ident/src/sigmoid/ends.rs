@@ -11,10 +11,10 @@ use super::{
     layout::{Layout, MOST_VARYING},
 };
 
-/// A parameter with its unit and its error.
+/// A parameter with its unit and its estimate.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct NamedEstimate {
-    /// K, T_L, T_I ... as [`FamilyOperator::named`] calls them.
+    /// K, T_L, T_I ..., with the names of [`FamilyOperator::named`].
     #[serde(deserialize_with = "hoid_model::interned::name")]
     pub name: hoid_model::interned::Name,
     /// Unit; empty for none.
@@ -24,7 +24,7 @@ pub struct NamedEstimate {
     pub estimate: Estimate,
 }
 
-/// An operator with the errors of its parameters.
+/// An operator with the standard errors of its parameters.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ChangedOperator {
     /// The operator.
@@ -34,12 +34,12 @@ pub struct ChangedOperator {
 }
 
 impl ChangedOperator {
-    /// A parameter by its name.
+    /// Returns a parameter by its name.
     pub fn get(&self, name: &str) -> Option<Estimate> {
         self.parameters.iter().find(|p| p.name == name).map(|p| p.estimate)
     }
 
-    /// The same by the names of the thesis; `None` for another form than a gain and a lead with the
+    /// Returns the same with the names of the thesis; `None` for a form other than a gain and a lead with the
     /// neuromuscular part.
     pub fn lead(&self) -> Option<OperatorEstimate> {
         if self.operator.form() != Form::Lead {
@@ -61,14 +61,14 @@ impl ChangedOperator {
 pub(super) struct ThetaEstimate<'a> {
     pub layout: &'a Layout,
     pub theta: &'a [f64],
-    /// Of theta, by rows; `None` for an exact fit.
+    /// Covariance of theta, by rows; `None` for an exact fit.
     pub covariance: Option<&'a [f64]>,
-    /// Variance of t_M where it is that of a change point: the sigmoid is then no line over it.
+    /// Variance of t_M if it is a change point: the sigmoid is then not linear over its interval.
     pub change_point: Option<f64>,
 }
 
 impl ThetaEstimate<'_> {
-    /// The operator before (0) or after (1) the change.
+    /// Returns the operator before (0) or after (1) the change.
     pub fn end(&self, end: usize) -> Result<ChangedOperator, ModelError> {
         let mut values = [0.0; MOST_VARYING];
         for (i, value) in values.iter_mut().enumerate().take(self.layout.varying) {
@@ -86,10 +86,10 @@ impl ThetaEstimate<'_> {
         Ok(ChangedOperator { operator, parameters })
     }
 
-    /// The parameters that change, at one time.
+    /// Returns the parameters that change, at one time.
     pub fn at(&self, time_s: f64) -> Vec<NamedEstimate> {
         let here = Instant::at(self.layout, self.theta, time_s);
-        // Between two operators lies one.
+        // Between two valid operators there is a valid one.
         let Ok(operator) = self.layout.operator(self.theta, &here.values) else {
             return Vec::new();
         };
@@ -105,7 +105,7 @@ impl ThetaEstimate<'_> {
             let mut of_time = 0.0;
             if let Some(variance) = self.change_point {
                 let x = (time_s - self.theta[midpoint]) / variance.sqrt();
-                // The logistic function that is nearest to the normal distribution.
+                // The logistic function nearest to the normal distribution.
                 let happened = 1.0 / (1.0 + (-1.702 * x).exp());
                 of_time = by_share * by_share * happened * (1.0 - happened);
             } else {
@@ -117,7 +117,7 @@ impl ThetaEstimate<'_> {
         self.named(&operator, changes, of)
     }
 
-    /// The part of a gradient that belongs to the constant part.
+    /// Returns the part of a gradient that belongs to the constant part.
     fn constant_part(&self, gradient: &[f64]) -> Vec<f64> {
         let mut whole = vec![0.0; self.theta.len()];
         for (place, slope) in self.layout.poles().into_iter().zip(&gradient[self.layout.varying..]) {
@@ -128,8 +128,8 @@ impl ThetaEstimate<'_> {
         whole
     }
 
-    /// The parameters of an operator whose gradients are `wanted`; `of` makes from a gradient along
-    /// the coordinates that along theta, and a variance alongside.
+    /// Returns the parameters of an operator with the gradients `wanted`; `of` converts a gradient with respect to the
+    /// coordinates to one with respect to theta, and adds a variance.
     fn named(
         &self,
         operator: &FamilyOperator,
@@ -141,7 +141,7 @@ impl ThetaEstimate<'_> {
             .map(|(parameter, gradient)| {
                 let (mut whole, beside) = of(&gradient);
                 let mut value = parameter.value;
-                // Themselves, without the way over their logarithms.
+                // Directly, without their logarithms.
                 let own = match (parameter.coordinate, self.layout.muscles) {
                     (Some(Coordinate::LogOmega), Some([omega, _])) => Some(omega),
                     (Some(Coordinate::LogZeta), Some([_, zeta])) => Some(zeta),
@@ -163,7 +163,7 @@ impl ThetaEstimate<'_> {
     }
 }
 
-/// No variance, no standard error: fixed parameters has none.
+/// Returns an estimate without a standard error if the variance is zero, as for fixed parameters.
 pub(super) fn estimate(value: f64, variance: f64) -> Estimate {
     if variance > 0.0 {
         Estimate::with_variance(value, variance)

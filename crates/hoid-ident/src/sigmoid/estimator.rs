@@ -1,4 +1,4 @@
-//! The estimator of an operator who changes once.
+//! The estimator of an operator that changes once.
 
 use hoid_model::{Record, SampleTime, Structure, delayed_operator::whole_samples};
 
@@ -18,23 +18,21 @@ use crate::{
     level::without_level,
 };
 
-/// Lower minima that the walks along t_M and G may come upon before the fit is left at the last
-/// one.
+/// Number of lower minima that the walks along t_M and G may find before the fit is stopped at the last one.
 const MOST_LOWER: usize = 10;
 
 impl SigmoidChange {
-    /// Fits one change to all records: parameters and t_M in common (t_M on the time axis of each
-    /// record), initial states of each.
+    /// Fits one change to all records: parameters and t_M in common (t_M on the time axis of each record), and initial
+    /// states of each record.
     ///
     /// # Errors
-    /// [`IdentError`]; how the search ended, and what the data do not determine, is part of the
-    /// fit.
+    /// [`IdentError`]; how the search ended, and which parameters the data do not determine, is part of the fit.
     pub fn fit(&self, records: &[Record]) -> Result<SigmoidFit, IdentError> {
         let sample_time = common_sample_time(records)?;
         let mut criterion = self.criterion(records, sample_time)?;
         let unit = prior::penalties(&criterion.layout, &self.prior);
         for penalty in &unit {
-            // What has a prior is positive.
+            // A parameter with a prior is positive.
             let (low, high) = criterion.limits[penalty.place];
             criterion.limits[penalty.place] = (low.max(0.0), high);
         }
@@ -57,8 +55,8 @@ impl SigmoidChange {
             let Some(theta) = walk.flatten() else {
                 return Ok(found);
             };
-            // With the weights of the other minimum this one may be the lower: the likelihood
-            // decides, weights and all.
+            // With the weights of the other minimum this one may be the lower: the likelihood, weights included, is
+            // decisive.
             let weights = criterion.weights.clone();
             let other = search(&criterion, theta, &self.search, None).ok_or(IdentError::NoFiniteLoss)?;
             let penalty = criterion.penalty.clone();
@@ -77,8 +75,8 @@ impl SigmoidChange {
         }
     }
 
-    /// Names of the parameters of this form and noise model: `K_e1`, `K_e2`, `T_L1`, `T_L2`, `t_M`,
-    /// `G`, `omega_nm`, `zeta_nm`, `tau_e`, `d1` ... of a gain and a lead.
+    /// Returns the names of the parameters of this form and noise model: `K_e1`, `K_e2`, `T_L1`, `T_L2`, `t_M`, `G`,
+    /// `omega_nm`, `zeta_nm`, `tau_e`, `d1` ... for a gain and a lead.
     pub fn names(&self) -> Vec<String> {
         self.layout().names()
     }
@@ -87,7 +85,7 @@ impl SigmoidChange {
         Layout::new(self.form, self.neuromuscular, self.nd)
     }
 
-    /// Name and theta of each start.
+    /// Returns name and theta of each start.
     fn starts(
         &self,
         criterion: &ChangeCriterion<'_>,
@@ -96,7 +94,7 @@ impl SigmoidChange {
         Ok(match &self.start {
             Some(start) => vec![("given".to_owned(), self.given_start(criterion, start)?)],
             None => {
-                // The regressions that rank the starts know of no level.
+                // The regressions that rank the starts have no level.
                 let off_level = if self.level {
                     without_level(records)
                 } else {

@@ -1,4 +1,4 @@
-//! The fitted change with its uncertainty.
+//! The fitted change with its standard errors.
 
 use hoid_model::{Form, Record, SampleTime, Structure, uncertainty::Estimate};
 
@@ -20,36 +20,35 @@ pub struct ChangeParameter {
     pub unit: &'static str,
     /// Estimate.
     pub estimate: Estimate,
-    /// Why it has no standard error, where it has none.
+    /// The reason if it has no standard error.
     pub remark: Option<Remark>,
 }
 
-/// The part that changes, as it is in force at one time.
+/// The changing parameters at one time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GainsAt {
     /// Time on the axis of the record, s.
     pub time_s: f64,
-    /// K_e, T_L and K_e_dot of a gain and a lead; else K and, with a lag, K_over_T_I, then T_L and
-    /// so on.
+    /// K_e, T_L and K_e_dot for a gain and a lead; otherwise K and, with a lag, K_over_T_I, followed by T_L and so on.
     pub gains: Vec<NamedEstimate>,
 }
 
 impl GainsAt {
-    /// One of them by name.
+    /// Returns one of them by name.
     pub fn get(&self, name: &str) -> Option<Estimate> {
         self.gains.iter().find(|g| g.name == name).map(|g| g.estimate)
     }
 }
 
-/// An operator who changes once.
+/// Fit of an operator that changes once.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SigmoidFit {
     layout: Layout,
     sample_time: SampleTime,
     first: usize,
-    /// u of each record has a level.
+    /// True if u of each record has a level.
     level: bool,
-    /// With ln G and 1/T_I.
+    /// theta, with ln G and 1/T_I.
     theta: Vec<f64>,
     covariance: Option<Vec<f64>>,
     #[serde(with = "each_or_none")]
@@ -70,7 +69,7 @@ pub struct SigmoidFit {
     constant: ChangedOperator,
 }
 
-/// A list of which some are missing, as lists of one or none: not every format has a missing element.
+/// Serialises a list with missing elements as lists of one or none: not every format has a missing element.
 mod each_or_none {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -87,7 +86,7 @@ mod each_or_none {
 }
 
 impl SigmoidFit {
-    /// The fit at the minimum with a change, compared with the one without, `constant`.
+    /// Creates the fit at the minimum with a change, compared with the one without, `constant`.
     pub(super) fn new(
         criterion: &ChangeCriterion<'_>,
         minimum: &Minimum,
@@ -138,8 +137,8 @@ impl SigmoidFit {
         self.layout.neuromuscular
     }
 
-    /// All parameters in the order of [`SigmoidChange::names`](crate::SigmoidChange::names): what
-    /// changes before and after the change, t_M, G, the others, then d1 ... d_nd.
+    /// Returns all parameters in the order of [`SigmoidChange::names`](crate::SigmoidChange::names): the changing ones
+    /// before and after the change, t_M, G, the others, then d1 ... d_nd.
     pub fn parameters(&self) -> Vec<ChangeParameter> {
         let names = self.layout.names_and_units().into_iter().enumerate();
         names
@@ -152,7 +151,7 @@ impl SigmoidFit {
             .collect()
     }
 
-    /// One parameter by name.
+    /// Returns one parameter by name.
     pub fn parameter(&self, name: &str) -> Option<ChangeParameter> {
         self.parameters().into_iter().find(|p| p.name == name)
     }
@@ -166,8 +165,8 @@ impl SigmoidFit {
         }
     }
 
-    /// Covariance of the parameters in the order and the units of [`SigmoidFit::parameters`], by
-    /// rows; zero for fixed parameters, `None` for an exact fit.
+    /// Returns the covariance of the parameters in the order and the units of [`SigmoidFit::parameters`], by rows; zero
+    /// for fixed parameters, `None` for an exact fit.
     pub fn covariance(&self) -> Option<Vec<f64>> {
         let p = self.theta.len();
         let scale: Vec<f64> = (0..p).map(|i| self.layout.typed_slope(i, self.theta[i])).collect();
@@ -175,9 +174,8 @@ impl SigmoidFit {
         Some((0..p * p).map(|k| c[k] * scale[k / p] * scale[k % p]).collect())
     }
 
-    /// Likelihood intervals of t_M and G, if there was a change and noise. Returns theta where the
-    /// loss is lower than at the minimum, if the walk along t_M or G comes upon such a place and is
-    /// not to stay.
+    /// Adds likelihood intervals of t_M and G, if there was a change and noise. If the walk along t_M or G finds a
+    /// lower loss than at the minimum and `stay` is false, returns theta there.
     pub(super) fn add_intervals(
         &mut self,
         criterion: &ChangeCriterion<'_>,
@@ -217,56 +215,55 @@ impl SigmoidFit {
         None
     }
 
-    /// 95 % likelihood interval of t_M in s; `None` without noise, without a change, or if it was
-    /// not asked for.
+    /// Returns the 95 % likelihood interval of t_M in s; `None` without noise, without a change, or if it was not
+    /// requested.
     pub fn midpoint_interval(&self) -> Option<(f64, f64)> {
         self.midpoint_interval.map(|i| (i.low, i.high))
     }
 
-    /// 95 % likelihood interval of G in 1/s, open to infinity where the change may have been
-    /// abrupt; else as [`SigmoidFit::midpoint_interval`].
+    /// Returns the 95 % likelihood interval of G in 1/s, open to infinity if the change may have been abrupt; otherwise
+    /// as [`SigmoidFit::midpoint_interval`].
     pub fn rate_interval(&self) -> Option<(f64, f64)> {
         self.rate_interval.map(|i| (i.low, i.high))
     }
 
-    /// True if the change is too fast for t_M to have an error that is normally distributed: a
-    /// change point.
+    /// True if the change is too fast for a normally distributed error of t_M: a change point.
     pub fn is_change_point(&self) -> bool {
         self.change_point
     }
 
-    /// The operator before the change, where there was one ([`SigmoidFit::change_found`]).
+    /// Returns the operator before the change, if there was one ([`SigmoidFit::change_found`]).
     pub fn initial_operator(&self) -> &ChangedOperator {
         &self.initial
     }
 
-    /// The operator after the change, where there was one.
+    /// Returns the operator after the change, if there was one.
     pub fn last_operator(&self) -> &ChangedOperator {
         &self.last
     }
 
-    /// The operator of the fit without a change.
+    /// Returns the operator of the fit without a change.
     pub fn constant_operator(&self) -> &ChangedOperator {
         &self.constant
     }
 
-    /// The fit against the one without a change.
+    /// Returns the comparison with the fit without a change.
     pub fn comparison(&self) -> Comparison {
         self.comparison
     }
 
-    /// True if the change is worth its parameters by the BIC. Otherwise t_M and G mean nothing
+    /// True if the change justifies its parameters by the BIC. Otherwise t_M and G have no meaning
     /// ([`Remark::NoChange`]), and [`SigmoidFit::constant_operator`] describes the records.
     pub fn change_found(&self) -> bool {
         self.comparison.bic_difference > 0.0
     }
 
-    /// Gains in force at a time on the axis of the record, with standard errors: those of the
-    /// sigmoid where the records show a change, else those of the fit without one.
+    /// Returns the gains at a time on the axis of the record, with standard errors: those of the sigmoid if the records
+    /// show a change, otherwise those of the fit without one.
     ///
-    /// The errors are those of the delta method, t_M and G included. Around a change point, where
-    /// the sigmoid is not a line over the interval of t_M, `step^2 p (1 - p)` represents the
-    /// latter, with p the probability that the change has happened.
+    /// The errors are those of the delta method, t_M and G included. Near a change point, where the sigmoid is not
+    /// linear over the interval of t_M, its contribution is `step^2 p (1 - p)`, with p the probability that the change
+    /// has happened.
     pub fn gains_at(&self, time_s: f64) -> GainsAt {
         let known = ThetaEstimate {
             layout: &self.layout,
@@ -286,39 +283,39 @@ impl SigmoidFit {
         GainsAt { time_s, gains }
     }
 
-    /// [`SigmoidFit::gains_at`] at every sample of a record.
+    /// Returns [`SigmoidFit::gains_at`] at every sample of a record.
     pub fn trace(&self, record: &Record) -> Vec<GainsAt> {
         record.times_s().into_iter().map(|t| self.gains_at(t)).collect()
     }
 
-    /// Coefficients of D.
+    /// Returns the coefficients of D.
     pub fn d(&self) -> &[f64] {
         &self.theta[self.layout.noise..]
     }
 
-    /// Loss: mean of the squared residuals, weighted where the noise level changes (weights with
-    /// the geometric mean 1).
+    /// Returns the loss: the mean of the squared residuals, weighted if the noise level changes (weights with the
+    /// geometric mean 1).
     pub fn loss(&self) -> f64 {
         self.loss
     }
 
-    /// `sum eps^2/(n - p - s)` of the same residuals, with p parameters and s initial states.
+    /// Returns `sum eps^2/(n - p - s)` of the same residuals, with p parameters and s initial states.
     pub fn innovation_variance(&self) -> f64 {
         self.innovation_variance
     }
 
-    /// Standard deviation of the innovations before and after the change; `None` if the same
-    /// throughout was requested, or the residuals have no size.
+    /// Returns the standard deviation of the innovations before and after the change; `None` if a constant level was
+    /// requested, or the residuals are zero.
     pub fn noise_levels(&self) -> Option<[f64; 2]> {
         self.levels
     }
 
-    /// Number n of residuals.
+    /// Returns the number n of residuals.
     pub fn residual_count(&self) -> usize {
         self.residuals
     }
 
-    /// Number s of initial states that were estimated.
+    /// Returns the number s of estimated initial states.
     pub fn state_count(&self) -> usize {
         self.states
     }
@@ -328,12 +325,12 @@ impl SigmoidFit {
         self.termination
     }
 
-    /// The best start.
+    /// Returns the name of the best start.
     pub fn start(&self) -> &str {
         &self.start
     }
 
-    /// One-step-ahead residuals on a record (not weighted), its initial state estimated.
+    /// Returns the one-step-ahead residuals on a record (not weighted), with its initial state estimated.
     ///
     /// # Errors
     /// [`IdentError::MixedSampling`], [`IdentError::TooFewSamples`].
@@ -341,8 +338,7 @@ impl SigmoidFit {
         self.errors_of(self.layout, &self.theta, record)
     }
 
-    /// Output of the operator alone, without noise model; the initial state is that of the least
-    /// simulation error.
+    /// Returns the output of the operator alone, without noise model; the initial state minimises the simulation error.
     ///
     /// # Errors
     /// As [`SigmoidFit::residuals`].
@@ -356,8 +352,8 @@ impl SigmoidFit {
         })
     }
 
-    /// The level of u in a record, in the unit of u, with its standard error; `None` if it was not estimated
-    /// ([`crate::SigmoidChange::level`]), and of an exact fit.
+    /// Returns the level of u in a record, in the unit of u, with its standard error; `None` if it was not estimated
+    /// ([`crate::SigmoidChange::level`]), and for an exact fit.
     pub fn level(&self, record: &Record) -> Option<Estimate> {
         let (criterion, covariance) = (self.criterion(self.layout, record).ok()?, self.covariance.as_ref()?);
         let (value, variance) = criterion.level_of(&self.theta, 0, self.innovation_variance, covariance)?;
@@ -371,7 +367,7 @@ impl SigmoidFit {
         Ok(Series { first, values })
     }
 
-    /// The criterion of this fit over another record, without weights.
+    /// Returns the criterion of this fit over another record, without weights.
     fn criterion<'a>(&self, layout: Layout, record: &'a Record) -> Result<ChangeCriterion<'a>, IdentError> {
         if !self.sample_time.matches(record.sample_time()) {
             return Err(IdentError::MixedSampling {

@@ -1,28 +1,27 @@
 //! Poles, delay and noise model from which searches start.
 //!
-//! For an operator of a gain and a lead they come from Box-Jenkins fits to the first and the last
-//! third of the records; where those give no operator, from a small grid of poles. A form of the
-//! family has a grid throughout.
+//! For an operator of a gain and a lead they come from Box-Jenkins fits to the first and the last third of the records
+//! or, if those give no operator, from a small grid of poles. A form of the family always uses a grid.
 
 use hoid_model::{OperatorParameters, Orders, Record, Structure};
 
 use super::{layout::Layout, objective::ChangeCriterion};
 use crate::{Estimator, Fit, SearchMethod, SearchOptions};
 
-/// Time between the delays that are tried, s: the search finds its way from a distance of a tenth
-/// of the period of the poles.
+/// Step between the delays that are tried, s: the search converges from a distance of a tenth of the period of the
+/// poles.
 const DELAY_STEP_S: f64 = 0.06;
-/// Searches in the windows: a start need not be exact.
+/// Limits of the searches in the windows: a start need not be exact.
 const COARSE: SearchOptions = SearchOptions {
     method: SearchMethod::LevenbergMarquardt,
     max_iterations: 15,
     tolerance: 1e-6,
 };
-/// Poles where the windows give none: omega_nm in rad/s, zeta_nm.
+/// Poles if the windows give none: omega_nm in rad/s, zeta_nm.
 const GRID: [(f64, f64); 3] = [(6.0, 0.4), (11.0, 0.4), (18.0, 0.4)];
 /// 1/T_I of the grid, 1/s.
 const LAG_RATES: [f64; 3] = [0.05, 0.25, 1.2];
-/// d1 where the windows give none.
+/// d1 if the windows give none.
 const GRID_D1: f64 = -0.8;
 
 /// Poles, delay and noise model in a theta without a change.
@@ -32,7 +31,7 @@ pub(super) struct Frozen {
     pub theta: Vec<f64>,
 }
 
-/// The grid of a form of the family.
+/// Returns the grid of a form of the family.
 pub(super) fn of_family(criterion: &ChangeCriterion<'_>) -> Vec<Frozen> {
     let (layout, ts) = (&criterion.layout, criterion.sample_time.s());
     let muscles: &[(f64, f64)] = if layout.muscles.is_some() { &GRID } else { &[(0.0, 0.0)] };
@@ -63,7 +62,7 @@ pub(super) fn of_family(criterion: &ChangeCriterion<'_>) -> Vec<Frozen> {
     all
 }
 
-/// The poles of the windows.
+/// Returns the poles of the windows.
 pub(super) fn of_windows(criterion: &ChangeCriterion<'_>, records: &[Record]) -> Vec<Frozen> {
     let third = |record: &Record, part: usize| {
         let (from, to) = (record.time_s(0), record.time_s(record.len()));
@@ -76,7 +75,7 @@ pub(super) fn of_windows(criterion: &ChangeCriterion<'_>, records: &[Record]) ->
     for (part, name) in [(0, "first"), (2, "last")] {
         let windows: Option<Vec<Record>> = records.iter().map(|r| third(r, part)).collect();
         let Some(windows) = windows else { continue };
-        // Each delay continues from the model of the one before.
+        // Each delay continues from the model of the previous one.
         let mut fits: Vec<Fit> = Vec::new();
         for nk in delays(criterion) {
             let before = fits.last().map(|f| f.model().theta().to_vec());
@@ -114,11 +113,11 @@ fn fit(criterion: &ChangeCriterion<'_>, windows: &[Record], nk: usize, start: Op
         start,
         ..Estimator::new(Structure::BoxJenkins, orders)
     };
-    // Only models that are operators have poles to give.
+    // Only models that correspond to operators give poles.
     estimator.fit(windows).ok().filter(|fit| fit.operator().is_ok())
 }
 
-/// The grid of a gain and a lead.
+/// Returns the grid of a gain and a lead.
 pub(super) fn of_grid(criterion: &ChangeCriterion<'_>) -> Vec<Frozen> {
     let ts = criterion.sample_time.s();
     let mut d = vec![0.0; criterion.layout.nd];

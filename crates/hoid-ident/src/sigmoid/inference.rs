@@ -1,5 +1,5 @@
-//! Inference from the two minima, with a change and without: covariance, which parameters have a
-//! standard error, and whether there was a change.
+//! Inference from the two minima, with a change and without: covariance, parameters with a standard error, and the test
+//! for a change.
 //!
 //! The covariance is `sigma^2 (psi' psi)^-1` of the parameters that were free, with the initial
 //! states eliminated and the weights taken as known. The comparison is by the likelihood ratio
@@ -21,33 +21,31 @@ use crate::{
     optimize::{Linearisation, Minimum, free_parameters},
 };
 
-/// Why a parameter has no standard error, or none that the data give.
+/// The reason why a parameter has no standard error, or none from the data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum Remark {
     /// It was fixed.
     Fixed,
-    /// It rests at a bound.
+    /// It is at a bound.
     AtBound,
-    /// G rests at its upper bound: the change takes no longer than two samples, and how fast it was
-    /// cannot be determined.
+    /// G is at its upper bound: the change takes no longer than two samples, and its rate cannot be determined.
     Abrupt,
-    /// The records show no change (BIC): t_M and G mean nothing, and gains on either side of it are
-    /// chosen by chance.
+    /// The records show no change (BIC): t_M and G have no meaning, and the gains on either side are due to chance.
     NoChange,
-    /// The change is too fast for a normal error: the likelihood interval holds.
+    /// The change is too fast for a normal error: only the likelihood interval is valid.
     ChangePoint,
     /// The data do not determine it.
     Undetermined,
-    /// More than half of its variance before the data is left: its error is that of the prior.
+    /// More than half of its variance before the data remains: its error is that of the prior.
     PriorAlone,
 }
 
-/// Largest part of the prior's variance in what the data determine.
+/// Largest ratio of the variance after to that before the data for a determined parameter.
 const LARGEST_PRIOR_SHARE: f64 = 0.5;
 
 impl Remark {
-    /// True for a parameter that has a standard error all the same.
+    /// True if the parameter still has a standard error.
     pub(super) fn leaves_an_error(self) -> bool {
         self == Self::PriorAlone
     }
@@ -69,32 +67,32 @@ impl fmt::Display for Remark {
     }
 }
 
-/// The fit against the one without a change.
+/// Comparison with the fit without a change.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Comparison {
     /// `n ln(V_0/V_1)`.
     pub likelihood_ratio: f64,
-    /// Parameters that the change adds: those after it (K_e2, T_L2 ...), t_M and G that were not
+    /// Number of parameters that the change adds: those after it (K_e2, T_L2 ...), t_M and G, as far as they were not
     /// fixed.
     pub extra_parameters: usize,
-    /// BIC without the change minus BIC with it; positive where the change is worth its parameters.
+    /// BIC without the change minus BIC with it; positive if the change justifies its parameters.
     pub bic_difference: f64,
 }
 
 /// Inference at the minimum with a change.
 pub(super) struct Inference {
-    /// Variance of the innovations, weighted where the noise level changes.
+    /// Variance of the innovations, weighted if the noise level changes.
     pub innovation_variance: f64,
     /// Covariance of theta by rows; `None` for an exact fit.
     pub covariance: Option<Vec<f64>>,
-    /// Why an element of theta has no standard error, where it has none.
+    /// The reason if an element of theta has no standard error.
     pub remarks: Vec<Option<Remark>>,
     pub comparison: Comparison,
-    /// True if the change is too fast for t_M to have a normal error.
+    /// True if the change is too fast for a normal error of t_M.
     pub change_point: bool,
 }
 
-/// The inference from the minimum with a change and the one without, `constant`.
+/// Computes the inference from the minimum with a change and the one without, `constant`.
 ///
 /// # Errors
 /// [`IdentError::SingularInformation`].
@@ -138,7 +136,7 @@ pub(super) fn inference(
             }
         })
         .collect();
-    // A rate at its bound is held even if the loss is flat there.
+    // A rate at its bound is fixed even if the loss is flat there.
     free.retain(|&i| !matches!(remarks[i], Some(Remark::AtBound | Remark::Abrupt)));
     let exact = minimum.termination.reason == Reason::ExactFit;
     let covariance = if exact {
@@ -175,13 +173,12 @@ pub(super) fn inference(
     })
 }
 
-/// ln G from which the change counts as abrupt, up to rounding.
+/// ln G from which on the change counts as abrupt, up to rounding.
 fn fastest(criterion: &ChangeCriterion<'_>) -> f64 {
     (FASTEST / criterion.sample_time.s()).ln() - 1e-9
 }
 
-/// Inverse of the information of the free parameters. Time and rate of a change that leaves no
-/// trace are taken out.
+/// Inverts the information of the free parameters. Time and rate of a change without any effect are removed.
 fn invert(
     layout: &Layout,
     at: &Linearisation,
@@ -202,7 +199,7 @@ fn invert(
     }
 }
 
-/// The operator at the minimum without a change.
+/// Returns the operator at the minimum without a change.
 ///
 /// # Errors
 /// [`IdentError::SingularInformation`].

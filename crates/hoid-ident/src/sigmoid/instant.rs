@@ -1,8 +1,8 @@
-//! The sigmoid (eq. 5), and the numerator that it makes at one time.
+//! The sigmoid (eq. 5), and its numerator at one time.
 
 use super::layout::{Layout, MOST_VARYING};
 
-/// Argument from which `e^-x` is zero in double precision.
+/// Argument above which `e^-x` is zero in double precision.
 const NOTHING: f64 = 746.0;
 
 /// The sigmoid and the changing parameters at one time.
@@ -16,18 +16,18 @@ pub(crate) struct Instant {
     pub by_log_rate: f64,
     /// The parameters of the numerator, the gain first.
     pub values: [f64; MOST_VARYING],
-    /// The numerator over its gain, by ascending powers of s.
+    /// The numerator divided by its gain, by ascending powers of s.
     pub shape: [f64; 3],
-    /// Derivatives of the shape along the parameters next to the gain.
+    /// Derivatives of the shape with respect to the parameters other than the gain.
     pub slopes: [[f64; 3]; 2],
 }
 
 impl Instant {
-    /// At the time `t_s`: eq. 5, as [`hoid_model::schedule::Schedule::value`] computes it.
+    /// Evaluates eq. 5 at the time `t_s`, like [`hoid_model::schedule::Schedule::value`].
     pub fn at(layout: &Layout, theta: &[f64], t_s: f64) -> Self {
         let rate = theta[layout.log_rate].exp();
         let x = rate * (t_s - theta[layout.midpoint]);
-        // The exponential is zero there, and slow.
+        // The exponential is zero there, and slow to compute.
         let far = if x.abs() > NOTHING { 0.0 } else { (-x.abs()).exp() };
         let rest = far / (1.0 + far);
         let share = if x < 0.0 { rest } else { 1.0 - rest };
@@ -46,7 +46,7 @@ impl Instant {
         Self::of(layout, values, share, [-rate * slope, by_log_rate])
     }
 
-    /// The first state, as if there were no change.
+    /// Returns the first state, as if there were no change.
     pub fn constant(layout: &Layout, theta: &[f64]) -> Self {
         let mut values = [0.0; MOST_VARYING];
         for (i, value) in values.iter_mut().enumerate().take(layout.varying) {

@@ -32,7 +32,7 @@ pub const SIGMOID_NAMES: [(&str, &str); 9] = [
 /// Largest number of parameters of a numerator.
 pub(crate) const MOST_VARYING: usize = 3;
 
-/// Where everything is in theta.
+/// Places of the parameters in theta.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Layout {
     pub form: Form,
@@ -51,14 +51,14 @@ pub(crate) struct Layout {
     pub noise: usize,
 }
 
-/// Definition of an element of theta.
+/// Meaning of an element of theta.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Element {
     /// A coordinate of the numerator, before (0) or after (1) the change.
     Varying(Coordinate, usize),
     Midpoint,
     LogRate,
-    /// A coordinate that does not change; omega_nm and zeta_nm represent their logarithms.
+    /// A coordinate that does not change; omega_nm and zeta_nm instead of their logarithms.
     Constant(Coordinate),
     /// d_i.
     Noise(usize),
@@ -96,18 +96,18 @@ impl Layout {
         self.noise + self.nd
     }
 
-    /// Places of the i-th parameter of the numerator before and after the change.
+    /// Returns the places of the i-th parameter of the numerator before and after the change.
     pub fn ends(i: usize) -> [usize; 2] {
         [2 * i, 2 * i + 1]
     }
 
-    /// Places of what a model without a change does not have.
+    /// Returns the places of the parameters that a model without a change does not have.
     pub fn of_the_change(&self) -> Vec<usize> {
         let last = (0..self.varying).map(|i| Self::ends(i)[1]);
         last.chain([self.midpoint, self.log_rate]).collect()
     }
 
-    /// Places of the poles and the delay, by which the responses change.
+    /// Returns the places of the poles and the delay, on which the responses depend.
     pub fn poles(&self) -> Vec<usize> {
         let muscles = self.muscles.into_iter().flatten();
         self.lag.into_iter().chain(muscles).chain([self.delay]).collect()
@@ -118,23 +118,23 @@ impl Layout {
         usize::from(self.form.has_pole()) + if self.neuromuscular { 2 } else { 0 }
     }
 
-    /// True if the operator passes e on at once.
+    /// True if the operator has a direct feedthrough of e.
     pub fn has_direct_part(&self) -> bool {
         self.form.degree() == self.order()
     }
 
-    /// How many samples more than nk must pass before the state alone reports the past.
+    /// Returns the number of samples in addition to nk after which the state alone contains the past.
     pub fn reach(&self) -> usize {
         if self.has_direct_part() { 2 } else { 0 }
     }
 
-    /// Pieces of a sample within which the response is a smooth function of the delay: the direct
+    /// Returns the number of pieces of a sample within which the response is a smooth function of the delay: the direct
     /// part has a kink in the middle ([`hoid_model::operator_family`], `zoh`).
     pub fn pieces(&self) -> usize {
         if self.has_direct_part() { 2 } else { 1 }
     }
 
-    /// The coordinates of the operator in the order of [`Form::coordinates`].
+    /// Returns the coordinates of the operator in the order of [`Form::coordinates`].
     pub fn coordinates(&self) -> Vec<Coordinate> {
         self.form.coordinates(self.neuromuscular)
     }
@@ -152,8 +152,7 @@ impl Layout {
             .collect()
     }
 
-    /// Name and unit of each element as it is typed and reported: G, T_I, omega_nm and zeta_nm
-    /// themselves.
+    /// Returns name and unit of each element as it is typed and reported: G, T_I, omega_nm and zeta_nm themselves.
     pub fn names_and_units(&self) -> Vec<(String, &'static str)> {
         let of = |element: Element| match element {
             Element::Varying(coordinate, end) => {
@@ -181,7 +180,7 @@ impl Layout {
         self.names_and_units().into_iter().map(|(name, _)| name).collect()
     }
 
-    /// The parameter that a coordinate is reported as.
+    /// Returns the parameter as which a coordinate is reported.
     fn parameter(&self, coordinate: Coordinate) -> &'static str {
         match (coordinate, self.form) {
             (Coordinate::Gain, Form::Lead) => "K_e",
@@ -199,8 +198,8 @@ impl Layout {
             .map_or("", |(_, unit)| unit)
     }
 
-    /// An element from the number that is typed and reported, and back: each is its own inverse but
-    /// the logarithm.
+    /// Converts a typed and reported number to an element, or back: except for the logarithm each conversion is its own
+    /// inverse.
     pub fn of_typed(&self, place: usize, value: f64) -> f64 {
         match place {
             _ if place == self.log_rate => value.ln(),
@@ -217,7 +216,7 @@ impl Layout {
         }
     }
 
-    /// Derivative of the report along an element of theta.
+    /// Returns the derivative of the reported number with respect to an element of theta.
     pub fn typed_slope(&self, place: usize, value: f64) -> f64 {
         match place {
             _ if place == self.log_rate => value.exp(),
@@ -226,7 +225,7 @@ impl Layout {
         }
     }
 
-    /// The orders of its discrete model, with this nk.
+    /// Returns the orders of its discrete model, with this nk.
     pub fn orders(&self, nk: usize) -> Orders {
         Orders {
             nb: self.order() + if self.has_direct_part() { 3 } else { 1 },
@@ -237,7 +236,7 @@ impl Layout {
         }
     }
 
-    /// The operator with this numerator, and with the poles and the delay of theta.
+    /// Returns the operator with this numerator, and with the poles and the delay of theta.
     ///
     /// # Errors
     /// As [`FamilyOperator::new`].

@@ -1,29 +1,27 @@
-//! Noise that grows or fades with the change.
+//! Noise whose level changes with the operator.
 //!
-//! A remnant with another gain after the change gives innovations of another size:
-//! `sigma(t) = sigma_1 + (sigma_2 - sigma_1) s(t)` with the sigmoid s of the gains, without their
-//! delay. Given the residuals, sigma_1 and sigma_2 minimise
-//! `sum of ln sigma(t) + eps(t)^2/(2 sigma(t)^2)` (Fisher scoring); the residuals are then weighted
-//! by 1/sigma(t), and the fit and the levels are found in turn. Source: R. J. Carroll and D.
-//! Ruppert, *Transformation and Weighting in Regression*, 1988, ch. 3.
+//! A remnant with another gain after the change gives innovations with another standard deviation:
+//! `sigma(t) = sigma_1 + (sigma_2 - sigma_1) s(t)` with the sigmoid s of the gains, without their delay. Given the
+//! residuals, sigma_1 and sigma_2 minimise `sum of ln sigma(t) + eps(t)^2/(2 sigma(t)^2)` (Fisher scoring); the
+//! residuals are then weighted by 1/sigma(t), and the fit and the levels are estimated in turn. Source: R. J. Carroll
+//! and D. Ruppert, *Transformation and Weighting in Regression*, 1988, ch. 3.
 
 use crate::linalg::least_squares::dot;
 
-/// Size of the innovations over the record.
+/// Standard deviation of the innovations over the record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum NoiseLevel {
-    /// The same throughout.
+    /// Constant.
     Constant,
     /// One level before and one after the change, with the same sigmoid between them.
     #[default]
     Changing,
 }
 
-/// Smallest ratio of the two levels: what lies below is a record without noise on one side.
+/// Smallest ratio of the two levels: a smaller one means a record without noise on one side.
 const SMALLEST_RATIO: f64 = 1e-3;
 
-/// `[sigma_1, sigma_2]` for the residuals and the share of the change at each; `None` if they have
-/// no size.
+/// Returns `[sigma_1, sigma_2]` for the residuals and the share of the change at each; `None` if they are zero.
 pub(crate) fn levels(residuals: &[Vec<f64>], shares: &[Vec<f64>]) -> Option<[f64; 2]> {
     let pairs = || residuals.iter().flatten().zip(shares.iter().flatten());
     // From the weighted mean squares on either side.
@@ -61,7 +59,7 @@ pub(crate) fn levels(residuals: &[Vec<f64>], shares: &[Vec<f64>]) -> Option<[f64
         ];
         let mut largest = 0.0_f64;
         for (s, d) in sigma.iter_mut().zip(step) {
-            // At most to the half or the double of a level in one step.
+            // In one step, a level changes at most by a factor of two.
             let moved = (*s + d).clamp(0.5 * *s, 2.0 * *s);
             largest = largest.max((moved - *s).abs() / *s);
             *s = moved;
@@ -74,8 +72,8 @@ pub(crate) fn levels(residuals: &[Vec<f64>], shares: &[Vec<f64>]) -> Option<[f64
     (ratio >= SMALLEST_RATIO).then_some(sigma)
 }
 
-/// Weights `1/sigma(t)`, scaled to the geometric mean 1 over all residuals: the sum of weighted
-/// squares then takes the place of the sum of squares in the likelihood.
+/// Returns weights `1/sigma(t)`, scaled to the geometric mean 1 over all residuals: the sum of weighted squares then
+/// takes the place of the sum of squares in the likelihood.
 pub(crate) fn weights(sigma: [f64; 2], shares: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let level = |share: f64| sigma[0] + (sigma[1] - sigma[0]) * share;
     let count: usize = shares.iter().map(Vec::len).sum();

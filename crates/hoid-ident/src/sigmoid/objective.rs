@@ -21,11 +21,11 @@
 //! states, `psi' (I - Q Q') psi` (G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973)
 //! 413-432; L. Kaufman, *BIT* 15 (1975) 49-57).
 //!
-//! **Level.** Of recorded data u may have a level c that is not a response to e ([`crate::Fit::level`]). It is one more
-//! linear unknown of each record, with a response of ones, eliminated in the same way. The means could not be taken out
-//! beforehand, as the response to that of e changes with the gains.
+//! **Level.** In recorded data u may have a level c that is not a response to e ([`crate::Fit::level`]). It is an
+//! additional linear unknown of each record, with a response of ones, eliminated in the same way. The means cannot be
+//! removed beforehand, as the response to that of e changes with the gains.
 //!
-//! **Prior.** What is known before the data is next to them as squares of its own ([`super::prior`]).
+//! **Prior.** Prior knowledge is added to the residuals as additional squares ([`super::prior`]).
 
 use hoid_model::{Form, SampleTime, uncertainty::variance_along};
 
@@ -55,15 +55,13 @@ pub(crate) struct ChangeCriterion<'a> {
     /// First sample whose residual counts; at least the longest nk plus nd.
     pub first: usize,
     pub limits: Vec<(f64, f64)>,
-    /// Piece of a sample in which the delay is held ([`Layout::pieces`]); by the delay itself where
-    /// there is none.
+    /// Piece of a sample in which the delay is held ([`Layout::pieces`]); `None` determines it from the delay itself.
     pub piece: Option<usize>,
-    /// False for the model whose first state holds throughout.
+    /// False for the model whose first state is valid throughout.
     pub changes: bool,
-    /// Weights of the residuals of each record, from the first residual on; none if all count the
-    /// same.
+    /// Weights of the residuals of each record, from the first residual on; `None` if all weights are equal.
     pub weights: Option<Vec<Vec<f64>>>,
-    /// Prior knowledge before the data.
+    /// Prior knowledge.
     pub penalty: Vec<Penalty>,
     /// True if u of each record has a level.
     pub level: bool,
@@ -73,7 +71,7 @@ pub(crate) struct ChangeCriterion<'a> {
 #[derive(Debug)]
 pub(crate) struct Pass {
     unit: UnitOperator,
-    /// The error with the past in front.
+    /// The error, preceded by the past.
     input: Vec<f64>,
     /// Responses to it.
     y: Vec<Vec<f64>>,
@@ -84,11 +82,11 @@ pub(crate) struct Pass {
     /// Weighted residuals.
     pub eps: Vec<f64>,
     basis: Vec<Vec<f64>>,
-    /// The level of u, and the length of its column off those of the states.
+    /// The level of u, and the norm of its column after projection on the complement of those of the states.
     pub level: Option<(f64, f64)>,
 }
 
-/// `sum_i of(instant, i) y_i`, as long as the shortest y_i.
+/// Returns `sum_i of(instant, i) y_i`, as long as the shortest y_i.
 fn combined(gains: &[Instant], y: &[&[f64]], of: impl Fn(&Instant, usize) -> f64) -> Vec<f64> {
     let length = y.iter().map(|y| y.len()).fold(gains.len(), usize::min);
     (0..length)
@@ -115,13 +113,13 @@ impl ChangeCriterion<'_> {
         self.penalties().map(|penalty| penalty.at(theta)).sum()
     }
 
-    /// The prior, without that of a change where there is none.
+    /// Returns the prior, without that of the change if there is none.
     fn penalties(&self) -> impl Iterator<Item = &Penalty> {
         let last = self.layout.of_the_change();
         (self.penalty.iter()).filter(move |penalty| self.changes || !last.contains(&penalty.place))
     }
 
-    /// Residuals of one record from [`ChangeCriterion::first`] on, not weighted.
+    /// Returns the residuals of one record from [`ChangeCriterion::first`] on, not weighted.
     pub fn residuals_of(&self, theta: &[f64], record: usize) -> Option<Vec<f64>> {
         let mut eps = self.pass(theta, record)?.eps;
         if let Some(weights) = &self.weights {
@@ -130,7 +128,7 @@ impl ChangeCriterion<'_> {
         Some(eps)
     }
 
-    /// `D x` with the weights of the record, of a signal from the first regressed sample on.
+    /// Returns `D x` with the weights of the record, for a signal from the first regressed sample on.
     fn whitened(&self, theta: &[f64], record: usize, x: &[f64]) -> Vec<f64> {
         let nd = self.layout.nd;
         let mut y = x[nd..].to_vec();
@@ -147,7 +145,7 @@ impl ChangeCriterion<'_> {
         }
     }
 
-    /// Numerators in force after the delay at each sample from the first regressed one on.
+    /// Returns the numerators after the delay at each sample from the first regressed one on.
     fn gains(&self, theta: &[f64], record: usize) -> Vec<Instant> {
         let (from, data) = (self.first - self.layout.nd, self.data[record]);
         let at = |t: usize| data.start_s + t as f64 * self.sample_time.s() - theta[self.layout.delay];
@@ -238,7 +236,7 @@ impl ChangeCriterion<'_> {
         Some((value, variance / (length * length) + variance_along(&slope, covariance)))
     }
 
-    /// Columns of psi in one record, weighted, not projected.
+    /// Returns the columns of psi in one record, weighted, not projected.
     fn columns(&self, theta: &[f64], record: usize, pass: &Pass) -> Vec<Vec<f64>> {
         let (layout, gains) = (&self.layout, &pass.gains);
         let begin = self.first - layout.nd + layout.order() - pass.unit.nk;
@@ -281,7 +279,7 @@ impl ChangeCriterion<'_> {
             let slopes: Vec<&[f64]> = slopes.iter().map(|slope| &slope[begin..]).collect();
             columns[place] = self.whitened(theta, record, &combined(gains, &slopes, Instant::numerator));
         }
-        // A longer delay takes the change along.
+        // A longer delay also delays the change.
         let (head, tail) = columns.split_at_mut(layout.delay);
         add_scaled(&mut tail[0], 1.0, &head[layout.midpoint]);
         for i in 0..layout.nd {
@@ -296,8 +294,8 @@ impl ChangeCriterion<'_> {
     }
 }
 
-/// Takes the best combination of the columns out of eps; returns their orthonormal basis and, of each
-/// column, how much was taken in and its length off those before.
+/// Projects the columns out of eps; returns their orthonormal basis and, for each column, its coefficient and the norm
+/// of its part orthogonal to the previous ones.
 fn eliminate(columns: Vec<Vec<f64>>, eps: &mut [f64]) -> (Vec<Vec<f64>>, Vec<(f64, f64)>) {
     let count = columns.len();
     let mut basis: Vec<Vec<f64>> = Vec::with_capacity(count);
@@ -386,8 +384,8 @@ impl Objective for ChangeCriterion<'_> {
         }
         self.penalties().for_each(|penalty| penalty.add_to(theta, &mut total));
         for i in 0..p {
-            // A parameter without any effect here would make the matrix singular; with a diagonal
-            // of one it rests.
+            // A parameter without any effect here would make the matrix singular; a diagonal element of one keeps it
+            // fixed.
             if total.gram[i * p + i] <= 0.0 {
                 total.descent[i] = 0.0;
                 for j in 0..p {

@@ -1,5 +1,5 @@
 //! Options of an operator that changes once: the fields of [`SigmoidChange`], and the names under which texts set them.
-//! An option is declared here and nowhere else.
+//! Each option is declared only here.
 
 use std::collections::BTreeMap;
 
@@ -14,41 +14,41 @@ use crate::{
     shared_options as shared,
 };
 
-/// Quantity to be estimated, and how.
+/// Estimator of an operator that changes once, with its options.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SigmoidChange {
-    /// Form of the operator: what changes is its numerator (K, T_L, c_1, c_2, alpha), with a lag the
-    /// gain K/T_I. Lag, neuromuscular part and delay do not change. Default a gain and a lead.
+    /// Form of the operator: its numerator changes (K, T_L, c_1, c_2, alpha; with a lag the gain is K/T_I). Lag,
+    /// neuromuscular part and delay do not change. Default: a gain and a lead.
     pub form: Form,
-    /// With the neuromuscular part. Default true.
+    /// True with the neuromuscular part. Default true.
     pub neuromuscular: bool,
-    /// A level of u in each record, estimated: of recorded data ([`SigmoidFit::level`](crate::SigmoidFit::level)). Default false.
+    /// True if a level of u is estimated in each record, for recorded data
+    /// ([`SigmoidFit::level`](crate::SigmoidFit::level)). Default false.
     pub level: bool,
-    /// Prior knowledge of the person before the data; that of T_L counts before and after the
-    /// change. Default nothing.
+    /// Prior knowledge of the person; that of T_L is used before and after the change. Default: none.
     pub prior: OperatorPrior,
     /// Order nd of D.
     pub nd: usize,
     /// Shortest and longest delay tau_e, s; any fraction of a sample. Equal ends fix it.
     pub delay_range_s: (f64, f64),
-    /// Fixed and bounded parameters by name ([`SigmoidChange::names`]). By default t_M lies in the middle nine tenths of the span that the records have in common, and
-    /// G between 5/span and 2/Ts.
+    /// Fixed and bounded parameters by name ([`SigmoidChange::names`]). By default t_M is within the middle nine tenths
+    /// of the time span common to the records, and G between 5/span and 2/Ts.
     pub constraints: BTreeMap<String, Constraint>,
-    /// Size of the innovations over the record.
+    /// Standard deviation of the innovations over the record.
     pub noise_level: NoiseLevel,
-    /// Start instead of the own ones: the parameters of [`SigmoidChange::names`] in their units.
+    /// Start of the search, instead of the estimator's own starts: the parameters of [`SigmoidChange::names`] in their
+    /// units.
     pub start: Option<Vec<f64>>,
     /// Method and limits of each search.
     pub search: SearchOptions,
-    /// Whether t_M and G get likelihood intervals; they take about as long as the fit. Default
-    /// true.
+    /// True if likelihood intervals of t_M and G are computed; they take about as long as the fit. Default true.
     pub likelihood_intervals: bool,
 }
 
 impl Default for SigmoidChange {
-    /// First-order noise, delay between 0.05 and 0.6 s, noise level that changes, own starts;
-    /// searches of up to 200 steps to a relative decrease of 1e-10 (a thousandth of a standard
-    /// error): a small change fills its loss with ripples in t_M.
+    /// First-order noise, delay between 0.05 and 0.6 s, a noise level that changes, own starts; searches of up to 200
+    /// steps to a relative decrease of 1e-10 (a thousandth of a standard error): with a small change the loss has many
+    /// ripples in t_M.
     fn default() -> Self {
         Self {
             form: Form::Lead,
@@ -71,10 +71,10 @@ impl Default for SigmoidChange {
 }
 
 impl SigmoidChange {
-    /// With an order nd of the noise that is named.
+    /// Sets the given order nd of the noise.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for another order, and for a range.
+    /// [`IdentError::BadOption`] for other orders, and for a range.
     pub fn with_noise_orders(self, named: &NamedOrders) -> Result<Self, IdentError> {
         for (name, range) in named {
             if name != "nd" || range.start() != range.end() {

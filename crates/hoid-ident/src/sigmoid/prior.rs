@@ -1,8 +1,8 @@
-//! Prior knowledge of the person before the data, next to the criterion of a change.
+//! Prior knowledge of the person in the criterion of a change.
 //!
-//! A prior of a positive parameter x, `ln x ~ N(m, s)`, stands as `sigma^2 (ln x - m)^2/s^2` next to
-//! the squared residuals ([`crate::family::OperatorPrior`]); that of T_L counts before and after the
-//! change. sigma^2, the variance of the innovations, is that of the fit: both in turn.
+//! A prior of a positive parameter x, `ln x ~ N(m, s)`, is added to the squared residuals as `sigma^2 (ln x - m)^2/s^2`
+//! ([`crate::family::OperatorPrior`]); that of T_L is used before and after the change. sigma^2, the variance of the
+//! innovations, is that of the fit: both are computed in turn.
 
 use super::{
     layout::{Element, Layout},
@@ -17,12 +17,12 @@ use crate::{
     optimize::{Minimum, Objective},
 };
 
-/// Rounds in which sigma^2 of the prior is brought up to date.
+/// Rounds in which sigma^2 of the prior is updated.
 const ROUNDS: usize = 3;
-/// Relative change of sigma^2 that needs no other round.
+/// Relative change of sigma^2 below which no further round is necessary.
 const SETTLED: f64 = 0.05;
 
-/// The prior for each place in theta, in units of one standard deviation.
+/// Returns the prior for each place in theta, in units of one standard deviation.
 pub(super) fn penalties(layout: &Layout, prior: &OperatorPrior) -> Vec<Penalty> {
     let all = layout.coordinates();
     let elements = layout.elements();
@@ -32,7 +32,7 @@ pub(super) fn penalties(layout: &Layout, prior: &OperatorPrior) -> Vec<Penalty> 
             Element::Varying(own, _) | Element::Constant(own) => *own == coordinate,
             _ => false,
         };
-        // omega_nm and zeta_nm are here themselves, in the family by their logarithms.
+        // omega_nm and zeta_nm are parameters here, in the family by their logarithms.
         let own = elements.iter().enumerate().filter(move |(_, e)| is_own(e));
         own.map(move |(place, _)| Penalty {
             place,
@@ -45,7 +45,7 @@ pub(super) fn penalties(layout: &Layout, prior: &OperatorPrior) -> Vec<Penalty> 
     unit.into_iter().flat_map(places).collect()
 }
 
-/// The penalties with the variance of the innovations as their unit.
+/// Returns the penalties with the variance of the innovations as their unit.
 pub(super) fn weighted(unit: &[Penalty], variance: f64) -> Vec<Penalty> {
     unit.iter().map(|p| p.weighted(variance)).collect()
 }
@@ -57,7 +57,7 @@ pub(super) fn innovation_variance(criterion: &ChangeCriterion<'_>, minimum: &Min
     squares / (criterion.residuals() - not_fixed - criterion.states()) as f64
 }
 
-/// The minimum with noise levels, and with the prior in units of the variance that belongs to it.
+/// Returns the minimum with noise levels, and with the prior in units of the variance that belongs to it.
 ///
 /// # Errors
 /// [`IdentError::NoFiniteLoss`].
@@ -88,7 +88,7 @@ pub(super) fn settled(
     Ok((minimum, levels))
 }
 
-/// The prior in units of the variance at a start.
+/// Returns the prior in units of the variance at a start.
 pub(super) fn begun(criterion: &ChangeCriterion<'_>, unit: &[Penalty], theta: &[f64]) -> Vec<Penalty> {
     if unit.is_empty() {
         return Vec::new();

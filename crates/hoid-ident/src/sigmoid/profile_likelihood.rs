@@ -15,18 +15,18 @@ use crate::optimize::{Minimum, SearchMethod, SearchOptions};
 const REGULAR: f64 = 3.841;
 /// 95 % quantile of the larger of two exponential variables with mean 2.
 const CHANGE_POINT: f64 = 7.352;
-/// The walk goes on to this multiple of the quantile: the loss need not grow steadily.
+/// Multiple of the quantile up to which the walk continues: the loss need not increase monotonically.
 const WELL_OUTSIDE: f64 = 2.0;
-/// Each step of the walk is longer than the one before.
+/// Growth factor of the steps of the walk.
 const GROWTH: f64 = 1.5;
 /// First step in standard errors.
 const FIRST_STEP: f64 = 0.5;
-/// Points of the walk to either side; the longest step is then hundreds of times the first.
+/// Number of points of the walk on either side; the longest step is then hundreds of times the first.
 const MOST_POINTS: usize = 40;
 /// Halvings of the last step: the end is known to a sixteenth of it.
 const HALVINGS: usize = 4;
 
-/// Ends of a 95 % interval; the bound of the parameter, or infinity for a rate, where it is open.
+/// Ends of a 95 % interval; an open end is the bound of the parameter, or infinity for a rate.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Interval {
     pub low: f64,
@@ -38,19 +38,19 @@ pub(crate) struct Interval {
 pub(crate) enum Profile {
     /// An interval.
     Interval(Interval),
-    /// A lower loss than that of the minimum, here.
+    /// A point with a lower loss than that of the minimum.
     Lower(Vec<f64>),
 }
 
-/// Whether t_M, with this standard error of a regular parameter, is a change point.
+/// True if t_M, with this standard error of a regular parameter, is a change point.
 pub(crate) fn is_change_point(layout: &Layout, theta: &[f64], standard_error: f64) -> bool {
-    // Derivatives at one t_M do not determine about another one a width of the change away: the
-    // ends of a 95 % interval.
+    // Derivatives at one t_M carry no information about another one at a distance of the width of the change: the ends
+    // of a 95 % interval.
     2.0 * standard_error >= (-theta[layout.log_rate]).exp()
 }
 
-/// 95 % interval of t_M or ln G around a minimum, `standard_error` its own where it has one; with
-/// `stay` a lower loss on the way only counts as inside.
+/// Returns the 95 % interval of t_M or ln G around a minimum, `standard_error` its own if it has one; with `stay` a
+/// lower loss on the way counts only as inside.
 pub(crate) fn profile_likelihood_interval(
     criterion: &ChangeCriterion<'_>,
     minimum: &Minimum,
@@ -68,7 +68,7 @@ pub(crate) fn profile_likelihood_interval(
     let options = SearchOptions {
         method: SearchMethod::LevenbergMarquardt,
         max_iterations: 30,
-        // For the statistic, n times this: a thousandth of the quantile.
+        // For the statistic, which is n times this: a thousandth of the quantile.
         tolerance: 1e-3 * quantile / n,
     };
     let (low, high) = criterion.limits[place];
@@ -98,8 +98,8 @@ pub(crate) fn profile_likelihood_interval(
             let value = (from[place] + sign * step).clamp(low, high);
             step *= GROWTH;
             let Some((loss, theta)) = at(value, &from) else { break };
-            // A lower minimum than the one that was found, by a tenth of what matters: the walk
-            // goes on to the lowest.
+            // A minimum lower than the one found, by a tenth of the relevant difference: the walk continues to the
+            // lowest.
             if loss < lowest && !stay {
                 lowest = loss;
                 lower = Some(theta.clone());

@@ -1,10 +1,9 @@
 //! The best numerators for given poles, delay, noise model and change, by linear least squares.
 //!
-//! `u = sum_i (n_i1 (1 - s) + n_i2 s) y_i` with the share s of the change and the responses y_i,
-//! whitened by D. From the coefficients n at either end follow the parameters of the numerator:
-//! where it has a coefficient less than parameters allow, those that lie nearest in the metric of
-//! the responses. A slow pole of the operator has a state where a record starts, which is one more
-//! unknown for each.
+//! `u = sum_i (n_i1 (1 - s) + n_i2 s) y_i` with the share s of the change and the responses y_i, whitened by D. The
+//! coefficients n at either end determine the parameters of the numerator: if it has fewer parameters than
+//! coefficients, the nearest ones in the metric of the responses. A slow pole of the operator has a state at the start
+//! of a record, which is an additional unknown for each.
 
 use hoid_model::Form;
 
@@ -16,18 +15,18 @@ use super::{
 };
 use crate::linalg::least_squares::{add_scaled, dot, solve_symmetric};
 
-/// Time constants of the poles that pass before residuals are ranked.
+/// Time constants of the poles before the first residual of the ranking.
 const SETTLING: f64 = 4.0;
-/// Where the pole is that settles last, when there is no neuromuscular part, 1/s.
+/// Slowest pole if there is no neuromuscular part, 1/s.
 const FAST: f64 = 10.0;
-/// Lead times that a square of a lead is searched for at, s: from the first by the factor.
+/// Lead times at which a squared lead is searched, s: first value, factor, number.
 const LEADS_S: (f64, f64, usize) = (0.02, 1.12, 60);
 
 /// Responses for given poles, delay and noise model.
 pub(super) struct Ranking<'c, 'a> {
     pub criterion: &'c ChangeCriterion<'a>,
     theta: Vec<f64>,
-    /// For each record: first sample that counts, the responses and u from nd samples before it on.
+    /// For each record: first sample that counts, and the responses and u from nd samples before it on.
     signals: Vec<(usize, Vec<Vec<f64>>, Vec<f64>)>,
 }
 
@@ -56,8 +55,8 @@ impl<'c, 'a> Ranking<'c, 'a> {
         })
     }
 
-    /// Sum of squares, and the parameters of the numerator at both ends in the order of theta, of
-    /// least squares for the change of `theta`; without one, both ends are the same.
+    /// Returns the sum of squares and the parameters of the numerator at both ends, in the order of theta, by least
+    /// squares for the change of `theta`; without a change, both ends are equal.
     pub fn best_gains(&self, change: Option<&[f64]>) -> Option<(f64, Vec<f64>)> {
         let powers = self.powers();
         let ends = if change.is_some() { 2 } else { 1 };
@@ -112,7 +111,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
         (rank.is_finite() && values.iter().all(|g| g.is_finite())).then_some((rank, values))
     }
 
-    /// The part of u that the best numerators for a theta leave unexplained, in each record.
+    /// Returns the part of u that the best numerators for a theta do not explain, in each record.
     pub fn unexplained(&self, theta: &[f64]) -> Option<Vec<Vec<f64>>> {
         let (layout, mut all) = (&self.criterion.layout, Vec::new());
         for (record, (first, y, u)) in self.signals.iter().enumerate() {
@@ -144,7 +143,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
         self.criterion.layout.form.has_pole()
     }
 
-    /// How the state of the pole of a lag or an integration dies away.
+    /// Returns the decay of the state of the pole of a lag or an integration.
     fn slow_state(&self, n: usize) -> Vec<f64> {
         let rate = self.criterion.layout.lag.map_or(0.0, |place| self.theta[place]);
         let per_sample = (-rate * self.criterion.sample_time.s()).exp();
@@ -153,7 +152,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
             .collect()
     }
 
-    /// Times after the delay of the samples of a record.
+    /// Returns the times of the samples of a record, minus the delay.
     fn times(&self, theta: &[f64], record: usize, first: usize, n: usize) -> impl Iterator<Item = f64> {
         let (data, ts) = (&self.criterion.data[record], self.criterion.sample_time.s());
         let from = first - self.criterion.layout.nd;
@@ -179,7 +178,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
     }
 }
 
-/// The parameters of a numerator `n_0 + n_1 s + n_2 s^2`.
+/// Returns the parameters of a numerator `n_0 + n_1 s + n_2 s^2`.
 fn parameters(form: Form, n: &[f64], metric: impl Fn(usize, usize) -> f64) -> [f64; MOST_VARYING] {
     // A gain of zero has no lead time.
     let over = |x: f64, gain: f64| if gain == 0.0 { 0.0 } else { x / gain };
@@ -199,7 +198,7 @@ fn parameters(form: Form, n: &[f64], metric: impl Fn(usize, usize) -> f64) -> [f
     }
 }
 
-/// Gain and lead time whose `k (1, 2 T, T^2)` lies nearest to n.
+/// Returns gain and lead time whose `k (1, 2 T, T^2)` is nearest to n.
 fn square_of_a_lead(form: Form, n: &[f64], metric: impl Fn(usize, usize) -> f64) -> [f64; MOST_VARYING] {
     let product = |a: &[f64], b: &[f64]| {
         let pairs = (0..3).flat_map(|i| (0..3).map(move |j| (i, j)));

@@ -1,6 +1,6 @@
-//! The fit with a noise level before the change and another after it: fit and levels in turn, until
-//! the ratio of the levels settles. The squared residuals are weighted with the inverse of the
-//! level in force ([`super::noise_level`]).
+//! The fit with one noise level before the change and another after it: fit and levels in turn, until the ratio of the
+//! levels converges. The squared residuals are weighted with the inverse of the level at their time
+//! ([`super::noise_level`]).
 
 use super::{
     instant::Instant,
@@ -16,15 +16,14 @@ use crate::{
 
 /// Rounds of fit and noise levels in turn.
 const ROUNDS: usize = 20;
-/// Rounds end when the ratio of the levels moves by less than this share; its own standard error is
-/// `1/sqrt n`, about 1 %.
+/// The rounds end when the ratio of the levels changes by less than this share; its own standard error is `1/sqrt n`,
+/// about 1 %.
 const SETTLED: f64 = 1e-6;
-/// Relative change of the loss that does not matter: of the log-likelihood of 10000 residuals, a
-/// two-hundredth.
+/// Relative change of the loss that is negligible: for the log-likelihood of 10000 residuals, a two-hundredth.
 const NO_MATTER: f64 = 1e-6;
 
-/// The minimum with the noise levels found in turn with the fit, and the levels; `None` if the
-/// residuals are rounding.
+/// Returns the minimum with the noise levels estimated in turn with the fit, and the levels; `None` if the residuals
+/// are rounding.
 ///
 /// # Errors
 /// [`IdentError::NoFiniteLoss`].
@@ -50,8 +49,7 @@ pub(super) fn with_levels(
         iterations += next.termination.iterations;
         let change = next.at.sum_of_squares / minimum.at.sum_of_squares - 1.0;
         if round > 0 && change > NO_MATTER {
-            // Two changes that each look worse with the noise levels of the other: the likelier one
-            // stays.
+            // Two changes that each have a higher loss with the noise levels of the other: the more likely one is kept.
             (criterion.weights, levels) = (kept, before);
             break;
         }
@@ -64,7 +62,7 @@ pub(super) fn with_levels(
     Ok((minimum, levels))
 }
 
-/// Share of the change at the time of each residual, without the delay: the remnant has none.
+/// Returns the share of the change at the time of each residual, without the delay: the remnant is not delayed.
 fn shares(criterion: &ChangeCriterion<'_>, theta: &[f64]) -> Vec<Vec<f64>> {
     let ts = criterion.sample_time.s();
     let of = |d: &Data<'_>| {

@@ -1,5 +1,5 @@
-//! Searches for the minimum of the loss, which has kinks where the delay is a whole number of
-//! samples, and of an operator with a direct part between them too ([`super::layout`], pieces).
+//! Searches for the minimum of the loss, which has kinks where the delay is an integer number of samples, and for an
+//! operator with a direct part between them too ([`super::layout`], pieces).
 
 use super::{objective::ChangeCriterion, starts};
 use crate::{
@@ -8,13 +8,13 @@ use crate::{
     optimize::{Minimum, minimise},
 };
 
-/// Steps from each start before the best of them is followed to its end.
+/// Number of steps from each start before the best of them is continued to its end.
 const LOOK: usize = 30;
 /// Distance to the border of a piece, in pieces, below which the next piece is tried.
 const NEAR_BORDER: f64 = 1e-6;
 
-/// The lowest of the minima from these starts, with the name of its start: a look at each, then the
-/// best to its end.
+/// Returns the lowest of the minima from these starts, with the name of its start: a few steps from each, then the best
+/// to its end.
 ///
 /// # Errors
 /// [`IdentError::NoFiniteLoss`].
@@ -46,7 +46,7 @@ pub(super) fn best_minimum(
     Ok((label, minimum))
 }
 
-/// The minimum of the model without a change, with the weights of the other.
+/// Returns the minimum of the model without a change, with the weights of the other.
 ///
 /// # Errors
 /// [`IdentError::NoFiniteLoss`].
@@ -66,8 +66,8 @@ pub(super) fn without_change(
     search(&constant, start, options, None).ok_or(IdentError::NoFiniteLoss)
 }
 
-/// Searches from theta. The loss has kinks where tau_e is a whole number of samples, and a search
-/// may end in one; it is then finished inside each of the pieces that meet there.
+/// Searches from theta. The loss has kinks where tau_e is an integer number of samples, and a search may end in one; it
+/// is then continued inside each of the pieces that meet there.
 pub(super) fn search(
     criterion: &ChangeCriterion<'_>,
     theta: Vec<f64>,
@@ -95,7 +95,7 @@ pub(super) fn search(
     let mut iterations = minimum.termination.iterations;
     let mut best = inside(piece, &minimum.theta)?;
     iterations += best.termination.iterations;
-    // Each move lowers the loss; the limit only guards against rounding.
+    // Each move decreases the loss; the limit only guards against rounding.
     for _ in 0..100 {
         let position = best.theta[delay] / length;
         let neighbours = [

@@ -1,4 +1,4 @@
-//! The starts of the search where none is given.
+//! Starts of the search if none is given.
 //!
 //! Poles, delay and noise model are those of [`super::frozen`]. With these and t_M and G given the
 //! residual is linear in the coefficients of the numerator at both ends (all of them following the
@@ -19,11 +19,11 @@ use crate::family::noise::NoiseProducts;
 const RATES: [f64; 3] = [0.5, 5.0, 100.0];
 /// Times of the change in the grid.
 const MIDPOINTS: usize = 12;
-/// Delays of a grid that each rate is tried with, each with its best poles: a search finds its way
-/// from poles to others more easily than from one delay to another.
+/// Number of delays of a grid that are tried for each rate, each with its best poles: a search changes poles more
+/// easily than delays.
 const BEST_DELAYS: usize = 4;
 
-/// A start and the words for it.
+/// A start with its description.
 #[derive(Debug, Clone)]
 pub(crate) struct Start {
     pub label: String,
@@ -31,13 +31,12 @@ pub(crate) struct Start {
     rank: f64,
 }
 
-/// Starts, the best first: one for each rate, and of a form of the family for each of the best
-/// delays.
+/// Returns the starts, the best first: one for each rate, and for a form of the family one for each of the best delays.
 pub(crate) fn initial_guesses(criterion: &ChangeCriterion<'_>, records: &[Record]) -> Vec<Start> {
     let (low, high) = criterion.limits[criterion.layout.log_rate];
     let mut rates: Vec<f64> = RATES.iter().map(|g| g.ln().clamp(low, high)).collect();
     rates.dedup();
-    // The poles that do best with the middling rate serve all.
+    // The best poles for the medium rate are used for all.
     let middling = rates[rates.len() / 2];
     let frozen = match criterion.layout.form {
         Form::Lead => {
@@ -63,7 +62,7 @@ pub(crate) fn initial_guesses(criterion: &ChangeCriterion<'_>, records: &[Record
     starts
 }
 
-/// The best poles of a grid, each with the noise model of what they leave.
+/// Returns the best poles of a grid, each with the noise model of its residuals.
 fn best_of_family(criterion: &ChangeCriterion<'_>, log_rate: f64) -> Vec<(f64, Frozen)> {
     let ranked = |frozen: Frozen| Some((on_grid(criterion, &frozen, log_rate)?.0, frozen));
     let mut all: Vec<(f64, Frozen)> = of_family(criterion).into_iter().filter_map(ranked).collect();
@@ -86,8 +85,7 @@ fn best_of_family(criterion: &ChangeCriterion<'_>, log_rate: f64) -> Vec<(f64, F
     all
 }
 
-/// The start of the model without a change, from the poles, the delay and the noise model of the
-/// other.
+/// Returns the start of the model without a change, from the poles, the delay and the noise model of the other.
 pub(crate) fn without_change(criterion: &ChangeCriterion<'_>, theta: &[f64]) -> Vec<f64> {
     let mut theta = theta.to_vec();
     if let Some(ranking) = Ranking::new(criterion, &theta)
@@ -98,7 +96,7 @@ pub(crate) fn without_change(criterion: &ChangeCriterion<'_>, theta: &[f64]) -> 
     theta
 }
 
-/// Rank and theta for one change, with the best gains.
+/// Returns rank and theta for one change, with the best gains.
 fn rank_at(ranking: &Ranking<'_, '_>, theta: &[f64], t_m: f64) -> Option<(f64, Vec<f64>)> {
     let mut there = theta.to_vec();
     there[ranking.criterion.layout.midpoint] = t_m;
@@ -107,13 +105,13 @@ fn rank_at(ranking: &Ranking<'_, '_>, theta: &[f64], t_m: f64) -> Option<(f64, V
     Some((rank, there))
 }
 
-/// Time between two points of the grid of t_M.
+/// Returns the step of the grid of t_M.
 fn grid_step(criterion: &ChangeCriterion<'_>) -> f64 {
     let (low, high) = criterion.limits[criterion.layout.midpoint];
     (high - low) / MIDPOINTS as f64
 }
 
-/// The best t_M of the grid for the given ln G.
+/// Returns the best t_M of the grid for the given ln G.
 fn on_grid<'c, 'a>(
     criterion: &'c ChangeCriterion<'a>,
     frozen: &Frozen,
@@ -129,7 +127,7 @@ fn on_grid<'c, 'a>(
     Some((rank, best, ranking))
 }
 
-/// The best t_M for the given ln G.
+/// Returns the best t_M for the given ln G.
 fn best_midpoint(criterion: &ChangeCriterion<'_>, frozen: &Frozen, log_rate: f64) -> Option<Start> {
     let (rank, theta, ranking) = on_grid(criterion, frozen, log_rate)?;
     let (low, high) = criterion.limits[criterion.layout.midpoint];

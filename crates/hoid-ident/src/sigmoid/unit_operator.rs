@@ -22,15 +22,14 @@ pub(crate) struct UnitOperator {
     /// For each power.
     pub b: Vec<Vec<f64>>,
     pub f: Vec<f64>,
-    /// For each power, along each of [`Layout::poles`].
+    /// For each power, with respect to each of [`Layout::poles`].
     b_slopes: Vec<Vec<Vec<f64>>>,
-    /// Along each of [`Layout::poles`].
+    /// With respect to each of [`Layout::poles`].
     f_slopes: Vec<Vec<f64>>,
 }
 
 impl UnitOperator {
-    /// `None` where theta has no meaning. The delay may be held in a piece of a sample
-    /// ([`Layout::pieces`]).
+    /// Returns `None` for an invalid theta. The delay may be held in a piece of a sample ([`Layout::pieces`]).
     pub fn of(layout: &Layout, theta: &[f64], piece: Option<usize>, ts: SampleTime) -> Option<Self> {
         let sample = match piece {
             Some(piece) => piece / layout.pieces(),
@@ -64,7 +63,7 @@ impl UnitOperator {
     }
 
     fn of_family(layout: &Layout, theta: &[f64], sample: usize, ts: SampleTime) -> Option<Self> {
-        // The numerator takes no part.
+        // The numerator has no effect.
         let operator = layout.operator(theta, &[1.0; 3]).ok()?;
         let powers = operator.zoh_powers_within(sample, ts).ok()?;
         // From the coordinates of the family to theta.
@@ -93,7 +92,7 @@ impl UnitOperator {
         })
     }
 
-    /// `y_i` for an input with the past in front.
+    /// Returns `y_i` for an input preceded by the past.
     pub fn response(&self, i: usize, input: &[f64]) -> Vec<f64> {
         let mut y = vec![0.0; input.len()];
         fir(&self.b[i], 0, input, &mut y);
@@ -101,7 +100,7 @@ impl UnitOperator {
         y
     }
 
-    /// Derivative of `y_i` along the p-th of [`Layout::poles`].
+    /// Returns the derivative of `y_i` with respect to the p-th of [`Layout::poles`].
     pub fn slope(&self, i: usize, p: usize, input: &[f64], y: &[f64]) -> Vec<f64> {
         let mut x = vec![0.0; input.len()];
         fir(&self.b_slopes[i][p], 0, input, &mut x);
@@ -112,7 +111,7 @@ impl UnitOperator {
         x
     }
 
-    /// Response of `B_i/F` to a unit input, until it has died away or `longest` is reached.
+    /// Returns the response of `B_i/F` to a unit input, until it has died away or its length is `longest`.
     pub fn impulse_response(&self, i: usize, longest: usize) -> Vec<f64> {
         let mut h: Vec<f64> = Vec::with_capacity(longest.min(4096));
         let mut largest = 0.0_f64;

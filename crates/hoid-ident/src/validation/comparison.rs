@@ -1,4 +1,4 @@
-//! A model against a record: simulated and predicted output, and the tests of the residuals.
+//! Comparison of a model with a record: simulated and predicted output, and the tests of the residuals.
 
 use std::fmt;
 
@@ -11,8 +11,8 @@ use super::{
 };
 use crate::{Fit, IdentError, Series};
 
-/// Results of the residual tests. A lag outside its 99 % bound is expected once in a hundred; more
-/// than [`OUTSIDE_ALLOWED`] of them is a sign.
+/// Results of the residual tests. A lag outside its 99 % bound is expected once in a hundred; a share of more than
+/// [`OUTSIDE_ALLOWED`] is significant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ResidualDiagnostics {
     /// The residuals are not white at the 1 % level: the noise model is too small.
@@ -28,10 +28,10 @@ pub struct ResidualDiagnostics {
 /// Share of lags outside the 99 % bound above which a correlation counts as present.
 pub const OUTSIDE_ALLOWED: f64 = 0.06;
 
-/// Simulated and predicted output of a model on a record, with what follows from them.
+/// Simulated and predicted output of a model on a record, with the derived results.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Validation {
-    /// First sample that all of the series below cover.
+    /// First sample that all series below contain.
     pub first: usize,
     /// Simulated output.
     pub simulated: Vec<f64>,
@@ -41,16 +41,14 @@ pub struct Validation {
     pub quality: GoodnessOfFit,
     /// Residual autocorrelation, lags 1 to [`LARGEST_LAG`].
     pub autocorrelation: Correlation,
-    /// Cross-correlation of residuals and input, lags from minus to plus [`LARGEST_LAG`]; no lags
-    /// without an input.
+    /// Cross-correlation of residuals and input, lags from minus to plus [`LARGEST_LAG`]; empty without an input.
     pub cross_correlation: Correlation,
-    /// Whiteness of the residuals; `None` when there are fewer lags than coefficients of the noise
-    /// model.
+    /// Whiteness of the residuals; `None` if there are fewer lags than coefficients of the noise model.
     pub ljung_box: Option<LjungBox>,
 }
 
 impl Validation {
-    /// Results of the residual tests.
+    /// Returns the results of the residual tests.
     pub fn diagnostics(&self) -> ResidualDiagnostics {
         let outside = |keep: fn(i64) -> bool| {
             let c = &self.cross_correlation;
@@ -67,7 +65,7 @@ impl Validation {
 }
 
 impl fmt::Display for Validation {
-    /// VAF and NRMSE of simulation and prediction, then what each residual test shows.
+    /// Formats VAF and NRMSE of simulation and prediction, followed by the results of the residual tests.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let q = &self.quality;
         let found = self.diagnostics();
@@ -121,7 +119,7 @@ impl fmt::Display for Validation {
 }
 
 impl Fit {
-    /// Compares the model with a record, the one it was fitted on or another.
+    /// Compares the model with a record, the one it was fitted to or another.
     ///
     /// # Errors
     /// As [`Fit::residuals`].
@@ -158,8 +156,8 @@ impl Fit {
         })
     }
 
-    /// The first sample that both cover, and from there on the simulated output and the prediction
-    /// one step ahead.
+    /// Returns the first sample that both contain, and from there on the simulated output and the one-step-ahead
+    /// prediction.
     fn model_outputs(&self, record: &Record) -> Result<(usize, Vec<f64>, Vec<f64>), IdentError> {
         let (simulated, predicted) = (self.simulate(record)?, self.predict(record)?);
         let first = simulated.first.max(predicted.first);
@@ -170,10 +168,9 @@ impl Fit {
         Ok((first, from_there(simulated), from_there(predicted)))
     }
 
-    /// Prediction of the output k samples ahead, the input being known:
-    /// `u - sum_{j<k} h_j eps(t-j)` with h the impulse response of the noise filter C/(A D) (L.
-    /// Ljung, *System Identification*, 1999, eq. 3.31). k = 1 is [`Fit::predict`]; for large k, and
-    /// a stable noise filter, it goes over into [`Fit::simulate`].
+    /// Predicts the output k samples ahead, with the input known: `u - sum_{j<k} h_j eps(t-j)` with h the impulse
+    /// response of the noise filter C/(A D) (L. Ljung, *System Identification*, 1999, eq. 3.31). k = 1 is
+    /// [`Fit::predict`]; for large k, and a stable noise filter, it approaches [`Fit::simulate`].
     ///
     /// # Errors
     /// As [`Fit::residuals`]; [`IdentError::BadOption`] for k = 0.
@@ -188,7 +185,7 @@ impl Fit {
         let eps = self.residuals(record)?;
         let m = self.model();
         let mut h = monic(m.c());
-        // Beyond the record nothing is multiplied.
+        // Beyond the record there are no products.
         h.resize(k.min(eps.values.len().max(1)), 0.0);
         let poles = product(&monic(m.a()), &monic(m.d()));
         hoid_core::filter::divide_in_place(&poles[1..], &mut h);
@@ -204,8 +201,8 @@ impl Fit {
         })
     }
 
-    /// VAF and NRMSE over several records together: the squared errors of all of them against the
-    /// power (for NRMSE, the spread around the mean of each record) of all of them.
+    /// Returns VAF and NRMSE over several records together: the sum of all squared errors relative to the total power
+    /// (for NRMSE, the total of the squared deviations from the mean of each record).
     ///
     /// # Errors
     /// As [`Fit::residuals`].
@@ -219,8 +216,7 @@ impl Fit {
 }
 
 impl GoodnessOfFit {
-    /// The value for several records together, as [`Fit::quality`], where their validations are
-    /// available.
+    /// Returns the same as [`Fit::quality`] for several records together, from their existing validations.
     pub fn pooled<'a>(validated: impl Iterator<Item = (&'a Record, &'a Validation)>) -> Self {
         let with = |all: ErrorSums, (record, v): (&'a Record, &'a Validation)| {
             all.and(&record.output()[v.first..], &v.simulated, &v.predicted)

@@ -14,15 +14,14 @@ pub struct Correlation {
     pub lags: Vec<i64>,
     /// Normalised correlation at each lag.
     pub values: Vec<f64>,
-    /// Bound that 99 % of the values keep when there is no correlation.
+    /// Bound for 99 % of the values if there is no correlation.
     pub bound_99: f64,
 }
 
-/// Samples that are multiplied with all lags before the next ones: they stay in the memory near the
-/// processor.
+/// Number of samples that are multiplied with all lags before the next ones: they remain in the processor cache.
 const BLOCK: usize = 8192;
 
-/// `sum_t x(t) y(t - k)` over the overlap, for each lag k; both have the same length.
+/// Returns `sum_t x(t) y(t - k)` over the overlap, for each lag k; both have the same length.
 fn covariances_at(x: &[f64], y: &[f64], lags: &[i64]) -> Vec<f64> {
     let n = x.len();
     let mut sums = vec![0.0; lags.len()];
@@ -39,14 +38,14 @@ fn covariances_at(x: &[f64], y: &[f64], lags: &[i64]) -> Vec<f64> {
     sums
 }
 
-/// The signal without its mean.
+/// Returns the signal without its mean.
 pub(super) fn centred(mut x: Vec<f64>) -> Vec<f64> {
     let mean = mean(&x);
     x.iter_mut().for_each(|v| *v -= mean);
     x
 }
 
-/// Covariances over a size; zeros if that is zero.
+/// Returns covariances divided by a size; zeros if that is zero.
 fn relative_to(size: f64, mut covariances: Vec<f64>) -> Vec<f64> {
     covariances
         .iter_mut()
@@ -70,8 +69,7 @@ pub(super) fn autocorrelation(x: &[f64], largest: usize) -> Correlation {
 pub(super) fn cross_correlation(x: &[f64], y: &[f64], largest: usize) -> Correlation {
     let largest = largest.min(x.len().saturating_sub(1)) as i64;
     let lags: Vec<i64> = (-largest..=largest).collect();
-    // The residuals are nearly white, so that few lags carry the sum, which has each of them on
-    // both sides of zero.
+    // The residuals are nearly white, so that a few lags on both sides of zero dominate the sum.
     let reach: Vec<i64> = (0..=(4 * largest).min(x.len() as i64 - 1)).collect();
     let (of_x, of_y) = (covariances_at(x, x, &reach), covariances_at(y, y, &reach));
     let zero = of_x.first().zip(of_y.first()).map_or(0.0, |(x, y)| x * y);

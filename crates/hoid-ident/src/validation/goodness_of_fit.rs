@@ -1,5 +1,4 @@
-//! How much of the measured output a model explains: VAF and NRMSE, of one record or of several
-//! together.
+//! Share of the measured output that a model explains: VAF and NRMSE, for one record or for several together.
 
 use crate::linalg::{least_squares::dot, products::variance};
 
@@ -26,7 +25,7 @@ pub(super) struct ErrorSums {
 }
 
 impl ErrorSums {
-    /// With one more record.
+    /// Returns the sums with an additional record.
     pub fn and(self, measured: &[f64], simulated: &[f64], predicted: &[f64]) -> Self {
         Self {
             power: self.power + dot(measured, measured),
@@ -46,17 +45,17 @@ impl ErrorSums {
     }
 }
 
-/// Variance accounted for (eq. 39), %. Zero where the measured signal is zero.
+/// Returns the variance accounted for (eq. 39), %. Zero if the measured signal is zero.
 pub fn vaf(measured: &[f64], model: &[f64]) -> f64 {
     vaf_of(squared_distance(measured, model), dot(measured, measured))
 }
 
-/// NRMSE fit, %. Zero where the measured signal is constant.
+/// Returns the NRMSE fit, %. Zero if the measured signal is constant.
 pub fn nrmse_fit(measured: &[f64], model: &[f64]) -> f64 {
     nrmse_of(squared_distance(measured, model), spread_of(measured))
 }
 
-/// Sum of the squared distances from the mean; zero for a constant.
+/// Returns the sum of the squared deviations from the mean; zero for a constant.
 fn spread_of(x: &[f64]) -> f64 {
     if x.is_empty() {
         0.0

@@ -1,4 +1,4 @@
-//! Are the residuals white? The test of Ljung and Box.
+//! Whiteness of the residuals: the test of Ljung and Box.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -7,25 +7,25 @@ use super::correlation::{Correlation, autocorrelation, centred};
 /// Largest lag of the residual tests, in samples.
 pub const LARGEST_LAG: usize = 50;
 
-/// Test of Ljung and Box: are the residuals white?
+/// Result of the test of Ljung and Box for white residuals.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LjungBox {
     /// `Q = n (n + 2) sum_k r_k^2/(n - k)` over the lags 1 to [`LARGEST_LAG`].
     pub statistic: f64,
-    /// Lags less the free coefficients of the noise model (those of A, C and D).
+    /// Number of lags minus the number of free coefficients of the noise model (those of A, C and D).
     pub degrees_of_freedom: usize,
     /// Probability of a larger Q for white residuals.
     pub p_value: f64,
 }
 
-/// Test of Ljung and Box on residuals whose noise model has `free` coefficients; `None` when there
-/// are fewer lags than those.
+/// Applies the test of Ljung and Box to residuals whose noise model has `free` coefficients; `None` if there are fewer
+/// lags than those.
 pub fn whiteness(residuals: &[f64], free: usize) -> Option<LjungBox> {
     let residuals = centred(residuals.to_vec());
     ljung_box(&autocorrelation(&residuals, LARGEST_LAG), residuals.len(), free)
 }
 
-/// The same from the autocorrelation of n residuals.
+/// Returns the same from the autocorrelation of n residuals.
 pub(super) fn ljung_box(correlation: &Correlation, n: usize, free: usize) -> Option<LjungBox> {
     let lags = correlation.lags.len();
     let degrees_of_freedom = lags.checked_sub(free).filter(|d| *d > 0)?;

@@ -4,9 +4,8 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::ContinuousTransferFunction;
 
-/// The system after a hold with a delay of a `fraction` of a sample, by ascending powers of `z^-1`;
-/// a fraction other than zero makes the numerator one longer. `None` when the matrix exponential is
-/// not finite.
+/// Returns the system after a hold with a delay of a `fraction` of a sample, by ascending powers of `z^-1`; a nonzero
+/// fraction makes the numerator longer by one. `None` if the matrix exponential is not finite.
 pub(super) fn hold(
     h: &ContinuousTransferFunction,
     ts: f64,
@@ -86,7 +85,7 @@ pub(super) fn hold(
     Some((num, den))
 }
 
-/// State after a part of a sample: `phi x(0) + constant u(0) + slope (u(1) - u(0))`.
+/// State after a fraction of a sample: `phi x(0) + constant u(0) + slope (u(1) - u(0))`.
 struct Propagation {
     phi: DMatrix<f64>,
     constant: DVector<f64>,
@@ -131,7 +130,7 @@ fn transfer_function_in_delta(row: &DVector<f64>, m: &DMatrix<f64>, column: &DVe
     (num, den)
 }
 
-/// A polynomial by descending powers of `delta = z - 1`, in powers of z.
+/// Converts a polynomial by descending powers of `delta = z - 1` to powers of z.
 fn from_delta_to_z(p: &[f64]) -> Vec<f64> {
     let mut result: Vec<f64> = Vec::with_capacity(p.len());
     for &c in p {

@@ -4,8 +4,7 @@ use num_complex::Complex64;
 
 use crate::{ContinuousTransferFunction, polynomial};
 
-/// Poles and zeros by `z = e^{s Ts}`, by descending powers of z. `None` when the roots are not
-/// found.
+/// Maps poles and zeros by `z = e^{s Ts}`, by descending powers of z. `None` if the roots cannot be found.
 pub(super) fn matched(h: &ContinuousTransferFunction, ts: f64) -> Option<(Vec<f64>, Vec<f64>)> {
     let poles = polynomial::roots(h.den())?;
     let leading = h.num()[0];
@@ -30,7 +29,7 @@ fn image(roots: &[Complex64], ts: f64) -> Vec<f64> {
     polynomial::from_roots(&roots.iter().map(|p| (p * ts).exp()).collect::<Vec<_>>())
 }
 
-/// `prod p / (e^{p Ts} - 1)`, the product that a factor `s - p` brings over its image at s = 0.
+/// `prod p / (e^{p Ts} - 1)`, the ratio of the factors `s - p` to their images at s = 0.
 fn static_ratio(roots: &[Complex64], ts: f64) -> f64 {
     let ratio = |p: &Complex64| {
         let z = p * ts;

@@ -4,7 +4,7 @@ use super::hold::hold;
 use super::matched::matched;
 use crate::{ContinuousTransferFunction, DiscreteTransferFunction, ModelError, SampleTime, polynomial};
 
-/// How a continuous transfer function becomes a discrete one.
+/// Method of discretisation of a continuous transfer function.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Method {
     /// Rectangle rule at the start of the sample.
@@ -26,17 +26,16 @@ pub enum Method {
     Matched,
 }
 
-/// Longest delay that is written out as leading zeros of a numerator.
+/// Longest delay that is represented by leading zeros of a numerator.
 const LONGEST_DELAY_SAMPLES: f64 = 1e6;
 
-/// The discrete transfer function of `h` by one of the methods of Table 5.2. The numerator starts
-/// with as many zeros as there are samples of delay.
+/// Returns the discrete transfer function of `h` by one of the methods of Table 5.2. The numerator starts with as many
+/// zeros as there are samples of delay.
 ///
 /// # Errors
-/// [`ModelError::OutOfRange`] when the delay is not a whole number of samples (the two holds take
-/// any delay) or the prewarping frequency does not lie between 0 and pi/Ts;
-/// [`ModelError::TransferFunction`] when the method sends a pole to infinity or the result is not
-/// finite.
+/// [`ModelError::OutOfRange`] if the delay is not an integer number of samples (the two holds accept any delay) or the
+/// prewarping frequency is not between 0 and pi/Ts; [`ModelError::TransferFunction`] if the method maps a pole to
+/// infinity or the result is not finite.
 pub fn discretise(
     h: &ContinuousTransferFunction,
     sample_time: SampleTime,

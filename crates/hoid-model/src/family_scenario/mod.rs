@@ -1,17 +1,17 @@
 //! Tasks of people: any operator of the family around any proper controlled element, with a remnant
 //! of several parts and a stick that drifts.
 //!
-//! `e = f - y`, `u = Y e + F f + n`, `y = P (u + d)`: a target f, which the person may see (F, [`Feedforward`]), a disturbance d at the input of the
-//! controlled element P. What changes goes along the sigmoid of eq. 5 as in
-//! [`Scenario`](crate::scenario::Scenario), which is the task of the thesis and stays apart: its
-//! operator is the lead, its element `K_c/(s(s + omega_b))`.
+//! `e = f - y`, `u = Y e + F f + n`, `y = P (u + d)`: a target f, which the person may see (F, [`Feedforward`]), and a
+//! disturbance d at the input of the controlled element P. Changes follow the sigmoid of eq. 5 as in
+//! [`Scenario`](crate::scenario::Scenario), which is the task of the thesis and remains separate: its operator is the
+//! lead, its element `K_c/(s(s + omega_b))`.
 //!
 //! | file | contents |
 //! |---|---|
 //! | `state` | [`FamilyState`]: operator and controlled element at one instant |
 //! | `multi_sine` | [`MultiSine`], [`Excitation`]: targets and disturbances as in recorded tasks |
-//! | `remnant` | [`RemnantPart`], [`Stick`]: what u holds next to the response |
-//! | `scenario` | [`FamilyScenario`] and what a simulation needs of it |
+//! | `remnant` | [`RemnantPart`], [`Stick`]: components of u other than the response |
+//! | `scenario` | [`FamilyScenario`] and its quantities for a simulation |
 
 mod multi_sine;
 mod remnant;

@@ -1,4 +1,4 @@
-//! Sums of sines at prime multiples of one frequency, as tasks with people use them.
+//! Sums of sines at prime multiples of one frequency, as in tasks with people.
 //!
 //! `d(t) = sum over primes p of A_p sin(2 pi p t/T + phi_p)`, `A_p` proportional to `1/p`: no line
 //! is a harmonic of another, so that what a person makes of one line does not fall on another, and
@@ -17,9 +17,9 @@ use crate::{
 /// A target or a disturbance.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Excitation {
-    /// Its sinusoids; none is not a signal.
+    /// Its sinusoids; empty for no signal.
     pub function: ForcingFunction,
-    /// True if each run draws its phases again, uniform over the circle.
+    /// True if each run draws new phases, uniform over the circle.
     pub random_phases: bool,
 }
 
@@ -32,11 +32,11 @@ pub struct MultiSine {
     pub largest: u32,
     /// Root mean square. Default 1.
     pub rms: f64,
-    /// Which of the primes it has. Default all.
+    /// The primes that it contains. Default all.
     pub interleaved: Interleaved,
 }
 
-/// Lines of a target and of a disturbance that do not meet: every other prime for each.
+/// Selection of the primes, for separate lines of a target and of a disturbance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Interleaved {
     /// All primes.
@@ -62,7 +62,7 @@ impl Default for MultiSine {
 }
 
 impl MultiSine {
-    /// The primes up to the largest multiple that it has.
+    /// Returns the primes in use, up to the largest multiple.
     pub fn multiples(&self) -> Vec<u32> {
         let is_prime = |n: &u32| (2..).take_while(|d| d * d <= *n).all(|d| !n.is_multiple_of(d));
         let (from, step) = match self.interleaved {
@@ -73,11 +73,11 @@ impl MultiSine {
         (2..=self.largest).filter(is_prime).skip(from).step_by(step).collect()
     }
 
-    /// The excitation, its phases drawn again in each run.
+    /// Returns the excitation, with new phases in each run.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] for a period that is not positive, an rms that is not finite, or
-    /// a largest multiple outside 2 to 10000.
+    /// [`ModelError::OutOfRange`] for a period that is not positive, an rms that is not finite, or a largest multiple
+    /// outside 2 to 10000.
     pub fn excitation(&self) -> Result<Excitation, ModelError> {
         let refuse = |quantity, found, expected| {
             Err(ModelError::OutOfRange {

@@ -1,4 +1,4 @@
-//! Components of u other than the response to the error: the remnant, and a stick that is not at rest.
+//! Components of u other than the response to the error: the remnant, and drift and offsets of the stick.
 //!
 //! The remnant is a sum of independent parts. Each part is a sequence of unit variance through a
 //! shaping filter and a gain,
@@ -48,10 +48,10 @@ pub enum RemnantShape {
     },
 }
 
-/// How strong a part is.
+/// Strength of a part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PartStrength {
-    /// Share of the variance of u that is this part's, through the closed loop.
+    /// Share of this part in the variance of u, through the closed loop.
     Share(f64),
     /// The gain K itself, before and after the change.
     Gain {
@@ -73,12 +73,12 @@ pub enum Followed {
 
 crate::named_choice!(Followed, "signal that a remnant follows", 2, { Control => "control", Rate => "rate" });
 
-/// A standard deviation that follows u.
+/// A standard deviation that depends on u.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SignalDependence {
     /// The signal followed.
     pub follows: Followed,
-    /// c: part of the variance that follows it, 0 to 1.
+    /// c: share of the variance that depends on the signal, 0 to 1.
     pub part: f64,
     /// Memory of the running mean square, s.
     pub memory_s: f64,
@@ -87,13 +87,13 @@ pub struct SignalDependence {
 /// Poisson pulses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pulses {
-    /// p: part of the variance that comes in pulses, 0 to 1.
+    /// p: share of the variance in pulses, 0 to 1.
     pub part: f64,
-    /// lambda: mean number in a second.
+    /// lambda: mean number per second.
     pub rate_per_s: f64,
 }
 
-/// A part that is there and not there.
+/// Switching of a part on and off.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Intermittence {
     /// Mean time T_on, s.
@@ -109,22 +109,21 @@ pub struct RemnantPart {
     pub shape: RemnantShape,
     /// Its strength.
     pub strength: PartStrength,
-    /// Whether it follows u.
+    /// Dependence on u, if any.
     pub signal_dependence: Option<SignalDependence>,
-    /// Whether it comes in pulses.
+    /// Pulses, if any.
     pub pulses: Option<Pulses>,
-    /// Whether it is there at times only.
+    /// Switching on and off, if any.
     pub intermittence: Option<Intermittence>,
 }
 
-/// A stick that is not at rest, and records with an offset. The first two are in the loop: the
-/// controlled element feels them, and the person acts on what follows. The others are of the
-/// recorder alone.
+/// Drift of a stick, and offsets of records. The first two act in the loop: the controlled element receives them, and
+/// the person responds to the effect. The others are added by the recorder only.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Stick {
     /// Constant part of u.
     pub bias: f64,
-    /// Standard deviation of the random walk of u, per root second.
+    /// Standard deviation of the random walk of u per root of a second.
     pub walk_per_root_s: f64,
     /// Offset of the recorded e.
     pub offset_e: f64,
@@ -133,7 +132,7 @@ pub struct Stick {
 }
 
 impl RemnantPart {
-    /// A Gaussian, stationary part with a share of the variance of u.
+    /// Returns a Gaussian, stationary part with a share of the variance of u.
     pub fn new(shape: RemnantShape, share: f64) -> Self {
         Self {
             shape,
@@ -144,7 +143,7 @@ impl RemnantPart {
         }
     }
 
-    /// The share of the variance of u that is given.
+    /// Returns the share of the variance of u, if it is given.
     pub fn share(&self) -> Option<f64> {
         match self.strength {
             PartStrength::Share(share) => Some(share),
@@ -152,10 +151,10 @@ impl RemnantPart {
         }
     }
 
-    /// Checks the numbers.
+    /// Checks the parameters.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`], [`ModelError::Operator`] with the quantity.
+    /// [`ModelError::OutOfRange`] or [`ModelError::Operator`] with the quantity.
     pub(super) fn check(&self) -> Result<(), ModelError> {
         let positive = "a positive finite number";
         let part = "a number from 0 to 1";

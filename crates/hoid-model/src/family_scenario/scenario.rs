@@ -10,7 +10,7 @@ use crate::{
     scenario::Realisation, schedule::Schedule,
 };
 
-/// Longest future that is shown, s.
+/// Longest preview, s.
 const LONGEST_PREVIEW_S: f64 = 60.0;
 /// Longest run, in samples.
 const MOST_SAMPLES: usize = 100_000_000;
@@ -28,7 +28,7 @@ pub struct FamilyScenario {
     pub schedule: Schedule,
     /// Target f.
     pub target: Excitation,
-    /// The response to a target that is seen, in u; `None` for a display of the error alone.
+    /// The response of u to the displayed target; `None` for a display of the error only.
     pub feedforward: Option<Feedforward>,
     /// Disturbance d at the input of the controlled element, held over each sample.
     pub disturbance: Excitation,
@@ -42,16 +42,16 @@ pub struct FamilyScenario {
     pub measurement_s: f64,
     /// Run-in before it, s.
     pub run_in_s: f64,
-    /// Where the leading gain of the controlled element stands.
+    /// Position of the leading gain of the controlled element.
     pub realisation: Realisation,
 }
 
-/// What a person does about a target that they see.
+/// Response of a person to the displayed target.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Feedforward {
-    /// The response; its delay is that to what is shown last.
+    /// The response; its delay is relative to the end of the preview.
     pub operator: FamilyOperator,
-    /// How much of the future is shown, s.
+    /// Preview time, s.
     pub preview_s: f64,
 }
 
@@ -59,14 +59,14 @@ pub struct Feedforward {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResolvedFamilyScenario {
     scenario: FamilyScenario,
-    /// Whole samples and a part of one, before and after the change.
+    /// Whole samples and a fraction of one, before and after the change.
     delays: [(usize, f64); 2],
     run_in_samples: usize,
     measurement_samples: usize,
 }
 
 impl FamilyScenario {
-    /// A task of 40 s at 60 Hz after 5 s of run-in, with nothing in it but operator and element.
+    /// Returns a task of 40 s at 60 Hz after 5 s of run-in, with operator and element only.
     pub fn new(state: FamilyState, sample_time: SampleTime) -> Self {
         Self {
             name: "people".to_owned(),
@@ -88,7 +88,7 @@ impl FamilyScenario {
     /// Checks the scenario.
     ///
     /// # Errors
-    /// [`ModelError`] that names the quantity.
+    /// [`ModelError`] with the quantity.
     pub fn resolve(&self) -> Result<ResolvedFamilyScenario, ModelError> {
         self.schedule.check()?;
         let wrong = |quantity, found, expected| ModelError::OutOfRange {
@@ -134,7 +134,7 @@ impl FamilyScenario {
             *delay = if changes {
                 (tau.round() as usize, 0.0)
             } else {
-                // The remainder of a whole number is rounding.
+                // The remainder for an integer number is rounding.
                 let late = tau - whole as f64;
                 (whole, if late < 1e-9 { 0.0 } else { late })
             };
@@ -163,33 +163,33 @@ impl FamilyScenario {
 }
 
 impl ResolvedFamilyScenario {
-    /// The scenario as it was described.
+    /// Returns the original scenario.
     pub fn scenario(&self) -> &FamilyScenario {
         &self.scenario
     }
 
-    /// Samples before t = 0.
+    /// Number of samples before t = 0.
     pub fn run_in_samples(&self) -> usize {
         self.run_in_samples
     }
 
-    /// Samples of the measurement.
+    /// Number of samples of the measurement.
     pub fn measurement_samples(&self) -> usize {
         self.measurement_samples
     }
 
-    /// Time of the sample `k` of the run, s; t = 0 is the start of the measurement.
+    /// Time of sample `k` of the run, s; t = 0 is the start of the measurement.
     pub fn time_s(&self, k: usize) -> f64 {
         -(self.run_in_samples as f64) * self.scenario.sample_time.s() + k as f64 * self.scenario.sample_time.s()
     }
 
-    /// The delay in whole samples and the rest as a part of a sample, before and after the change.
-    /// Where it changes both are whole samples, the nearest.
+    /// Returns the delay in whole samples and the fraction of a sample, before and after the change. If it changes,
+    /// both are rounded to whole samples.
     pub fn delays(&self) -> [(usize, f64); 2] {
         self.delays
     }
 
-    /// The delay at time `t_s`: the nearest whole number of samples on its way, where it changes.
+    /// Returns the delay at time `t_s`: if it changes, the nearest integer number of samples.
     pub fn delay_at(&self, t_s: f64) -> (usize, f64) {
         let [initial, last] = self.delays;
         if initial == last {
@@ -199,11 +199,10 @@ impl ResolvedFamilyScenario {
         (delay.round() as usize, 0.0)
     }
 
-    /// Operator and controlled element in force at time `t_s`.
+    /// Returns operator and controlled element at time `t_s`.
     ///
     /// # Errors
-    /// [`ModelError`] where the way between two states that have a meaning leads through one that
-    /// has none.
+    /// [`ModelError`] if the transition between two valid states passes through an invalid one.
     pub fn state_at(&self, t_s: f64) -> Result<FamilyState, ModelError> {
         let FamilyScenario {
             initial,

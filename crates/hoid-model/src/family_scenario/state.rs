@@ -6,7 +6,7 @@ use crate::{
     operator_family::Coordinate,
 };
 
-/// A state of adaptation: an operator of the family and the controlled element.
+/// Operator of the family and controlled element at one instant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FamilyState {
     /// The operator.
@@ -24,7 +24,7 @@ impl FamilyState {
         Ok(self.operator.transfer_function()?.series(&self.controlled_element))
     }
 
-    /// Crossover frequency and margins in continuous time.
+    /// Returns crossover frequency and margins in continuous time.
     ///
     /// # Errors
     /// As [`FamilyState::crossings`].
@@ -32,7 +32,7 @@ impl FamilyState {
         Ok(self.crossings()?.margins())
     }
 
-    /// Every crossing in continuous time.
+    /// Returns every crossing in continuous time.
     ///
     /// # Errors
     /// As [`FamilyState::open_loop`]; [`ModelError::UnstableLoop`].
@@ -47,7 +47,7 @@ impl FamilyState {
         Ok(crossings(|omega| open_loop.response(omega), MANUAL_CONTROL_RANGE_RAD_S))
     }
 
-    /// True when both states have the same form, so that one can turn into the other.
+    /// True if both states have the same form, so that a transition between them exists.
     pub(super) fn is_like(&self, other: &Self) -> bool {
         let (a, b) = (&self.operator, &other.operator);
         let (c, d) = (&self.controlled_element, &other.controlled_element);
@@ -56,16 +56,15 @@ impl FamilyState {
             && (c.num().len(), c.den().len()) == (d.num().len(), d.den().len())
     }
 
-    /// The state on the way from this one to another, each parameter by `between`: those of
-    /// [`FamilyOperator::coordinates`], with omega_nm and zeta_nm themselves in place of their
-    /// logarithms; of the element its leading gain, and numerator and denominator without it. The
-    /// delay is this one's.
+    /// Returns the state between this one and another, with each parameter computed by `between`: those of
+    /// [`FamilyOperator::coordinates`], with omega_nm and zeta_nm instead of their logarithms; for the element its
+    /// leading gain, and numerator and denominator without it. The delay is that of this state.
     pub(super) fn towards(&self, other: &Self, between: impl Fn(f64, f64) -> f64) -> Result<Self, ModelError> {
         let (a, b) = (&self.operator, &other.operator);
         let kinds = a.form().coordinates(a.has_neuromuscular());
         let on_its_way = |(kind, (x, y)): (&Coordinate, (&f64, &f64))| match kind {
             Coordinate::Delay => *x,
-            // An end of the way is that end to the last bit.
+            // Equal ends remain exact to the last bit.
             _ if x == y => *x,
             Coordinate::LogOmega | Coordinate::LogZeta => between(x.exp(), y.exp()).ln(),
             _ => between(*x, *y),

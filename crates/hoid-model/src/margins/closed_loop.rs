@@ -1,4 +1,4 @@
-//! The stability of the closed loop.
+//! Stability of the closed loop.
 
 use std::f64::consts::PI;
 
@@ -7,30 +7,31 @@ use num_complex::Complex64;
 use super::crossings::{LARGEST_TURN_RAD, turn};
 use crate::{ContinuousTransferFunction, polynomial};
 
-/// Bounds the work of the stability test, which gives no proof beyond.
+/// Limit of the stability test, which gives no proof beyond it.
 const MOST_EVALUATIONS: usize = 4_000_000;
 
-/// True when unit negative feedback around the open loop gives a stable loop: all closed-loop poles
-/// in the open left half plane. Poles of the open loop may lie anywhere, also at the origin.
+/// True if unit negative feedback around the open loop gives a stable loop: all closed-loop poles are in the open left
+/// half plane. Poles of the open loop may be anywhere, also at the origin.
 ///
-/// Stable means proven stable. A closed-loop pole nearer to the imaginary axis than rounding allows
-/// counts as not stable, and so do a biproper open loop with delay whose gain at infinite frequency
-/// is one or more (it has infinitely many poles in the right half plane) and a delay of millions of
-/// radians at the frequencies where the gain exceeds 1/2.
+/// Stable means proven stable. A closed-loop pole so near to the imaginary axis that rounding matters counts as
+/// unstable, and so do a biproper open loop with delay whose gain at infinite frequency is one or more (it has
+/// infinitely many poles in the right half plane) and a delay of millions of radians at frequencies where the gain
+/// exceeds 1/2.
 pub fn closed_loop_is_stable(open_loop: &ContinuousTransferFunction) -> bool {
     Characteristic::new(open_loop).and_then(|f| f.zeros_in_right_half_plane()) == Some(0)
 }
 
-/// Lowest frequency at which a closed loop is followed, over the size of the controlled element's poles and 1 rad/s.
+/// Lowest frequency at which a closed loop is evaluated, relative to the magnitude of the controlled element's poles
+/// and 1 rad/s.
 const LOWEST: f64 = 1e-4;
-/// Distance in rad from a whole number of half turns that is not rounding any more.
+/// Distance in rad from an integer number of half turns above which it is not rounding.
 const NO_HALF_TURN_RAD: f64 = 0.5;
 
-/// Number of closed-loop poles in the right half plane of a stable operator with the frequency response `operator`
-/// around a controlled element, in a loop with unit negative feedback.
+/// Returns the number of closed-loop poles in the right half plane of a stable operator with the frequency response
+/// `operator` around a controlled element, in a loop with unit negative feedback.
 ///
-/// `None` if that cannot be determined: the response is not finite, `|L|` is not below one at `highest_rad_s`, or a
-/// closed-loop pole lies on the imaginary axis.
+/// `None` if this cannot be determined: the response is not finite, `|L|` is not below one at `highest_rad_s`, or a
+/// closed-loop pole is on the imaginary axis.
 pub fn unstable_poles(
     operator: impl Fn(f64) -> Complex64,
     element: &ContinuousTransferFunction,
@@ -66,7 +67,7 @@ pub fn unstable_poles(
     ((-total / PI - half_turns).abs() * PI < NO_HALF_TURN_RAD && half_turns >= 0.0).then_some(half_turns as usize)
 }
 
-/// Size of the largest root of a polynomial, from its coefficients.
+/// Magnitude of the largest root of a polynomial, estimated from its coefficients.
 fn root_size(p: &[f64]) -> f64 {
     let relative = (1..p.len()).map(|k| (p[k] / p[0]).abs().powf(1.0 / k as f64));
     relative.fold(0.0, f64::max)
@@ -76,14 +77,14 @@ fn root_size(p: &[f64]) -> f64 {
 pub(super) struct Characteristic<'a> {
     open_loop: &'a ContinuousTransferFunction,
     order: usize,
-    /// The shift a, 1/s: the size of the open-loop poles.
+    /// The shift a, 1/s: the magnitude of the open-loop poles.
     scale: f64,
-    /// Beyond this frequency `F/(s + a)^n` stays near its limit and makes no round about zero.
+    /// Above this frequency `F/(s + a)^n` stays near its limit and does not encircle zero.
     last: f64,
 }
 
 impl<'a> Characteristic<'a> {
-    /// `None` when the gain at infinite frequency alone makes the loop unstable.
+    /// Returns `None` if the gain at infinite frequency makes the loop unstable.
     pub(super) fn new(open_loop: &'a ContinuousTransferFunction) -> Option<Self> {
         let (num, den, tau) = (open_loop.num(), open_loop.den(), open_loop.delay_s());
         let order = den.len() - 1;
@@ -123,7 +124,7 @@ impl<'a> Characteristic<'a> {
         None
     }
 
-    /// `F/(s + a)^n`, its smallest meaningful size (what rounding can make of a zero), and `|L|`.
+    /// Returns `F/(s + a)^n`, its smallest meaningful magnitude (the rounding error of a zero), and `|L|`.
     fn at(&self, omega: f64) -> (Complex64, f64, f64) {
         let s = Complex64::new(0.0, omega);
         let horner = |p: &[f64]| p.iter().fold(Complex64::new(0.0, 0.0), |sum, &c| sum * s + c);
@@ -134,8 +135,8 @@ impl<'a> Characteristic<'a> {
         (f / shifted, 1e-12 * size / shifted.norm(), num.norm() / den.norm())
     }
 
-    /// Zeros of F in the open right half plane; `None` when one lies on the imaginary axis, as far
-    /// as rounding allows, or the delay turns too often to follow.
+    /// Number of zeros of F in the open right half plane; `None` if one is on the imaginary axis, within rounding, or
+    /// the delay turns the phase too often to follow.
     pub(super) fn zeros_in_right_half_plane(&self) -> Option<usize> {
         let tau = self.open_loop.delay_s();
         let mut grid = vec![0.0];

@@ -1,8 +1,8 @@
-//! Where a frequency response crosses unit gain and the negative real axis.
+//! Crossings of unit gain and of the negative real axis by a frequency response.
 
 use num_complex::Complex64;
 
-/// Margins of an open loop. A quantity that does not exist within the range scanned is `None`.
+/// Margins of an open loop. A quantity that does not exist within the scanned range is `None`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Margins {
     /// Gain crossover frequency omega_c in rad/s.
@@ -15,7 +15,7 @@ pub struct Margins {
     pub gain_margin_db: Option<f64>,
 }
 
-/// A range that holds every crossover of manual control, in rad/s.
+/// A range that contains every crossover of manual control, in rad/s.
 pub const MANUAL_CONTROL_RANGE_RAD_S: (f64, f64) = (1e-3, 1e3);
 
 /// A frequency at which the open loop crosses unit gain or the negative real axis.
@@ -23,21 +23,21 @@ pub const MANUAL_CONTROL_RANGE_RAD_S: (f64, f64) = (1e-3, 1e3);
 pub struct Crossing {
     /// The frequency, rad/s.
     pub omega_rad_s: f64,
-    /// The margin there: phase margin in deg at unit gain, gain margin in dB at the axis.
+    /// The margin at this frequency: phase margin in deg at unit gain, gain margin in dB at the axis.
     pub margin: f64,
 }
 
 /// All frequencies at which an open loop crosses, the lowest first.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Crossings {
-    /// Of unit gain, each with its phase margin in deg, between -180 and 180.
+    /// Crossings of unit gain, each with its phase margin in deg, between -180 and 180.
     pub gain: Vec<Crossing>,
-    /// For the negative real axis, each with its gain margin in dB.
+    /// Crossings of the negative real axis, each with its gain margin in dB.
     pub phase: Vec<Crossing>,
 }
 
 impl Crossings {
-    /// The margins nearest to zero, the first one of equals.
+    /// Returns the margins nearest to zero; of equal ones, the first.
     pub fn margins(&self) -> Margins {
         let nearest = |of: &[Crossing]| {
             of.iter().copied().reduce(|held, next| {
@@ -59,22 +59,22 @@ impl Crossings {
 }
 
 const POINTS_PER_DECADE: f64 = 100.0;
-/// Largest turn of the phase between neighbours.
+/// Largest turn of the phase between neighbouring points.
 pub(super) const LARGEST_TURN_RAD: f64 = 0.5;
-/// Turn between neighbours beyond which its sense is not certain.
+/// Turn between neighbouring points above which its direction is not certain.
 const MOST_TURN_RAD: f64 = 2.0;
-/// Bounds the work: 4096 points for a step of the grid follow a delay of 90 s at 1000 rad/s.
+/// Limit of the subdivision: 4096 points per step of the grid follow a delay of 90 s at 1000 rad/s.
 const DEEPEST_HALVING: u32 = 12;
-/// The margins nearest to zero of any frequency response, as [`crossings`].
+/// Returns the margins nearest to zero of any frequency response, as for [`crossings`].
 pub fn margins(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> Margins {
     crossings(open_loop, range_rad_s).margins()
 }
 
-/// Where any frequency response crosses: continuous with delay, or discrete with a range that ends at
-/// pi/Ts (a response there on the negative real axis counts as a phase crossover).
+/// Returns the crossings of any frequency response: continuous with delay, or discrete with a range that ends at pi/Ts
+/// (a response there on the negative real axis counts as a phase crossover).
 ///
-/// A range that is not `0 < low < high`, both finite, has no crossings; where the response is not
-/// finite it is left out.
+/// A range that is not `0 < low < high`, both finite, has no crossings; frequencies at which the response is not finite
+/// are left out.
 pub fn crossings(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> Crossings {
     let points = scan(&open_loop, range_rad_s);
     let mut found = Crossings::default();
@@ -110,8 +110,8 @@ pub fn crossings(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) 
     found
 }
 
-/// Sum of the turns of a response from the lower to the upper end of a range, rad, with its values at both ends. `None`
-/// if it is not finite, or turns too fast to be followed.
+/// Total turn of a response from the lower to the upper end of a range, rad, with its values at both ends. `None` if it
+/// is not finite, or turns too fast to be followed.
 pub(super) fn turn(of: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> Option<(f64, Complex64, Complex64)> {
     let points = scan(&of, range_rad_s);
     let (first, last) = (points.first()?.l, points.last()?.l);
@@ -144,7 +144,7 @@ impl Point {
     }
 }
 
-/// The response on a logarithmic grid that follows its phase.
+/// Evaluates the response on a logarithmic grid that is refined to follow its phase.
 fn scan(open_loop: &impl Fn(f64) -> Complex64, (low, high): (f64, f64)) -> Vec<Point> {
     if !(low > 0.0 && high > low && high.is_finite()) {
         return Vec::new();
@@ -165,7 +165,7 @@ fn scan(open_loop: &impl Fn(f64) -> Complex64, (low, high): (f64, f64)) -> Vec<P
     points
 }
 
-/// Appends `high`, and before it as many points between as the phase needs.
+/// Appends `high`, preceded by as many points in between as the phase needs.
 fn halve(open_loop: &impl Fn(f64) -> Complex64, low: Point, high: Point, depth: u32, points: &mut Vec<Point>) {
     let turn = (high.l * low.l.conj()).arg().abs();
     let by_slope = low.slope_s.abs().max(high.slope_s.abs()) * (high.omega - low.omega);
@@ -178,7 +178,7 @@ fn halve(open_loop: &impl Fn(f64) -> Complex64, low: Point, high: Point, depth: 
     }
 }
 
-/// Where `holds` turns from true (at `low`) to false, to rounding.
+/// Returns the point at which `holds` changes from true (at `low`) to false, to rounding.
 fn bisect(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (low, high);
     for _ in 0..60 {

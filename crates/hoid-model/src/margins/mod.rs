@@ -7,10 +7,9 @@
 //! - the phase crossovers are where L crosses the negative real axis (`arg L = -180 deg` modulo 360
 //!   deg); the gain margin there is `-20 log10 |L|` dB.
 //!
-//! Where there are several, the phase margin nearest to 0 deg and the gain margin nearest to 0 dB
-//! are given, each with its frequency. MATLAB's `margin` and python-control's `margin` choose in
-//! the same way. Margins carry no information about a loop that is not stable, nor whether it is:
-//! [`closed_loop_is_stable`] does.
+//! If there are several, the phase margin nearest to 0 deg and the gain margin nearest to 0 dB are returned, each with
+//! its frequency. MATLAB's `margin` and python-control's `margin` use the same rule. Margins do not show whether a loop
+//! is stable, and have no meaning for an unstable one: see [`closed_loop_is_stable`].
 //!
 //! **Scan.** A logarithmic grid, halved wherever the phase turns by more than 0.5 rad between
 //! neighbours, as seen from their phases or from the slope of the phase at each (a whole round

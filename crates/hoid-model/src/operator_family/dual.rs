@@ -5,7 +5,7 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// Number of partial derivatives: the most parameters that a form has.
+/// Number of partial derivatives: the largest number of parameters of a form.
 pub const PARTIALS: usize = 6;
 
 /// A value and its partial derivatives.
@@ -18,7 +18,7 @@ pub struct Dual {
 }
 
 impl Dual {
-    /// A number that depends on nothing.
+    /// Returns a constant, whose derivatives are zero.
     pub const fn constant(value: f64) -> Self {
         Self {
             value,
@@ -26,14 +26,14 @@ impl Dual {
         }
     }
 
-    /// The `index`-th of the variables.
+    /// Returns the variable with this index.
     pub fn variable(value: f64, index: usize) -> Self {
         let mut partials = [0.0; PARTIALS];
         partials[index] = 1.0;
         Self { value, partials }
     }
 
-    /// `f(x)` with the slope `f'(x)`.
+    /// Returns `f(x)` for the derivative `f'(x)` (chain rule).
     fn chain(self, value: f64, slope: f64) -> Self {
         Self {
             value,
@@ -41,13 +41,13 @@ impl Dual {
         }
     }
 
-    /// The exponential.
+    /// Returns the exponential.
     pub fn exp(self) -> Self {
         let e = self.value.exp();
         self.chain(e, e)
     }
 
-    /// A multiple.
+    /// Returns a multiple.
     pub fn scaled(self, factor: f64) -> Self {
         self.chain(factor * self.value, factor)
     }
@@ -76,7 +76,7 @@ impl Sub for Dual {
     }
 }
 
-// The rules of derivatives, which the lint takes for slips.
+// The rules of differentiation, which the lint reports as suspicious.
 #[allow(clippy::suspicious_arithmetic_impl)]
 impl Mul for Dual {
     type Output = Self;

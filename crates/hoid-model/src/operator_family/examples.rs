@@ -1,8 +1,8 @@
-//! Operators that the tests of the family take.
+//! Operators for the tests of the family.
 
 use super::{Coordinate, FamilyOperator, Form};
 
-/// An operator of each form as a person may have it.
+/// Returns a typical operator of each form.
 pub(super) fn operator(form: Form, neuromuscular: bool, tau_e_s: f64) -> FamilyOperator {
     let value = |coordinate: &Coordinate| match coordinate {
         Coordinate::Gain => 4.0,
@@ -19,7 +19,7 @@ pub(super) fn operator(form: Form, neuromuscular: bool, tau_e_s: f64) -> FamilyO
     FamilyOperator::new(form, neuromuscular, &values).unwrap()
 }
 
-/// All forms that are proper, with and without the neuromuscular part, with each of these delays.
+/// Returns all proper forms, with and without the neuromuscular part, with each of these delays.
 pub(super) fn operators(delays_s: &[f64]) -> Vec<FamilyOperator> {
     let mut all = Vec::new();
     for form in Form::ALL {

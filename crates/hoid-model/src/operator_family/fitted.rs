@@ -1,16 +1,16 @@
-//! An operator as a fit left it: where another estimate of the same person may start.
+//! A fitted operator, as the start of another estimate of the same person.
 
 use super::operator::FamilyOperator;
 use crate::{ModelError, SampleTime};
 
-/// An operator with the covariance of its coordinates, its noise model, and what it is a fit of.
+/// An operator with the covariance of its coordinates, its noise model, and the data of its fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FittedOperator {
     /// The operator.
     pub operator: FamilyOperator,
     /// Covariance of its coordinates by rows.
     pub covariance: Vec<f64>,
-    /// Coefficients c and d of the noise model `v = (C/D) eps`, without the 1.
+    /// Coefficients c and d of the noise model `v = (C/D) eps`, without the leading 1.
     pub noise: (Vec<f64>, Vec<f64>),
     /// Variance of eps, in the unit of u squared.
     pub innovation_variance: f64,
@@ -18,16 +18,16 @@ pub struct FittedOperator {
     pub sample_time: SampleTime,
     /// Units of e and u; empty if they were not declared.
     pub units: [String; 2],
-    /// Where it is from, for messages: the name of a file.
+    /// Its source, for messages: the name of a file.
     pub source: String,
 }
 
 impl FittedOperator {
-    /// The fit, when its numbers make sense.
+    /// Returns the fit if its numbers are valid.
     ///
     /// # Errors
-    /// [`ModelError::Operator`] for a covariance of another size, numbers that are not finite, and
-    /// variances that are not positive.
+    /// [`ModelError::Operator`] for a covariance of another size, numbers that are not finite, and variances that are
+    /// not positive.
     pub fn checked(self) -> Result<Self, ModelError> {
         let p = self.operator.coordinates().len();
         let wrong = |reason: String| Err(ModelError::Operator { reason });
@@ -55,11 +55,11 @@ impl FittedOperator {
         Ok(self)
     }
 
-    /// Refuses samples that are not like those of the fit: another sample time, or units that were
-    /// declared on both sides and differ. `units` are those of e and u.
+    /// Refuses samples that differ from those of the fit: another sample time, or other units if both are declared.
+    /// `units` are those of e and u.
     ///
     /// # Errors
-    /// [`ModelError::Operator`] with the findings and the remedy.
+    /// [`ModelError::Operator`] with the difference and the remedy.
     pub fn check_samples(&self, sample_time: SampleTime, units: [&str; 2]) -> Result<(), ModelError> {
         let wrong = |reason: String| Err(ModelError::Operator { reason });
         if !self.sample_time.matches(sample_time) {

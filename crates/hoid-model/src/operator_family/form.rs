@@ -1,9 +1,8 @@
-//! The forms of the family: which parameters an operator has.
+//! The forms of the family: the parameters of an operator.
 
 use super::dual::{Dual, PARTIALS};
 
-/// A form of the operator, without its delay and neuromuscular part; p is the power of the lead, q
-/// that of the lag.
+/// A form of the operator, without its delay and neuromuscular part; p is the power of the lead, q that of the lag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum Form {
     /// `K` (p = 0, q = 0).
@@ -18,15 +17,15 @@ pub enum Form {
     LeadLag,
     /// `K (T_L s + 1)^2 / (T_I s + 1)` (p = 2, q = 1).
     Lead2Lag,
-    /// `K_I (1 + c_1 s + c_2 s^2) / s`: a free quadratic numerator over s. The integration here and
-    /// below leaks by 1e-4 1/s.
+    /// `K_I (1 + c_1 s + c_2 s^2) / s`: a free quadratic numerator over s. The integration in this and the following
+    /// forms has a leak of 1e-4 1/s.
     QuadraticIntegral,
     /// `K (T_L s + 1) (1 + alpha/s)`: a lead with the droop of the phase at low frequencies,
     /// `e^{-j alpha/omega}` by its rational approximation.
     LeadDroop,
-    /// `K_d s`: the response to the rate of a target that is seen.
+    /// `K_d s`: the response to the rate of a displayed target.
     Derivative,
-    /// `K_d s (T_L s + 1)`: the response to rate and acceleration of a target that is seen.
+    /// `K_d s (T_L s + 1)`: the response to rate and acceleration of a displayed target.
     DerivativeLead,
 }
 
@@ -43,14 +42,14 @@ crate::named_choice!(Form, "form of the operator", 10, {
     DerivativeLead => "derivative-lead",
 });
 
-/// Pole of an integration, 1/s: a leak that no record shows keeps the discrete model stable.
+/// Pole of an integration, 1/s: a leak too slow to be seen in a record keeps the discrete model stable.
 const LEAK: f64 = 1e-4;
 
-/// A coordinate in which an operator is fitted. Lag and neuromuscular part are fitted in
-/// coordinates whose estimates are nearly normal also where the data carry little information.
+/// A coordinate in which an operator is fitted. Lag and neuromuscular part are fitted in coordinates whose estimates
+/// are nearly normal even if the data carry little information.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub enum Coordinate {
-    /// K without a lag, `K/T_I` with one, K_d of a derivative in s.
+    /// K without a lag, `K/T_I` with a lag, K_d of a derivative in s.
     Gain,
     /// T_L, s.
     Lead,
@@ -71,7 +70,7 @@ pub enum Coordinate {
 }
 
 impl Coordinate {
-    /// All of them.
+    /// All coordinates.
     pub const ALL: [Self; 9] = [
         Self::Gain,
         Self::Lead,
@@ -84,8 +83,8 @@ impl Coordinate {
         Self::Delay,
     ];
 
-    /// The parameter that people name it by: T_I for `1/T_I`, and K for each gain, which is
-    /// `K/T_I`, K_I or K_e in some forms.
+    /// Returns the name of the related parameter: T_I for `1/T_I`, and K for every gain, which is `K/T_I`, K_I or K_e
+    /// in some forms.
     pub fn parameter(self) -> &'static str {
         match self {
             Self::Gain => "K",
@@ -100,8 +99,8 @@ impl Coordinate {
         }
     }
 
-    /// The coordinate of a parameter by its name; `None` for K_e_dot, which is a product of two,
-    /// and for what is not a parameter.
+    /// Returns the coordinate of a parameter by its name; `None` for K_e_dot, which is a product of two, and for
+    /// unknown names.
     pub fn of_parameter(name: &str) -> Option<Self> {
         match name {
             "K_over_T_I" | "K_I" | "K_e" | "K_d" => Some(Self::Gain),
@@ -109,7 +108,7 @@ impl Coordinate {
         }
     }
 
-    /// Its name: that of the parameter, or what of it is fitted.
+    /// Returns its name: that of the parameter, or of its transformation.
     pub fn name(self) -> &'static str {
         match self {
             Self::Gain => "gain",
@@ -125,14 +124,14 @@ impl Coordinate {
     }
 }
 
-/// Numerator `n_0 + n_1 s + n_2 s^2` and pole `-a` of an operator, where it has one.
+/// Numerator `n_0 + n_1 s + n_2 s^2` and pole `-a` of an operator, if it has one.
 pub(super) struct Rational {
     pub numerator: [Dual; 3],
     pub pole: Option<Dual>,
 }
 
 impl Form {
-    /// The forms of the response to the error: a loop that leaves what is constant alone is none of people's.
+    /// The forms of the response to the error, without derivatives: people respond to a constant error.
     pub const OF_ERROR: [Self; 8] = [
         Self::Gain,
         Self::Lead,
@@ -144,7 +143,7 @@ impl Form {
         Self::LeadDroop,
     ];
 
-    /// The forms of the response to what is seen besides: a target, its rate and acceleration.
+    /// The forms of the response to a displayed target: to its value, rate and acceleration.
     pub const OF_TARGET: [Self; 5] = [
         Self::Gain,
         Self::Lead,
@@ -153,12 +152,12 @@ impl Form {
         Self::DerivativeLead,
     ];
 
-    /// True where a constant input has no response.
+    /// True if a constant input has no response.
     pub fn is_derivative(self) -> bool {
         matches!(self, Self::Derivative | Self::DerivativeLead)
     }
 
-    /// Power p of the lead; the degree of the numerator.
+    /// Returns the power p of the lead, which is the degree of the numerator.
     pub fn degree(self) -> usize {
         match self {
             Self::Gain | Self::Lag => 0,
@@ -167,7 +166,7 @@ impl Form {
         }
     }
 
-    /// True if the form has a pole of its own: a lag or an integration.
+    /// True if the form has its own pole: a lag or an integration.
     pub fn has_pole(self) -> bool {
         !matches!(self, Self::Gain | Self::Lead | Self::Lead2) && !self.is_derivative()
     }
@@ -177,13 +176,13 @@ impl Form {
         matches!(self, Self::Lag | Self::LeadLag | Self::Lead2Lag)
     }
 
-    /// True if the numerator is of no higher degree than the denominator, so that the operator has
-    /// no pure derivative.
+    /// True if the degree of the numerator does not exceed that of the denominator, so that the operator has no pure
+    /// derivative.
     pub fn is_proper(self, neuromuscular: bool) -> bool {
         self.degree() <= usize::from(self.has_pole()) + if neuromuscular { 2 } else { 0 }
     }
 
-    /// The coordinates, in the order in which they are fitted.
+    /// Returns the coordinates, in the order in which they are fitted.
     pub fn coordinates(self, neuromuscular: bool) -> Vec<Coordinate> {
         let mut all = vec![Coordinate::Gain];
         match self {
@@ -201,8 +200,8 @@ impl Form {
         all
     }
 
-    /// Number of coordinates of the numerator next to the gain: T_L, or c_1 and c_2, or T_L and
-    /// alpha. They are after the gain in [`Form::coordinates`], before those of the poles.
+    /// Number of coordinates of the numerator other than the gain: T_L, or c_1 and c_2, or T_L and alpha. They follow
+    /// the gain in [`Form::coordinates`] and precede those of the poles.
     pub fn varying_beside_gain(self) -> usize {
         match self {
             Self::Gain | Self::Lag | Self::Derivative => 0,
@@ -211,8 +210,8 @@ impl Form {
         }
     }
 
-    /// The numerator over its gain, `m_0 + m_1 s + m_2 s^2`, from the coordinates of the numerator
-    /// after the gain, and the derivatives of its coefficients along them.
+    /// Returns the numerator divided by its gain, `m_0 + m_1 s + m_2 s^2`, from the coordinates of the numerator after
+    /// the gain, and the derivatives of its coefficients with respect to them.
     pub fn shape(self, x: &[f64]) -> ([f64; 3], [[f64; 3]; 2]) {
         let none = [0.0; 3];
         match self {
@@ -232,7 +231,7 @@ impl Form {
         }
     }
 
-    /// Numerator and pole from the first coordinates.
+    /// Returns numerator and pole from the first coordinates.
     pub(super) fn rational(self, x: &[Dual]) -> Rational {
         let zero = Dual::constant(0.0);
         let k = x[0];

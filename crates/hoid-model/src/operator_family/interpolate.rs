@@ -1,12 +1,11 @@
 //! The discrete model of an operator of the family for an error that is smooth between samples.
 //!
-//! A hold makes the response a staircase's: where the operator's step response starts with a slope
-//! (relative degree 1), the model has a kink at every delay of a whole number of samples, and a
-//! search over the delay of a recorded person ends in one. A person sees no staircase. Here the
-//! error runs straight from sample to sample, `e(t)`, and the operator acts on `e(t - tau - Ts/2)`:
-//! half a sample later, as after a hold, so that tau means the same in both. At frequency omega the
-//! two differ by the factor `sin(x)/x`, `x = omega Ts/2` (0.5 % at 20 rad/s and 60 Hz), and in no
-//! phase.
+//! A hold makes the response that of a staircase: if the operator's step response starts with a slope (relative degree
+//! 1), the model has a kink at every delay of an integer number of samples, and a search over the delay of a recorded
+//! person ends in one. A person does not see a staircase. Here the error is linear from sample to sample, `e(t)`, and
+//! the operator acts on `e(t - tau - Ts/2)`: half a sample later, as after a hold, so that tau has the same meaning in
+//! both. At frequency omega the two differ by the factor `sin(x)/x`, `x = omega Ts/2` (0.5 % at 20 rad/s and 60 Hz),
+//! and not in phase.
 //!
 //! With `tau + Ts/2 = l Ts + delta`, `0 <= delta < Ts`, and times in samples,
 //!
@@ -28,22 +27,21 @@ use super::{
 use crate::{ModelError, SampleTime, delayed_operator::whole_samples};
 
 impl FamilyOperator {
-    /// Numbers of coefficients of B and F in the interpolated model of this form.
+    /// Returns the numbers of coefficients of B and F in the interpolated model of this form.
     pub fn interpolated_orders(&self) -> (usize, usize) {
         (self.order() + 2, self.order())
     }
 
-    /// The discrete model for an error that is interpolated between samples.
+    /// Returns the discrete model for an error that is interpolated between samples.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] when an exponential overflows or the delay has too many samples.
+    /// [`ModelError::OutOfRange`] if an exponential overflows or the delay has too many samples.
     pub fn interpolate(&self, sample_time: SampleTime) -> Result<HeldFamily, ModelError> {
         let late = self.tau_e_s() + 0.5 * sample_time.s();
         self.interpolate_within(whole_samples(late, sample_time)?, sample_time)
     }
 
-    /// As [`FamilyOperator::interpolate`], with the sample in which `tau + Ts/2` lies chosen by the
-    /// caller.
+    /// As [`FamilyOperator::interpolate`], for a given sample that contains `tau + Ts/2`.
     ///
     /// # Errors
     /// As [`FamilyOperator::interpolate`].

@@ -12,8 +12,8 @@ const TERMS: usize = 20;
 pub(super) type Matrix = [[Dual; SIZE]; SIZE];
 pub(super) type Vector = [Dual; SIZE];
 
-/// `[A B 0; 0 0 1; 0 0 0]` of the controllable canonical form, in units of a sample: the input
-/// grows by its slope.
+/// Returns `[A B 0; 0 0 1; 0 0 0]` of the controllable canonical form, in units of a sample: the input increases with
+/// its slope.
 pub(super) fn companion(denominator: &Vector, order: usize) -> Matrix {
     let mut m = [[Dual::constant(0.0); SIZE]; SIZE];
     for i in 0..=order {
@@ -25,12 +25,12 @@ pub(super) fn companion(denominator: &Vector, order: usize) -> Matrix {
     m
 }
 
-/// `exp(M h)`.
+/// Returns `exp(M h)`.
 pub(super) fn exponential(m: &Matrix, h: Dual) -> Matrix {
     let m: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| m[i][j] * h));
     let row = |r: &[Dual; SIZE]| r.iter().map(|c| c.value.abs()).sum::<f64>();
     let norm = m.iter().map(row).fold(0.0, f64::max);
-    // An unreasonable norm overflows anyway.
+    // A very large norm overflows anyway.
     let halvings = if norm > 1.0 {
         norm.log2().ceil().min(60.0) as i32
     } else {
@@ -79,8 +79,7 @@ pub(super) fn times(a: &Matrix, x: &Vector, size: usize) -> Vector {
     y
 }
 
-/// Coefficients of `det(I - q^-1 Phi)` without the leading one, by the method of Faddeev and
-/// LeVerrier.
+/// Coefficients of `det(I - q^-1 Phi)` without the leading one, by the method of Faddeev and LeVerrier.
 pub(super) fn characteristic(phi: &Matrix, order: usize) -> Vec<Dual> {
     let mut coefficients = Vec::with_capacity(order);
     let mut m = identity();

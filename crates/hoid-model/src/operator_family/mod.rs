@@ -1,20 +1,19 @@
-//! The family of operators that people are found to be.
+//! The family of operators found for people.
 //!
 //! `Y(s) = K (T_L s + 1)^p / (T_I s + 1)^q e^{-tau s} omega^2/(s^2 + 2 zeta omega s + omega^2)`,
 //! p = 0, 1, 2, q = 0, 1 (eq. 2.2 of the thesis; D. T. McRuer and H. R. Jex, IEEE Trans. Human
 //! Factors in Electronics 8 (1967) 231-249), with or without the neuromuscular part, and two rivals
 //! for controlled elements of second order ([`Form`]).
 //!
-//! A person who integrates slow errors has a lag with a long T_I. Then K and T_I cannot be
-//! distinguished, `K/T_I` can; an operator is therefore held by the coordinates
-//! `[K/T_I, T_L, 1/T_I, ln omega, ln zeta, tau]` ([`Coordinate`]), in which `1/T_I = 0`, the pure
-//! integration, is a point like others.
+//! A person who integrates slow errors has a lag with a long T_I. Then K and T_I cannot be distinguished, but `K/T_I`
+//! can; an operator is therefore represented by the coordinates `[K/T_I, T_L, 1/T_I, ln omega, ln zeta, tau]`
+//! ([`Coordinate`]), in which `1/T_I = 0`, the pure integration, is an ordinary point.
 //!
 //! | file | contents |
 //! |---|---|
 //! | `form` | [`Form`], [`Coordinate`] |
 //! | `operator` | [`FamilyOperator`]: one operator, its response, its named parameters |
-//! | `fitted` | [`FittedOperator`]: an operator as a fit left it |
+//! | `fitted` | [`FittedOperator`]: a fitted operator |
 //! | `zoh` | its exact discrete model for a held input, with the derivatives |
 //! | `interpolate` | the same for an error that is smooth between samples |
 //! | `matrices` | the matrix exponential |

@@ -11,7 +11,7 @@ use crate::{
     uncertainty::{Estimate, variance_along},
 };
 
-/// The parameters of all forms, as [`FamilyOperator::named`] calls them, with their units.
+/// The parameters of all forms, with the names of [`FamilyOperator::named`], and their units.
 pub const PARAMETERS: [(&str, &str); 14] = [
     ("K", ""),
     ("K_over_T_I", "1/s"),
@@ -38,7 +38,7 @@ pub struct FamilyOperator {
     coordinates: Vec<f64>,
 }
 
-/// An operator as it is written, not yet checked.
+/// An operator as read from a file, not yet checked.
 #[derive(serde::Deserialize)]
 struct Written {
     form: Form,
@@ -54,7 +54,7 @@ impl TryFrom<Written> for FamilyOperator {
     }
 }
 
-/// `Y(j omega)` and its derivatives along the coordinates.
+/// `Y(j omega)` and its derivatives with respect to the coordinates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FamilyResponse {
     /// `Y(j omega)`.
@@ -64,14 +64,14 @@ pub struct FamilyResponse {
 }
 
 impl FamilyResponse {
-    /// Covariance of real and imaginary part of `dY/Y = d ln Y`, of gain and phase, from that of the coordinates by
-    /// rows.
+    /// Returns the covariance of the real and imaginary part of `dY/Y = d ln Y`, i.e. of gain and phase, from that of
+    /// the coordinates by rows.
     pub fn relative_covariance(&self, covariance: &[f64]) -> [[f64; 2]; 2] {
         let along = |part: fn(Complex64) -> f64| -> Vec<f64> {
             let gradient = self.gradient.iter().map(|g| part(g / self.value));
             gradient.collect()
         };
-        // Along both: their sum holds the covariance of the two twice.
+        // The variance of the sum contains the covariance of the two twice.
         let [a, c, both] = [along(|z| z.re), along(|z| z.im), along(|z| z.re + z.im)]
             .map(|gradient| variance_along(&gradient, covariance));
         let b = 0.5 * (both - a - c);
@@ -79,7 +79,7 @@ impl FamilyResponse {
     }
 }
 
-/// A parameter as it is reported.
+/// A reported parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NamedParameter {
     /// K, K_over_T_I, T_L, T_I, omega_nm, zeta_nm, tau_e and so on.
@@ -88,12 +88,12 @@ pub struct NamedParameter {
     pub unit: &'static str,
     /// Its value; infinite for T_I of a pure integration.
     pub value: f64,
-    /// Its coordinate, where it is a function of one.
+    /// Its coordinate, if it is a function of a single one.
     pub coordinate: Option<Coordinate>,
 }
 
 impl Form {
-    /// The parameters of an operator of this form, in the order of [`FamilyOperator::named`].
+    /// Returns the parameters of an operator of this form, in the order of [`FamilyOperator::named`].
     pub fn parameters(self, neuromuscular: bool) -> Vec<&'static str> {
         let any = FamilyOperator {
             form: self,
@@ -105,11 +105,11 @@ impl Form {
 }
 
 impl FamilyOperator {
-    /// An operator with these coordinates, in the order of [`Form::coordinates`].
+    /// Creates an operator with these coordinates, in the order of [`Form::coordinates`].
     ///
     /// # Errors
-    /// [`ModelError::Operator`] for an improper form, a wrong number of coordinates, or a value
-    /// that is not finite; [`ModelError::OutOfRange`] for a negative delay.
+    /// [`ModelError::Operator`] for an improper form, a wrong number of coordinates, or a value that is not finite;
+    /// [`ModelError::OutOfRange`] for a negative delay.
     pub fn new(form: Form, neuromuscular: bool, coordinates: &[f64]) -> Result<Self, ModelError> {
         let wrong = |reason: String| Err(ModelError::Operator { reason });
         if !form.is_proper(neuromuscular) {
@@ -147,13 +147,13 @@ impl FamilyOperator {
         })
     }
 
-    /// From the parameters by name: `K` (or `K_over_T_I`, or `K_e`), `T_L`, `T_I`, `omega_nm`,
-    /// `zeta_nm`, `tau_e`, `c_1`, `c_2`, `alpha`; those that the form has. The neuromuscular part
-    /// is there when omega_nm is named. A missing tau_e is zero.
+    /// Creates an operator from the parameters by name: `K` (or `K_over_T_I`, or `K_e`), `T_L`, `T_I`, `omega_nm`,
+    /// `zeta_nm`, `tau_e`, `c_1`, `c_2`, `alpha`, as far as the form has them. It has a neuromuscular part if omega_nm
+    /// is given. A missing tau_e is zero.
     ///
     /// # Errors
-    /// [`ModelError::Operator`] for a name that is unknown, lacking, or reported twice, and for
-    /// values without a meaning; else as [`FamilyOperator::new`].
+    /// [`ModelError::Operator`] for a name that is unknown, missing, or given twice, and for invalid values; otherwise
+    /// as [`FamilyOperator::new`].
     pub fn of_names(form: Form, pairs: &[(String, f64)]) -> Result<Self, ModelError> {
         let wrong = |reason: String| ModelError::Operator { reason };
         let find = |name: &str| pairs.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
@@ -212,7 +212,7 @@ impl FamilyOperator {
         self.neuromuscular
     }
 
-    /// The coordinates, in the order of [`Form::coordinates`].
+    /// Returns the coordinates, in the order of [`Form::coordinates`].
     pub fn coordinates(&self) -> &[f64] {
         &self.coordinates
     }
@@ -237,8 +237,8 @@ impl FamilyOperator {
         Some((log_omega.exp(), log_zeta.exp()))
     }
 
-    /// The parameters under their names: `K`, `K_over_T_I`, `T_L`, `T_I`, `omega_nm`, `zeta_nm`,
-    /// `tau_e`; `K_e`, `T_L`, `K_e_dot` for the lead; `c_1`, `c_2`, `alpha` for the rivals.
+    /// Returns the parameters by name: `K`, `K_over_T_I`, `T_L`, `T_I`, `omega_nm`, `zeta_nm`, `tau_e`; `K_e`, `T_L`,
+    /// `K_e_dot` for the lead; `c_1`, `c_2`, `alpha` for the rivals.
     pub fn named(&self) -> Vec<NamedParameter> {
         let gain = self.coordinates[0];
         let mut all = Vec::new();
@@ -280,7 +280,7 @@ impl FamilyOperator {
         all
     }
 
-    /// The parameters of [`FamilyOperator::named`], each with its derivatives along the coordinates.
+    /// Returns the parameters of [`FamilyOperator::named`], each with its derivatives with respect to the coordinates.
     pub fn named_gradients(&self) -> Vec<(NamedParameter, Vec<f64>)> {
         let x = &self.coordinates;
         let all = self.form.coordinates(self.neuromuscular);
@@ -306,9 +306,8 @@ impl FamilyOperator {
         self.named().into_iter().map(with).collect()
     }
 
-    /// The parameters of [`FamilyOperator::named`] with their errors to first order, from the
-    /// covariance of the coordinates by rows; without an error where there is none or where a
-    /// parameter is infinite.
+    /// Returns the parameters of [`FamilyOperator::named`] with their errors to first order, from the covariance of the
+    /// coordinates by rows; without an error if there is no covariance or if a parameter is infinite.
     pub fn named_estimates(&self, covariance: Option<&[f64]>) -> Vec<(NamedParameter, Estimate)> {
         let of = |(parameter, gradient): (NamedParameter, Vec<f64>)| {
             let estimate = match covariance {
@@ -322,27 +321,26 @@ impl FamilyOperator {
         self.named_gradients().into_iter().map(of).collect()
     }
 
-    /// The coordinates as variables.
+    /// Returns the coordinates as variables.
     pub(super) fn variables(&self) -> Vec<Dual> {
         let variable = |(i, &x): (usize, &f64)| Dual::variable(x, i);
         self.coordinates.iter().enumerate().map(variable).collect()
     }
 
-    /// `(omega, zeta)` as functions of the coordinates.
+    /// Returns `(omega, zeta)` as functions of the coordinates.
     pub(super) fn neuromuscular_of(&self, variables: &[Dual]) -> Option<(Dual, Dual)> {
         let n = variables.len();
         self.neuromuscular
             .then(|| (variables[n - 3].exp(), variables[n - 2].exp()))
     }
 
-    /// `Y(j omega)` and its derivatives, delay included.
+    /// Returns `Y(j omega)` and its derivatives, delay included.
     pub fn response_and_gradient(&self, omega_rad_s: f64) -> FamilyResponse {
         let variables = self.variables();
         let s = Complex64::new(0.0, omega_rad_s);
         let Rational { numerator, pole } = self.form.rational(&variables);
         let zero = Complex64::new(0.0, 0.0);
-        // Value and derivatives of a polynomial in s whose coefficients are functions of the
-        // coordinates.
+        // Value and derivatives of a polynomial in s whose coefficients are functions of the coordinates.
         let of = |coefficients: &[Dual]| {
             let mut value = zero;
             let mut partials = [zero; PARTIALS];
@@ -379,12 +377,12 @@ impl FamilyOperator {
         }
     }
 
-    /// `Y(j omega)`, delay included.
+    /// Returns `Y(j omega)`, delay included.
     pub fn response(&self, omega_rad_s: f64) -> Complex64 {
         self.response_and_gradient(omega_rad_s).value
     }
 
-    /// Y(s) as a transfer function with its delay.
+    /// Returns Y(s) as a transfer function with its delay.
     ///
     /// # Errors
     /// As [`ContinuousTransferFunction::new`].

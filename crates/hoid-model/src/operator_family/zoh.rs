@@ -13,11 +13,10 @@
 //! characteristic polynomial of Phi, B the product of F and the impulse response. Everything is
 //! computed with numbers that carry their derivatives along the coordinates ([`super::dual`]).
 //!
-//! **Direct part.** A form whose numerator has the degree of its denominator passes e on at once.
-//! For the held error, at the instant of a sample, that would be one sample or the next, with a
-//! step where the delay is a whole number of samples. Its direct part is taken from the error
-//! interpolated between the samples around `t - tau - Ts/2`: the delay that the hold gives to all
-//! other parts.
+//! **Direct part.** A form whose numerator has the degree of its denominator has a direct feedthrough of e. For the
+//! held error, at a sampling instant this would be one sample or the next, with a step if the delay is an integer
+//! number of samples. Its direct part is therefore computed from the error interpolated between the samples around
+//! `t - tau - Ts/2`: the delay that the hold gives to all other parts.
 
 use super::{
     dual::{Dual, PARTIALS},
@@ -36,13 +35,13 @@ pub struct HeldFamily {
     pub b: Vec<f64>,
     /// Coefficients of F without the leading one.
     pub f: Vec<f64>,
-    /// A row for each coefficient of B, then of F, with a derivative for each coordinate.
+    /// One row for each coefficient of B, then of F, with a derivative for each coordinate.
     pub jacobian: Vec<[f64; PARTIALS]>,
 }
 
-/// Response of poles and delay to a sample, for any numerator.
+/// Response of poles and delay over a sample, for any numerator.
 struct HeldPoles {
-    /// omega^2, where there is a neuromuscular part.
+    /// omega^2, if there is a neuromuscular part.
     gain: Option<Dual>,
     f: Vec<Dual>,
     denominator: Vector,
@@ -54,7 +53,7 @@ struct HeldPoles {
 }
 
 impl HeldFamily {
-    /// The model with this impulse response from lag nk on, and these poles: `B = F h`.
+    /// Returns the model with this impulse response from lag nk on, and these poles: `B = F h`.
     pub(super) fn of_impulse_response(nk: usize, impulse: &[Dual], f: &[Dual]) -> Result<Self, ModelError> {
         let order = f.len();
         let b: Vec<Dual> = (0..impulse.len())
@@ -77,8 +76,8 @@ impl HeldFamily {
 }
 
 impl FamilyOperator {
-    /// Numbers of coefficients of B and F in the discrete model of this form, whatever its
-    /// parameters, and how many samples nk is more than the whole samples of tau.
+    /// Returns the numbers of coefficients of B and F in the discrete model of this form, for any parameters, and the
+    /// difference between nk and the whole samples of tau.
     pub fn held_orders(&self) -> (usize, usize, usize) {
         let order = self.order();
         if self.has_direct_part() {
@@ -88,7 +87,7 @@ impl FamilyOperator {
         }
     }
 
-    /// Order of the dynamics.
+    /// Returns the order of the dynamics.
     pub fn order(&self) -> usize {
         usize::from(self.form().has_pole()) + if self.has_neuromuscular() { 2 } else { 0 }
     }
@@ -97,16 +96,16 @@ impl FamilyOperator {
         self.form().degree() == self.order()
     }
 
-    /// The exact discrete model.
+    /// Returns the exact discrete model.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] when an exponential overflows or the delay has too many samples.
+    /// [`ModelError::OutOfRange`] if an exponential overflows or the delay has too many samples.
     pub fn zoh(&self, sample_time: SampleTime) -> Result<HeldFamily, ModelError> {
         self.zoh_within(whole_samples(self.tau_e_s(), sample_time)?, sample_time)
     }
 
-    /// As [`FamilyOperator::zoh`], with the sample in which the delay lies chosen by the caller:
-    /// `delta = tau - sample Ts` may be 0 or Ts at the borders, where the two meet.
+    /// As [`FamilyOperator::zoh`], for a given sample that contains the delay: `delta = tau - sample Ts` may be 0 or
+    /// Ts at the borders, where the two models are equal.
     ///
     /// # Errors
     /// As [`FamilyOperator::zoh`].
@@ -117,10 +116,9 @@ impl FamilyOperator {
         self.held(&poles, numerator, sample, sample_time.s())
     }
 
-    /// The exact discrete models of `s^i` in place of the numerator, i from 0 to its degree, with
-    /// the poles and the delay of this operator, and one F: what passes from e to u is
-    /// `sum_i n_i(t) (B_i/F) q^-nk e` also where the coefficients n_i of the numerator change with
-    /// time and the poles do not.
+    /// Returns the exact discrete models with `s^i` instead of the numerator, i from 0 to its degree, with the poles
+    /// and the delay of this operator, and a common F: the response from e to u is `sum_i n_i(t) (B_i/F) q^-nk e` even
+    /// if the coefficients n_i of the numerator change with time, as long as the poles do not.
     ///
     /// # Errors
     /// As [`FamilyOperator::zoh`].
@@ -132,10 +130,10 @@ impl FamilyOperator {
             .collect()
     }
 
-    /// Response of the poles and the delay to a sample.
+    /// Returns the response of the poles and the delay over a sample.
     fn held_poles(&self, variables: &[Dual], sample: usize, ts: f64) -> HeldPoles {
         let delay = variables[variables.len() - 1];
-        // In units of a sample: all matrices have entries of moderate size.
+        // In units of a sample, all matrices have entries of moderate size.
         let delta = delay.scaled(1.0 / ts) - Dual::constant(sample as f64);
         let denominator = self.denominator_by_samples(variables, ts);
         let order = self.order();
@@ -162,7 +160,7 @@ impl FamilyOperator {
         }
     }
 
-    /// The model of this numerator over these poles.
+    /// Returns the model of this numerator with these poles.
     fn held(&self, poles: &HeldPoles, numerator: [Dual; 3], sample: usize, ts: f64) -> Result<HeldFamily, ModelError> {
         let (zero, one) = (Dual::constant(0.0), Dual::constant(1.0));
         let order = self.order();
@@ -199,7 +197,7 @@ impl FamilyOperator {
         HeldFamily::of_impulse_response(sample + shift, &impulse, &poles.f)
     }
 
-    /// Numerator and monic denominator by ascending powers of `s Ts`.
+    /// Returns numerator and monic denominator by ascending powers of `s Ts`.
     pub(super) fn by_samples(&self, variables: &[Dual], ts: f64) -> (Vector, Vector) {
         let Rational { numerator, .. } = self.form().rational(variables);
         (
@@ -208,7 +206,7 @@ impl FamilyOperator {
         )
     }
 
-    /// omega^2, by which the neuromuscular part multiplies the numerator; 1 without it.
+    /// Returns omega^2, the factor of the neuromuscular part in the numerator; 1 without it.
     fn numerator_gain(&self, variables: &[Dual]) -> Option<Dual> {
         self.neuromuscular_of(variables).map(|(omega, _)| omega * omega)
     }

@@ -1,11 +1,11 @@
-//! The two ways from continuous to discrete time, each with its pole and gain.
+//! The two discretisations, each with its pole and gain.
 
 use super::held_numerator::Factored;
 
-/// Smallest Ts/T_n, and the inverse of the largest, for which the filter is worked out.
+/// Smallest Ts/T_n, and inverse of the largest, for which the filter is computed.
 pub(super) const SMALLEST_RATIO: f64 = 1e-9;
 
-/// How the remnant filter is taken to discrete time, or was.
+/// Discretisation of the remnant filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum RemnantDiscretisation {
     /// Exact for noise held over each sample.
@@ -21,7 +21,7 @@ crate::named_choice!(RemnantDiscretisation, "discretisation of the remnant", 2, 
 });
 
 impl RemnantDiscretisation {
-    /// The pole alpha, from `a = Ts/T_n`.
+    /// Returns the pole alpha, from `a = Ts/T_n`.
     pub(super) fn pole(self, a: f64) -> f64 {
         match self {
             Self::ZeroOrderHold => (-a).exp(),
@@ -29,7 +29,7 @@ impl RemnantDiscretisation {
         }
     }
 
-    /// `T_n/Ts` from the pole, and its derivative.
+    /// Returns `T_n/Ts` from the pole, and its derivative.
     pub(super) fn time_constant(self, alpha: f64) -> (f64, f64) {
         match self {
             Self::ZeroOrderHold => {
@@ -40,8 +40,7 @@ impl RemnantDiscretisation {
         }
     }
 
-    /// sigma' of the filter with K_n = 1, and its logarithmic derivative with respect to
-    /// `a = Ts/T_n`.
+    /// Returns sigma' of the filter with K_n = 1, and its logarithmic derivative with respect to `a = Ts/T_n`.
     pub(super) fn innovation_sd(self, order: usize, a: f64) -> (f64, f64) {
         match self {
             Self::ZeroOrderHold => {

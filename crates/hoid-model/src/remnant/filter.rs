@@ -27,11 +27,11 @@ pub struct NoiseModel {
 }
 
 impl RemnantFilter {
-    /// A remnant filter with parameters that have a meaning.
+    /// Creates a remnant filter with valid parameters.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] unless the gain is zero or more, the time constant positive, both
-    /// finite, and the order 1 to 4.
+    /// [`ModelError::OutOfRange`] unless the gain is zero or more, the time constant is positive, both are finite, and
+    /// the order is 1 to 4.
     pub fn new(gain: f64, time_constant_s: f64, order: usize) -> Result<Self, ModelError> {
         let filter = Self {
             gain,
@@ -63,7 +63,7 @@ impl RemnantFilter {
         Ok(())
     }
 
-    /// `a = Ts/T_n` of a filter that passes the checks.
+    /// Returns `a = Ts/T_n` of a filter that passes the checks.
     pub(crate) fn ratio(&self, sample_time: SampleTime) -> Result<f64, ModelError> {
         self.check()?;
         let a = sample_time.s() / self.time_constant_s;
@@ -77,11 +77,10 @@ impl RemnantFilter {
         Ok(a)
     }
 
-    /// The discrete filter from the noise, one draw a sample, to the remnant n.
+    /// Returns the discrete filter from the noise, one draw per sample, to the remnant n.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] as for [`RemnantFilter::new`], and when T_n is not between 1e-9
-    /// and 1e9 samples.
+    /// [`ModelError::OutOfRange`] as for [`RemnantFilter::new`], and if T_n is not between 1e-9 and 1e9 samples.
     pub fn discrete(
         &self,
         sample_time: SampleTime,
@@ -100,11 +99,10 @@ impl RemnantFilter {
         DiscreteTransferFunction::new(&num, &denominator(self.order, how.pole(a)), sample_time)
     }
 
-    /// The monic noise model of the same spectrum.
+    /// Returns the monic noise model with the same spectrum.
     ///
     /// # Errors
-    /// [`ModelError::OutOfRange`] as for [`RemnantFilter::new`], and when T_n is not between 1e-9
-    /// and 1e9 samples.
+    /// [`ModelError::OutOfRange`] as for [`RemnantFilter::new`], and if T_n is not between 1e-9 and 1e9 samples.
     pub fn noise_model(&self, sample_time: SampleTime, how: RemnantDiscretisation) -> Result<NoiseModel, ModelError> {
         let a = self.ratio(sample_time)?;
         let (c, unit) = match how {

@@ -1,5 +1,4 @@
-//! The numerator of the filter after a zero-order hold, and its factors with all zeros inside the
-//! unit circle.
+//! The numerator of the filter after a zero-order hold, factored with all zeros inside the unit circle.
 
 use num_complex::Complex64;
 
@@ -26,8 +25,8 @@ fn moments(a: f64) -> [f64; 5] {
     let decay = (-a).exp();
     let mut m = [0.0; 5];
     if a < 8.0 {
-        // The highest by its series of positive terms, e^-a sum of a^i k!/(k + 1 + i)!; the others
-        // follow downwards by parts.
+        // The highest from its series of positive terms, e^-a sum of a^i k!/(k + 1 + i)!; the others by downward
+        // recurrence (integration by parts).
         let (mut term, mut sum) = (0.2, 0.0);
         for i in 0..80 {
             sum += term;
@@ -63,7 +62,7 @@ fn held_numerator_derivative(order: usize, a: f64) -> Vec<f64> {
     let pieces = B_SPLINES[order - 1].iter().zip(&numerator).enumerate();
     pieces
         .map(|(j, (piece, n))| {
-            // The moments differentiate to minus the next ones.
+            // The derivative of a moment is minus the next one.
             let moved: f64 = piece.iter().zip(&m[1..]).map(|(c, m)| c * m).sum();
             n * (order as f64 / a - j as f64) - a.powi(order as i32) * (-a * j as f64).exp() * moved
         })
@@ -94,8 +93,7 @@ impl Factored {
             .collect();
         let at = |p: &[f64], z: Complex64| p.iter().fold(Complex64::new(0.0, 0.0), |sum, &c| sum * z + c);
         let (mut inside, mut moves) = (Vec::with_capacity(degree), Vec::with_capacity(degree));
-        // At most three roots of positive coefficients: found unless a is so large that all but n_1
-        // vanish.
+        // At most three roots of positive coefficients: found unless a is so large that all but n_1 vanish.
         for zero in polynomial::roots(&numerator).unwrap_or_default() {
             // N(zeta, a) = 0 moves the zero by -N_a/N_zeta.
             let moved = -at(&derivative, zero) / at(&slope, zero);

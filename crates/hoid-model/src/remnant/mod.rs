@@ -1,8 +1,8 @@
-//! The remnant filter `K_n / (T_n s + 1)^m`, m = 1..4: its discretisations, its monic noise model,
-//! and the way back (B.11-B.16).
+//! The remnant filter `K_n / (T_n s + 1)^m`, m = 1..4: its discretisations, its monic noise model, and the inverse
+//! (B.11-B.16).
 //!
-//! **Zero-order hold** (exact for white noise that is drawn once a sample, as the simulator does).
-//! With `a = Ts/T_n` and `alpha = e^-a`
+//! **Zero-order hold** (exact for white noise that is drawn once per sample, as in the simulator). With `a = Ts/T_n`
+//! and `alpha = e^-a`
 //!
 //! `H(z) = K_n (n_1 z^-1 + ... + n_m z^-m) / (1 - alpha z^-1)^m`,
 //! `n_j = a^m  integral over [j-1, j] of e^{-a t} B_m(t) dt`,
@@ -19,11 +19,10 @@
 //! dropped, numerator zeros zeta outside the unit circle are reflected, and the standard deviation
 //! of eps' is `sigma' = K_n |n_1| prod over |zeta| > 1 of |zeta|`.
 //!
-//! **Retrieval.** Each coefficient `d_i = (-1)^i binom(m, i) alpha^i` of an estimated D gives an
-//! alpha and with it a time constant; T_n is their mean (eq. 16, B.14), and K_n is sigma' over that
-//! of the filter with this T_n and K_n = 1 (backward Euler: B.16). C is not used: where D is
-//! estimated without a C, m >= 2 and the truth is the zero-order hold, D absorbs the missing C and
-//! T_n is biased.
+//! **Retrieval.** Each coefficient `d_i = (-1)^i binom(m, i) alpha^i` of an estimated D gives an alpha and with it a
+//! time constant; T_n is their mean (eq. 16, B.14), and K_n is the ratio of sigma' to that of the filter with this T_n
+//! and K_n = 1 (backward Euler: B.16). C is not used: if D was estimated without a C, m >= 2 and the true filter is the
+//! zero-order hold, D absorbs the missing C and T_n is biased.
 
 mod discretisation;
 mod filter;

@@ -4,7 +4,7 @@ use super::discretisation::{RemnantDiscretisation, SMALLEST_RATIO, binomial};
 use super::held_numerator::HIGHEST_ORDER;
 use crate::{NotConvertible, SampleTime};
 
-/// Time constant and gain found in a noise model.
+/// Time constant and gain retrieved from a noise model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RetrievedRemnant {
     /// Time constant T_n in s.
@@ -13,13 +13,13 @@ pub struct RetrievedRemnant {
     pub k_n: f64,
 }
 
-/// T_n and K_n from the noise polynomial `1 + d[0] q^-1 + ... + d[m-1] q^-m` and the standard
-/// deviation of the innovation.
+/// Retrieves T_n and K_n from the noise polynomial `1 + d[0] q^-1 + ... + d[m-1] q^-m` and the standard deviation of
+/// the innovation.
 ///
 /// # Errors
-/// [`NotConvertible::NotFinite`] for coefficients that are not numbers;
-/// [`NotConvertible::NotARemnantFilter`] when m is not 1 to 4, a coefficient has the wrong sign, it
-/// implies a pole outside (0, 1), or T_n is nothing compared with a sample.
+/// [`NotConvertible::NotFinite`] for coefficients that are not finite; [`NotConvertible::NotARemnantFilter`] if m is
+/// not 1 to 4, a coefficient has the wrong sign, it implies a pole outside (0, 1), or T_n is negligible compared with a
+/// sample.
 pub fn retrieve(
     d: &[f64],
     innovation_sd: f64,
@@ -35,8 +35,8 @@ pub fn retrieve(
     })
 }
 
-/// Jacobian of `[T_n in s, K_n]` (rows) with respect to `[d_1, ..., d_m, sigma']` (columns) at what
-/// [`retrieve`] finds.
+/// Jacobian of `[T_n in s, K_n]` (rows) with respect to `[d_1, ..., d_m, sigma']` (columns) at the result of
+/// [`retrieve`].
 ///
 /// # Errors
 /// As [`retrieve`].
@@ -64,7 +64,7 @@ pub fn retrieval_jacobian(
     Ok([time, gain])
 }
 
-/// The pole alpha that each coefficient of D implies.
+/// Returns the pole alpha that each coefficient of D implies.
 fn implied_poles(d: &[f64], innovation_sd: f64) -> Result<Vec<f64>, NotConvertible> {
     let order = d.len();
     let refuse = |reason: String| NotConvertible::NotARemnantFilter { order, reason };

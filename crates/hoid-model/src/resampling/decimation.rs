@@ -1,4 +1,4 @@
-//! Amount by which a record is decimated: a choice of the user, or of the rate.
+//! Factor of the decimation of a record: chosen by the user, or from the rate.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,28 +6,28 @@ use std::str::FromStr;
 use super::kernel::{Kernel, PASS, STOP_DB};
 use crate::{ModelError, SampleTime};
 
-/// Rates above it are decimated automatically, Hz.
+/// Rate above which records are decimated automatically, Hz.
 const HIGHEST_HZ: f64 = 200.0;
-/// The rate that they are brought near to, Hz.
+/// Target rate of the automatic decimation, Hz.
 const WANTED_HZ: f64 = 100.0;
-/// A rate is above another by more than rounding.
+/// Relative difference of two rates above which it is not rounding.
 const ROUNDING: f64 = 1e-6;
 
-/// Whether the rate of a record is lowered, and by how much.
+/// Choice of the decimation of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Decimation {
-    /// Above 200 Hz by the factor that comes nearest to 100 Hz.
+    /// Rates above 200 Hz by the factor whose result is nearest to 100 Hz.
     #[default]
     Auto,
-    /// Not at all.
+    /// No decimation.
     Off,
     /// By this factor.
     By(usize),
 }
 
 impl Decimation {
-    /// The same for an estimator that takes the samples as they are unless a factor is named: of
-    /// polynomials orders and delays count samples.
+    /// Returns the choice for an estimator that uses the original samples unless a factor is given: the orders and
+    /// delays of polynomials are in samples.
     pub fn when_named(self) -> Self {
         match self {
             Self::Auto => Self::Off,
@@ -35,7 +35,7 @@ impl Decimation {
         }
     }
 
-    /// The factor for a sample time: 1 leaves it.
+    /// Returns the factor for a sample time: 1 for no decimation.
     pub fn factor(self, sample_time: SampleTime) -> usize {
         let hz = 1.0 / sample_time.s();
         match self {
@@ -55,7 +55,7 @@ impl Decimation {
     }
 }
 
-/// `auto`, `off`, or a whole number of 1 or more.
+/// `auto`, `off`, or an integer of 1 or more.
 impl FromStr for Decimation {
     type Err = ModelError;
 
@@ -87,10 +87,10 @@ impl fmt::Display for Decimation {
     }
 }
 
-/// Action of a decimation.
+/// Data of an applied decimation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Decimated {
-    /// New sample time by the old one.
+    /// Ratio of the new sample time to the old one.
     pub factor: usize,
     /// Old sampling frequency, Hz.
     pub from_hz: f64,
@@ -98,21 +98,21 @@ pub struct Decimated {
     pub to_hz: f64,
     /// End of the pass band, Hz.
     pub pass_hz: f64,
-    /// Start of the stop band, Hz: what lies between folds down above the pass band.
+    /// Start of the stop band, Hz: frequencies between this and the pass band fold to above the pass band.
     pub stop_hz: f64,
     /// Attenuation in the stop band, dB.
     pub stop_db: f64,
     /// Length of the filter, samples of the old rate.
     pub taps: usize,
-    /// Amount by which a sample of the input is taken later than that of the output next to it, s.
+    /// Time in s by which a sample of the input is later than the sample of the output with the same index.
     pub lead_s: f64,
-    /// Amount by which a stream is behind, s.
+    /// Delay of a stream, s.
     pub lag_s: f64,
 }
 
 impl Decimated {
-    /// By a factor from a sample time, with its filter and the new sample time; none if the filter would be longer than
-    /// `longest` samples to each side.
+    /// Returns the decimation of a sample time by a factor, with its filter and the new sample time; `None` if the
+    /// filter would be longer than `longest` samples on each side.
     pub(super) fn by(factor: usize, old: SampleTime, longest: usize) -> Option<(Self, Kernel, SampleTime)> {
         let kernel = Kernel::folding(1.0 / factor as f64, longest)?;
         let new = SampleTime::new(factor as f64 * old.s()).ok()?;
@@ -132,7 +132,7 @@ impl Decimated {
     }
 }
 
-/// The rates, as a phrase without a full stop.
+/// Formats the rates as a phrase without a full stop.
 impl fmt::Display for Decimated {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let hz = |hz: f64| (hz * 1e4).round() / 1e4;

@@ -1,11 +1,11 @@
-//! Decimation sample by sample, as a stream needs it.
+//! Sample-by-sample decimation, for streams.
 //!
-//! The value at `k M` is there once what the filter needs beyond it has come: the stream is behind by
-//! half the filter and half of M, about 15 samples of the new rate ([`Decimated::lag_s`]). Up to the
-//! end of what has come its values are those of the decimated record, digit for digit.
+//! The value at `k M` is available when the filter has the samples after it: the delay of the stream is half the filter
+//! plus half of M, about 15 samples of the new rate ([`Decimated::lag_s`]). Up to the last available sample its values
+//! are identical to those of the decimated record.
 //!
-//! **Values that are not finite** (missing, faulty) are held at the last good one within the filter; a new sample among
-//! whose M old ones is such a one is NaN, so that it belongs to no person.
+//! **Values that are not finite** (missing, faulty) are replaced by the last valid one within the filter; a new sample
+//! is NaN if one of its M old samples is not finite, so that it is not used for identification.
 
 use std::collections::VecDeque;
 
@@ -15,7 +15,7 @@ use super::decimation::Decimated;
 use super::kernel::Kernel;
 use crate::{ModelError, SampleTime};
 
-/// Longest filter of a stream, to each side, samples.
+/// Longest filter of a stream on each side, samples.
 const LONGEST: usize = 1_000_000;
 
 /// Decimates C channels together.
@@ -25,37 +25,37 @@ pub struct Decimator<const C: usize> {
     kernel: Kernel,
     sample_time: SampleTime,
     lanes: [Lane; C],
-    /// Samples that have come.
+    /// Number of input samples.
     came: u64,
-    /// Samples that have been given.
+    /// Number of output samples.
     given: u64,
 }
 
 /// The past of one channel.
 #[derive(Debug, Clone)]
 struct Lane {
-    /// Samples from its old sample to the whole one before a new value: 0, or the middle of M.
+    /// Offset of the whole sample before a new value from its old sample: 0, or the middle of M.
     lead: i64,
-    /// Place of the first weight next to that sample, and the weights.
+    /// Place of the first weight relative to that sample, and the weights.
     offset: i64,
     weights: Vec<f64>,
-    /// Requirements of the filter; the first is at `first` old samples, which the reflection of the
-    /// start makes negative.
+    /// Samples that the filter needs; the first is at `first` old samples, which is negative for the reflection of the
+    /// start.
     past: VecDeque<f64>,
     first: i64,
-    /// The last good value.
+    /// The last valid value.
     last: f64,
-    /// Whether there was one.
+    /// True if there has been a valid value.
     seen: bool,
-    /// Which of the samples from the last given one on are not good, by their number.
+    /// Numbers of the samples from the last output on that are not valid.
     bad: VecDeque<u64>,
 }
 
 impl<const C: usize> Decimator<C> {
-    /// A decimator by a factor of 2 or more; `held` states which channels are inputs that a model holds.
+    /// Creates a decimator by a factor of 2 or more; `held` marks the channels that are held inputs of a model.
     ///
     /// # Errors
-    /// [`ModelError::Decimation`] for a factor without meaning.
+    /// [`ModelError::Decimation`] for an invalid factor.
     pub fn new(factor: usize, sample_time: SampleTime, held: [bool; C]) -> Result<Self, ModelError> {
         let found = (factor > 1)
             .then(|| Decimated::by(factor, sample_time, LONGEST))
@@ -91,30 +91,30 @@ impl<const C: usize> Decimator<C> {
         })
     }
 
-    /// Its behaviour.
+    /// Returns the data of the decimation.
     pub fn done(&self) -> Decimated {
         self.done
     }
 
-    /// The sample time after it.
+    /// Returns the new sample time.
     pub fn sample_time(&self) -> SampleTime {
         self.sample_time
     }
 
-    /// How many samples the last one given lies after the last one taken.
+    /// Returns the number of samples between the last output and the last input.
     pub fn lag_samples(&self) -> u64 {
         let at = self.given.saturating_sub(1) * self.done.factor as u64;
         self.came.saturating_sub(1).saturating_sub(at)
     }
 
-    /// All that changes as numbers, for [`Decimator::restore`].
+    /// Returns the state as numbers, for [`Decimator::restore`].
     pub fn saved(&mut self) -> Vec<f64> {
         let mut numbers = Vec::new();
         self.visit(&mut |number| numbers.push(*number));
         numbers
     }
 
-    /// Continues where the one was that [`Decimator::saved`] was asked of; false for numbers of another.
+    /// Restores the state saved by [`Decimator::saved`]; returns false for numbers of another decimator.
     #[must_use]
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
         let (mut left, mut lacking) = (numbers.iter(), false);
@@ -125,14 +125,14 @@ impl<const C: usize> Decimator<C> {
         !lacking && left.next().is_none()
     }
 
-    /// Takes a sample of each channel; gives one when it is time.
+    /// Takes a sample of each channel; returns one when it is due.
     pub fn take(&mut self, values: [f64; C]) -> Option<[f64; C]> {
         let (number, factor, half) = (self.came, self.done.factor as u64, self.kernel.half());
         self.came += 1;
         for (lane, value) in self.lanes.iter_mut().zip(values) {
             lane.take(value, number);
         }
-        // The farthest sample that the next value needs.
+        // The last sample that the next value needs.
         if self.came <= self.given * factor + factor / 2 + half as u64 {
             return None;
         }
@@ -155,7 +155,7 @@ impl Lane {
         if value.is_finite() {
             self.last = value;
             if !self.seen {
-                // The data before is not known: as the first that is.
+                // The past is not known: it is set to the first value.
                 self.past.iter_mut().for_each(|past| *past = value);
                 self.seen = true;
             }
@@ -165,7 +165,7 @@ impl Lane {
         self.past.push_back(self.last);
     }
 
-    /// The reflection of the start in the first sample.
+    /// Reflects the start in the first sample.
     fn reflect(&mut self, half: usize) {
         let begin = self.past[0];
         for k in 1..=half {
@@ -176,7 +176,7 @@ impl Lane {
         self.first = -(half as i64);
     }
 
-    /// The new value for the old samples from `at` on.
+    /// Returns the new value for the old samples from `at` on.
     fn value(&mut self, at: u64, factor: u64) -> f64 {
         if self.bad.iter().any(|bad| (at..at + factor).contains(bad)) {
             return f64::NAN;
@@ -190,7 +190,7 @@ impl Lane {
             .sum()
     }
 
-    /// Lets go what the value at `next` and those after it do not need.
+    /// Discards the samples that the value at `next` and later values do not need.
     fn forget(&mut self, next: u64, half: usize) {
         while self.first < next as i64 - half as i64 && self.past.pop_front().is_some() {
             self.first += 1;

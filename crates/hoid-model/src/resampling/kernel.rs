@@ -10,36 +10,35 @@
 //! below 1 in the pass band and the stop band alike for `beta = 0.1102 (A - 8.7)` and a length
 //! `2 L = (A - 7.95) / (2.285 d)`, d the width in rad of the transition around c.
 //!
-//! At whole t this is a linear-phase FIR filter whose delay is compensated; at other t it
-//! interpolates, and both have the same frequency response. The weights of each t are divided by
-//! their sum, so that a constant stays what it is. A is [`DESIGN_DB`], by which the stated
-//! [`STOP_DB`] hold with room to spare.
+//! At integer t this is a linear-phase FIR filter whose delay is compensated; at other t it interpolates, and both have
+//! the same frequency response. The weights of each t are divided by their sum, so that a constant is unchanged. A is
+//! [`DESIGN_DB`], for which the stated [`STOP_DB`] are satisfied with a margin.
 
 use std::f64::consts::PI;
 
-/// Attenuation that is designed for, dB.
+/// Design attenuation, dB.
 const DESIGN_DB: f64 = 90.0;
-/// Attenuation that is stated: of what would fold down, and of the error of interpolation, dB.
+/// Stated attenuation of aliases and of the error of interpolation, dB.
 pub const STOP_DB: f64 = 80.0;
-/// Half the width of the transition, as a share of its upper edge.
+/// Half the width of the transition, relative to its upper edge.
 const HALF_TRANSITION: f64 = 0.1;
-/// End of the pass band as a share of the lower of both Nyquist frequencies.
+/// End of the pass band relative to the lower of the two Nyquist frequencies.
 pub const PASS: f64 = 0.8;
 
-/// Distance from a whole sample that is taken for rounding, samples.
+/// Distance from an integer that counts as rounding, samples.
 const WHOLE: f64 = 1e-9;
 
 /// Continuous impulse response of a low-pass filter, in samples of the record.
 #[derive(Debug, Clone, Copy)]
 pub struct Kernel {
     cutoff: f64,
-    /// Samples to each side.
+    /// Samples on each side.
     half: usize,
 }
 
 impl Kernel {
-    /// Passes up to 0.8 of the Nyquist frequency of the record and stops from 1.2: moves a
-    /// band-limited signal by parts of a sample.
+    /// Returns a kernel that passes up to 0.8 of the Nyquist frequency of the record and stops from 1.2: it shifts a
+    /// band-limited signal by fractions of a sample.
     pub fn interpolating() -> Self {
         Self {
             cutoff: 1.0,
@@ -47,38 +46,37 @@ impl Kernel {
         }
     }
 
-    /// Passes up to 0.8 `ratio` and stops from `ratio`, the new Nyquist frequency as a share of the
-    /// old one; none if the filter would be longer than `longest` to each side.
+    /// Returns a kernel that passes up to 0.8 `ratio` and stops from `ratio`, the new Nyquist frequency relative to the
+    /// old one; `None` if the filter would be longer than `longest` on each side.
     pub fn limiting(ratio: f64, longest: usize) -> Option<Self> {
         let half = half_length(2.0 * HALF_TRANSITION * ratio);
-        // Written so that NaN is none.
+        // Written so that NaN gives `None`.
         (half <= longest as f64).then_some(Self {
             cutoff: (1.0 - HALF_TRANSITION) * ratio,
             half: half as usize,
         })
     }
 
-    /// Passes up to 0.8 `ratio` and stops from 1.2 `ratio`, with 6 dB at `ratio`, the new Nyquist
-    /// frequency as a share of the old one: what folds down falls between 0.8 and 1 of it, where it
-    /// takes the place of what the filter has taken, so that noise keeps a spectrum without a hole.
-    /// None if it would be longer than `longest` to each side.
+    /// Returns a kernel that passes up to 0.8 `ratio` and stops from 1.2 `ratio`, with 6 dB at `ratio`, the new Nyquist
+    /// frequency relative to the old one: aliases fall between 0.8 and 1 of it, where they replace the part that the
+    /// filter has removed, so that the spectrum of noise has no gap. `None` if it would be longer than `longest` on
+    /// each side.
     pub fn folding(ratio: f64, longest: usize) -> Option<Self> {
         let half = half_length(2.0 * (1.0 - PASS) * ratio);
-        // Written so that NaN is none.
+        // Written so that NaN gives `None`.
         (half <= longest as f64).then_some(Self {
             cutoff: ratio,
             half: half as usize,
         })
     }
 
-    /// Samples that it reaches to each side of the requested one.
+    /// Returns the number of samples on each side of the requested one.
     pub fn half(self) -> usize {
         self.half
     }
 
-    /// Weights of the samples `floor(t) - half + 1 ..= floor(t) + half` for
-    /// `t = floor(t) + fraction`; for a whole t the first is `floor(t) - half`, so that they are
-    /// symmetric.
+    /// Returns the weights of the samples `floor(t) - half + 1 ..= floor(t) + half` for `t = floor(t) + fraction`; for
+    /// an integer t the first is `floor(t) - half`, so that they are symmetric.
     pub(super) fn weights(self, fraction: f64) -> (isize, Vec<f64>) {
         let half = self.half as isize;
         let first = if fraction == 0.0 { -half } else { 1 - half };
@@ -95,15 +93,15 @@ impl Kernel {
         self.cutoff * sinc(self.cutoff * s) * bessel_i0(beta * root) / bessel_i0(beta)
     }
 
-    /// Values at `t_k = first + k step` for k = 0 .. n, in samples; every t lies [`Kernel::half`]
+    /// Returns the values at `t_k = first + k step` for k = 0 .. n, in samples; every t is at least [`Kernel::half`]
     /// samples inside.
     pub fn values(self, samples: &[f64], first: f64, step: f64, n: usize) -> Vec<f64> {
-        // For a whole step all fractions are one, and the weights are made once.
+        // For an integer step all fractions are equal, and the weights are computed once.
         let (mut known, mut offset, mut weights) = (f64::NAN, 0, Vec::new());
         (0..n)
             .map(|k| {
                 let t = first + k as f64 * step;
-                // What lies on a sample up to rounding is that sample.
+                // A time at a sample up to rounding is that sample.
                 let whole = (t - t.round()).abs() < WHOLE;
                 let at = if whole { t.round() } else { t.floor() };
                 let fraction = if whole { 0.0 } else { t - at };
@@ -120,7 +118,7 @@ impl Kernel {
     }
 }
 
-/// Half the length for a transition of this width, as a share of the Nyquist frequency.
+/// Half the length for a transition of this width, relative to the Nyquist frequency.
 fn half_length(width: f64) -> f64 {
     ((DESIGN_DB - 7.95) / (2.0 * 2.285 * PI * width)).ceil()
 }
@@ -130,8 +128,7 @@ fn sinc(x: f64) -> f64 {
     if angle.abs() < 1e-8 { 1.0 } else { angle.sin() / angle }
 }
 
-/// Modified Bessel function of the first kind and order 0, by its power series; the terms fall once
-/// k > x / 2.
+/// Modified Bessel function of the first kind and order 0, by its power series; the terms decrease for k > x / 2.
 fn bessel_i0(x: f64) -> f64 {
     let square = 0.25 * x * x;
     let (mut term, mut sum) = (1.0, 1.0);

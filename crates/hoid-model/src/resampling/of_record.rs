@@ -5,7 +5,7 @@ use super::kernel::Kernel;
 use crate::{Channel, ModelError, Record};
 
 impl Decimation {
-    /// The record at its new rate, and the actions taken; none if nothing was.
+    /// Returns the record at its new rate, with the data of the decimation; `None` if it was not decimated.
     ///
     /// # Errors
     /// As [`Record::decimated`].
@@ -18,12 +18,11 @@ impl Decimation {
 }
 
 impl Record {
-    /// Every M-th sample of all channels after the same filter of linear phase, the input taken in
-    /// the middle of the M samples over which it is held.
+    /// Returns every M-th sample of all channels after the same linear-phase filter, with the input taken in the middle
+    /// of the M samples over which it is held.
     ///
     /// # Errors
-    /// [`ModelError::Decimation`] for a factor of 0, and for a record that is shorter than half the
-    /// filter.
+    /// [`ModelError::Decimation`] for a factor of 0, and for a record that is shorter than half the filter.
     pub fn decimated(self, factor: usize) -> Result<(Self, Decimated), ModelError> {
         let refuse = |found: String, expected: String| ModelError::Decimation {
             label: self.label().to_owned(),
@@ -34,7 +33,7 @@ impl Record {
             return Err(refuse("a factor of 0".to_owned(), "1 or more".to_owned()));
         }
         let n = self.len();
-        // A reflection has no more than the record but its end point.
+        // The reflection is no longer than the record without its end point.
         let Some((done, kernel, new)) = Decimated::by(factor, self.sample_time(), n - 1) else {
             let half = Decimated::by(factor, self.sample_time(), usize::MAX).map(|(_, kernel, _)| kernel.half());
             return Err(refuse(
@@ -45,7 +44,7 @@ impl Record {
                 "a longer record, or a smaller factor; decimate off keeps the rate".to_owned(),
             ));
         };
-        // As long as it was, to half a new sample: whole periods stay whole.
+        // The duration is preserved to half a new sample: whole periods remain whole.
         let new_samples = (n + factor / 2) / factor;
         let (label, start_s) = (self.label().to_owned(), self.time_s(0));
         let (input, output, others) = self.into_channels();
@@ -66,8 +65,8 @@ impl Record {
     }
 }
 
-/// Filtered values at `first + k factor`, k = 0 .. n; beyond its ends the signal is its reflection in
-/// the end points.
+/// Returns filtered values at `first + k factor`, k = 0 .. n; beyond its ends the signal is reflected in the end
+/// points.
 fn filtered(kernel: Kernel, values: &[f64], first: f64, factor: usize, n: usize) -> Vec<f64> {
     let half = kernel.half();
     let last = values.len() - 1;

@@ -1,7 +1,7 @@
-//! Transfer functions in s as people write them, and back.
+//! Parsing and formatting of transfer functions in s.
 //!
-//! Two notations are read. `NUM/DEN` with commas holds the coefficients by descending powers of s:
-//! `90/1,6,0`. Everything else is an expression in s:
+//! Two notations are accepted. `NUM/DEN` with commas contains the coefficients by descending powers of s: `90/1,6,0`.
+//! Any other text is an expression in s:
 //!
 //! ```text
 //! sum     = product { (+ | -) product }
@@ -11,17 +11,16 @@
 //! atom    = number | s | ( sum ) | exp( -tau s )
 //! ```
 //!
-//! so that `90/(s(s+6))`, `(2s+1)/(s^2+0.4s+1)` and `0.5(s+1)/s/(s+2)` are what they look like.
-//! A number is written before what it multiplies (`s2` is `s^2` mistyped). What follows a divisor
-//! without a sign in between is read one way by people and the other way by
-//! programs (`90/s(s+6)`), and is refused with both remedies. Common factors of numerator and
-//! denominator stay: `s/s^2` has a pole that it hides. A delay is a factor of the whole.
+//! so that `90/(s(s+6))`, `(2s+1)/(s^2+0.4s+1)` and `0.5(s+1)/s/(s+2)` have their expected meaning. A number precedes
+//! its factor (`s2` is a mistyped `s^2`). A factor after a divisor without an operator in between is ambiguous
+//! (`90/s(s+6)`), and is refused with both remedies. Common factors of numerator and denominator are kept: `s/s^2` has
+//! a pole that is cancelled in its response. A delay is a factor of the whole expression.
 //!
 //! | file | contents |
 //! |---|---|
 //! | `coefficients` | the list of coefficients |
 //! | `reader` | the expression |
-//! | `ratio` | what both give |
+//! | `ratio` | the result of both |
 
 mod coefficients;
 mod ratio;
@@ -38,7 +37,7 @@ use crate::ModelError;
 impl FromStr for ContinuousTransferFunction {
     type Err = ModelError;
 
-    /// Reads `90/1,6,0`, `90/(s(s+6))`, `0.5(s+1)exp(-0.1s)/s^2`.
+    /// Parses `90/1,6,0`, `90/(s(s+6))`, `0.5(s+1)exp(-0.1s)/s^2`.
     ///
     /// ```
     /// # use hoid_model::ContinuousTransferFunction;
@@ -48,9 +47,8 @@ impl FromStr for ContinuousTransferFunction {
     /// ```
     ///
     /// # Errors
-    /// [`ModelError::TransferFunction`] with the character at which the text stops being one, or
-    /// with the problems of the whole: a numerator of higher degree than the denominator, a delay
-    /// that is negative.
+    /// [`ModelError::TransferFunction`] with the character at which the text is invalid, or with the problem of the
+    /// whole: a numerator of higher degree than the denominator, a negative delay.
     fn from_str(text: &str) -> Result<Self, ModelError> {
         let read = if text.contains(',') {
             coefficients(text)
@@ -75,7 +73,7 @@ impl FromStr for ContinuousTransferFunction {
 }
 
 impl fmt::Display for ContinuousTransferFunction {
-    /// As an expression in s that reads back as the same transfer function.
+    /// Formats it as an expression in s that is parsed to the same transfer function.
     ///
     /// ```
     /// # use hoid_model::ContinuousTransferFunction;
@@ -104,7 +102,7 @@ impl fmt::Display for ContinuousTransferFunction {
     }
 }
 
-/// The shortest text that gives the same number back.
+/// Returns the shortest text that is parsed to the same number.
 fn number(value: f64) -> String {
     if value != 0.0 && !(1e-4..1e7).contains(&value.abs()) {
         format!("{value:e}")
@@ -113,7 +111,7 @@ fn number(value: f64) -> String {
     }
 }
 
-/// By descending powers, `s^2 + 6s - 1`.
+/// Formats a polynomial by descending powers, `s^2 + 6s - 1`.
 fn polynomial_text(p: &[f64]) -> String {
     let mut text = String::new();
     for (c, power) in p.iter().zip((0..p.len()).rev()).filter(|(c, _)| **c != 0.0) {

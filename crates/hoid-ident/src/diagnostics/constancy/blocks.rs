@@ -1,8 +1,8 @@
 //! Scores `g_c = sum psi eps` and information `G_c = sum psi psi'` of blocks of records.
 //!
-//! Blocks are of [`BLOCK_S`], or longer where all records together would have more than [`MOST`]. A
-//! long record is passed in pieces of whole blocks, each with initial states of its own, so that the
-//! columns of psi need no memory in proportion to it.
+//! Blocks have the length [`BLOCK_S`], or more if all records together would have more than [`MOST`]. A long record is
+//! processed in pieces of whole blocks, each with its own initial states, so that the memory for the columns of psi is
+//! not proportional to its length.
 
 use std::ops::Range;
 
@@ -14,7 +14,7 @@ use crate::{
 
 /// Length of a block, s: longer than the memory of residuals.
 pub(super) const BLOCK_S: f64 = 2.0;
-/// Blocks of all records.
+/// Largest number of blocks of all records.
 const MOST: usize = 96;
 /// Residuals of a piece.
 const PIECE: usize = 1 << 15;
@@ -26,15 +26,15 @@ pub(crate) struct ScoreBlock {
     /// Its first sample in the record; 0 for the first block.
     pub from: usize,
     pub g: Vec<f64>,
-    /// By rows.
+    /// The matrix by rows.
     pub big: Vec<f64>,
 }
 
 /// Residuals of a piece of a record, and the columns of psi with their places.
 pub(crate) type Scores = (Vec<f64>, Vec<(usize, Vec<f64>)>);
 
-/// The blocks of records whose residuals start at sample `first`, with p places; `None` if there
-/// are no scores.
+/// Computes the blocks of records whose residuals start at sample `first`, with p places; `None` if there are no
+/// scores.
 pub(crate) fn score_blocks(
     data: &[Data<'_>],
     first: usize,
@@ -89,14 +89,14 @@ pub(crate) fn score_blocks(
     blocks.iter().all(finite).then_some(blocks)
 }
 
-/// Blocks of a record that are passed together.
+/// Groups of blocks of a record that are processed together.
 fn pieces(number: usize, residuals: usize) -> Vec<Range<usize>> {
     let together = (PIECE * number / residuals.max(1)).max(1);
     let starts = (0..number).step_by(together);
     starts.map(|from| from..(from + together).min(number)).collect()
 }
 
-/// The blocks of a fit in physical parameters, over the elements of eta that are free.
+/// Computes the blocks of a fit in physical parameters, over the free elements of eta.
 pub(crate) fn physical_blocks<P: Parametrisation>(
     criterion: &PhysicalCriterion<'_, P>,
     eta: &[f64],
@@ -105,7 +105,7 @@ pub(crate) fn physical_blocks<P: Parametrisation>(
 ) -> Option<Vec<ScoreBlock>> {
     let ts = criterion.layout.sample_time().s();
     let mut scores = |record: usize, data: Data<'_>| -> Option<Scores> {
-        // A piece of a long record does not say which piece of the other inputs is its own.
+        // A piece of a long record does not contain the corresponding piece of the other inputs.
         if !criterion.further.is_empty() && data.u.len() != criterion.data[record].u.len() {
             return None;
         }

@@ -9,8 +9,8 @@
 //! `P(sup T^2 > c) = sqrt(c/2) e^(-c/2)/Gamma(1/2) [(1 - 1/c) ln lambda + 2/c]`,
 //! `lambda = ((1 - pi_0)/pi_0)^2`.
 //!
-//! Of m instants the supremum is at most what Bonferroni's inequality reports, m times the p-value of one; for few
-//! instants that is the smaller number.
+//! For m instants the p-value of the supremum is at most m times that of one (Bonferroni's inequality); for few
+//! instants this is the smaller number.
 
 use std::f64::consts::PI;
 
@@ -21,7 +21,7 @@ pub(super) fn of_student(t: f64, freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |d| 2.0 * d.sf(t.abs()))
 }
 
-/// p-value of the supremum over `instants` whose smallest share is pi_0, from the smallest p-value of one.
+/// p-value of the supremum over `instants`, the smallest with the share pi_0, from the smallest p-value of one.
 pub(super) fn of_supremum(p_one: f64, instants: usize, smallest_share: f64) -> f64 {
     let bonferroni = p_one * instants as f64;
     let Ok(normal) = Normal::new(0.0, 1.0) else {

@@ -1,10 +1,10 @@
-//! Whether the parameters of a fit are the same throughout: the scores over time.
+//! Test of whether the parameters of a fit are constant: the scores over time.
 //!
-//! At the minimum the scores `s(t) = psi(t) eps(t)` sum to zero. Where a parameter changes within a record, or from one
-//! run to the next, they have one sign before and the other one behind (J. Nyblom, *JASA* 84 (1989) 223-230; B. E.
-//! Hansen, *J. Policy Modeling* 14 (1992) 517-533). For a direction v in the space of the parameters and a set A of
-//! samples (those of a record after an instant, or a whole run among others) the regressor of a change is `z = psi'v`
-//! in A and 0 elsewhere. Definition of the constant parameters do not explain of it
+//! At the minimum the scores `s(t) = psi(t) eps(t)` sum to zero. If a parameter changes within a record, or from one
+//! run to the next, they have one sign before the change and the other after it (J. Nyblom, *JASA* 84 (1989) 223-230;
+//! B. E. Hansen, *J. Policy Modeling* 14 (1992) 517-533). For a direction v in the space of the parameters and a set A
+//! of samples (those of a record after an instant, or a whole run among others) the regressor of a change is
+//! `z = psi'v` in A and 0 elsewhere. Its part that the constant parameters do not explain is
 //!
 //! `r(t) = psi(t)' w(t)`, `w = v - a` in A and `-a` elsewhere, `a = G^-1 G_A v`
 //!
@@ -32,8 +32,8 @@
 //! | `critical` | p-values of a supremum |
 //! | `polynomials` | the scores of a fit of polynomials, with that of the delay |
 //! | `search` | all changes, and the one that is prominent |
-//! | `steadiness` | the same of columns that are known: jumps, drifts and sways |
-//! | `stretch` | the block that carries the fit |
+//! | `steadiness` | the same test for known columns: jumps, drifts and periodic changes |
+//! | `stretch` | the block with the most influence on the fit |
 
 mod blocks;
 mod critical;
@@ -55,12 +55,12 @@ use stretch::carrying;
 
 /// p-value below which a parameter counts as changed, for the delay and for all others.
 const LEVEL: f64 = 5e-4;
-/// Variation of people's parameters from run to run, where the estimator has no option for it.
+/// Variation of people's parameters from run to run, for estimators without an option for it.
 pub(crate) const DEFAULT_RUN_TO_RUN: f64 = 0.06;
 
 impl Constancy<'_> {
-    /// Doubts: a change, and a stretch that carries the fit (where the error bars are those of the model, and not of
-    /// the scatter of stretches).
+    /// Returns the doubts: a change, and a stretch that dominates the fit (if the standard errors are those of the
+    /// model, and not those of the scatter of stretches).
     pub fn findings(&self) -> Vec<Finding> {
         self.change().into_iter().chain(self.stretch()).collect()
     }
@@ -91,7 +91,7 @@ impl Constancy<'_> {
         ))
     }
 
-    /// A doubt that reports what changes and about when.
+    /// Returns a doubt that reports which parameter changes and about when.
     pub fn change(&self) -> Option<Finding> {
         let records = self.blocks.last().map_or(0, |block| block.record + 1);
         let of = |delay: bool| strongest(self, delay).filter(|change| change.p_value < LEVEL);

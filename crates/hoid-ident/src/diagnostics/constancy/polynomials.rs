@@ -1,8 +1,8 @@
-//! The scores of a fit of polynomials, with that of the delay.
+//! Scores of a fit of polynomials, with that of the delay.
 //!
-//! nk is a whole number, but the residual has a slope along the delay too
-//! ([`searched_delay`](crate::searched_delay)). Its score need not sum to zero, as nk has no minimum
-//! between two samples; the step to the minimum is taken out with the others.
+//! nk is an integer, but the residual also has a derivative with respect to the delay
+//! ([`searched_delay`](crate::searched_delay)). Its score need not sum to zero, as nk has no minimum between two
+//! samples; the step to the minimum is removed together with the others.
 
 use hoid_model::{
     Finding, Record,
@@ -18,16 +18,15 @@ use crate::{
     criterion::{Criterion, Data, Workspace, first_residual},
 };
 
-/// Residuals of a robust fit are held to a given number of its scales, as its loss holds their
-/// slope.
+/// Residuals of a robust fit are limited to this number of its scales, as in its loss.
 const CLIPPED: f64 = 1.345;
-/// Deviations of a sum of scores beyond which the fit is not a minimum of the squares: one for
-/// simulation, or with a prior that weighs more than the data.
+/// Standard deviations of a sum of scores above which the fit is not a least squares minimum: for example a fit for
+/// simulation, or one with a prior that has more weight than the data.
 const MOST_OFF: f64 = 3.0;
 
 impl Fit {
-    /// Doubts where the operator is not the same throughout the records, or a stretch carries it. Nothing is reported
-    /// about models without an input or without noise, and of fits whose scores are not those of the squares.
+    /// Returns doubts if the operator is not constant over the records, or a stretch dominates the fit. Models without
+    /// an input or without noise, and fits whose scores are not those of least squares, have no such findings.
     pub(in crate::diagnostics) fn constancy_findings(&self, records: &[Record]) -> Vec<Finding> {
         self.constancy(records).unwrap_or_default()
     }
@@ -74,7 +73,7 @@ impl Fit {
         Some(constancy.findings())
     }
 
-    /// The delay, and the operator's parameters or, where there is no operator, the coefficients.
+    /// Returns the directions: the delay, and the parameters of the operator or, without an operator, the coefficients.
     fn directions(&self) -> Vec<Direction> {
         let (orders, p) = (self.orders(), self.model.theta().len());
         let unit_vector = |place: usize| {

@@ -1,4 +1,4 @@
-//! The change that is prominent among all directions, records and instants.
+//! Search for the most significant change over all directions, records and instants.
 
 use std::f64::consts::{FRAC_PI_4, TAU};
 
@@ -10,17 +10,17 @@ use super::{
     critical::{of_student, of_supremum},
 };
 
-/// Blocks on each side of a change.
+/// Least number of blocks on each side of a change.
 const FEWEST: usize = 2;
-/// Shortest period of a sway, in blocks.
+/// Shortest period of a periodic change, in blocks.
 const SHORTEST: f64 = 5.0;
-/// Share of the information of a change that the constant parameters must leave.
+/// Least share of the information of a change that the constant parameters may leave.
 const LEFT: f64 = 1e-3;
 /// Eigenvalue of the information, scaled to a unit diagonal, below which a combination of parameters
 /// is not determined.
 const SINGULAR: f64 = 1e-9;
 
-/// The data inspected.
+/// The data of the test.
 pub(crate) struct Constancy<'a> {
     pub blocks: &'a [ScoreBlock],
     pub directions: &'a [Direction],
@@ -35,23 +35,23 @@ pub(crate) struct Constancy<'a> {
 #[derive(Debug, Clone)]
 pub(crate) struct Direction {
     pub name: String,
-    /// Unit of the change, with a space in front where there is one.
+    /// Unit of the change, with a leading space if there is one.
     pub unit: &'static str,
     pub vector: Vec<f64>,
     pub delay: bool,
-    /// The parameter's value, of which people vary by a part between runs; 1 for a logarithm, 0 for
-    /// what each run has for itself.
+    /// The value of the parameter, of which people vary by a part between runs; 1 for a logarithm, 0 for a parameter
+    /// that is estimated for each run.
     pub size: f64,
 }
 
-/// How a parameter goes.
+/// Time course of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Course {
-    /// It jumps.
+    /// A jump.
     Step,
-    /// It drifts from one end to the other.
+    /// A drift from one end to the other.
     Drift,
-    /// It sways, with this period in s.
+    /// A periodic change with this period in s.
     Sway(f64),
 }
 
@@ -62,14 +62,14 @@ pub(super) struct Change {
     pub name: String,
     pub unit: &'static str,
     pub record: usize,
-    /// First sample after it; 0 where a whole record differs from the others.
+    /// First sample after the change; 0 if a whole record differs from the others.
     pub at: usize,
     pub by: f64,
     pub error: f64,
     pub p_value: f64,
 }
 
-/// A change over the blocks: record, first sample, how it goes, and what share of it each block has.
+/// A change over the blocks: record, first sample, course, and its size in each block.
 pub(super) struct Set {
     record: usize,
     at: usize,
@@ -78,7 +78,7 @@ pub(super) struct Set {
 }
 
 impl Set {
-    /// All blocks of a range have it, others do not.
+    /// A change that is one in all blocks of a range and zero in the others.
     fn of_blocks(record: usize, at: usize, blocks: std::ops::Range<usize>, all: usize) -> Self {
         let weights = (0..all).map(|c| f64::from(u8::from(blocks.contains(&c)))).collect();
         Self {
@@ -101,13 +101,13 @@ struct Tested {
     between_runs: f64,
 }
 
-/// The change with the smallest p-value among the delays, or among the others.
+/// Returns the change with the smallest p-value, either of the delay or of the other parameters.
 pub(super) fn strongest(of: &Constancy<'_>, delay: bool) -> Option<Change> {
     let directions: Vec<_> = of.directions.iter().filter(|d| d.delay == delay).collect();
     strongest_among(of, &directions, &sets(of.blocks))
 }
 
-/// The same among these directions and courses.
+/// Returns the same among these directions and courses.
 pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], sets: &[Set]) -> Option<Change> {
     let (blocks, n) = (of.blocks, of.blocks.len());
     let p = blocks.first()?.g.len();
@@ -117,7 +117,7 @@ pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], set
     let matrices: Vec<DMatrix<f64>> = blocks.iter().map(|b| DMatrix::from_row_slice(p, p, &b.big)).collect();
     let whole = matrices.iter().fold(DMatrix::zeros(p, p), |sum, m| sum + m);
     let inverse = pseudo_inverse(&whole)?;
-    // A prior or a bound leaves a sum of scores: one step to the minimum without it.
+    // With a prior or a bound the sum of scores is not zero: one step to the minimum without it.
     let sum = blocks
         .iter()
         .fold(DVector::zeros(p), |sum, b| sum + DVector::from_column_slice(&b.g));
@@ -137,7 +137,7 @@ pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], set
         let typical = upper_median(&mut ratios).unwrap_or(1.0);
         let smallest = all.iter().map(|t| t.share.min(1.0 - t.share)).fold(0.5, f64::min);
         for t in &all {
-            // All blocks have a share in a drift and a sway, and the typical scatter is that of them all.
+            // A drift and a periodic change act on all blocks, and the typical scatter is that of them all.
             let (scatter, freedom) = match sets[t.set].course {
                 Course::Step => (t.by_blocks, n - 2),
                 _ => (0.0, 4 * (n - 2)),
@@ -166,7 +166,7 @@ pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], set
     best
 }
 
-/// Whole records among others, and the part of a record after each boundary of blocks.
+/// Returns whole records among others, and the part of a record after each boundary of blocks.
 pub(super) fn sets(blocks: &[ScoreBlock]) -> Vec<Set> {
     let records = blocks.last().map_or(0, |b| b.record + 1);
     let mut all = Vec::new();
@@ -183,7 +183,7 @@ pub(super) fn sets(blocks: &[ScoreBlock]) -> Vec<Set> {
     all
 }
 
-/// A drift over the blocks of one record.
+/// Returns drifts over the blocks of one record.
 pub(super) fn drifts(blocks: &[ScoreBlock]) -> Vec<Set> {
     let n = blocks.len();
     let weight = |c: usize| (c as f64 + 0.5) / n.max(1) as f64 - 0.5;
@@ -197,8 +197,8 @@ pub(super) fn drifts(blocks: &[ScoreBlock]) -> Vec<Set> {
     }]
 }
 
-/// Sines over the blocks of one record, of a given number of s each: periods from [`SHORTEST`] blocks to two thirds of
-/// all, half of what distinguishes two frequencies from one to the next, each in four phases.
+/// Returns sines over the blocks of one record, each block of a given duration in s: periods from [`SHORTEST`] blocks
+/// to two thirds of the record, spaced by half the frequency resolution, each in four phases.
 pub(super) fn sways(blocks: &[ScoreBlock], block_s: f64) -> Vec<Set> {
     let n = blocks.len();
     let frequencies = (3..)
@@ -265,7 +265,7 @@ fn tested(
     })
 }
 
-/// The inverse over the determined parameters, in units of a unit diagonal.
+/// Inverse over the determined parameters, after scaling to a unit diagonal.
 pub(super) fn pseudo_inverse(whole: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let p = whole.nrows();
     let scale = DVector::from_fn(p, |i, _| {

@@ -1,11 +1,11 @@
-//! Whether a response is the same throughout: jumps, drifts and sways of its gain and of its delay.
+//! Test of whether a response is constant: jumps, drifts and periodic changes of its gain and of its delay.
 //!
-//! `u = sum b_i z_i + v` with columns `z_{i+1} = dz_i/dt`: the gain is along b, the delay along
-//! `-db/dt`, `-b_i` at `z_{i+1}`. A lead that grows by so much is a delay that falls by it, to first order.
+//! `u = sum b_i z_i + v` with columns `z_{i+1} = dz_i/dt`: the direction of the gain is b, that of the delay `-db/dt`,
+//! i.e. `-b_i` at `z_{i+1}`. To first order, an increase of the lead is a decrease of the delay by the same amount.
 //!
-//! The scores are those of least squares in columns that are known ([`crate::diagnostics::whitened`]), and the test is
-//! that of fits. A drift is `t/T - 1/2` in place of the share of a jump, a sway a sine of one of some periods in four
-//! phases; all that are examined are counted (Bonferroni).
+//! The scores are those of least squares with known columns ([`crate::diagnostics::whitened`]), and the test is that of
+//! fits. For a drift the regressor is `t/T - 1/2`, for a periodic change a sine of one of some periods in four phases;
+//! the p-value is corrected for all of them (Bonferroni).
 
 use std::ops::Range;
 
@@ -18,23 +18,24 @@ use crate::diagnostics::whitened::{LIMIT, NOISE, Whitened, thinning};
 /// Least number of blocks of 2 s.
 const FEWEST: usize = 8;
 
-/// A response that is not the same throughout.
+/// A response that is not constant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unsteady {
-    /// How it goes.
+    /// Its time course.
     pub course: Course,
-    /// What: `gain` or `delay`, which may be a lead.
+    /// Name of what changes: `gain` or `delay`, which may be a lead.
     pub name: &'static str,
     /// First sample after a jump.
     pub at: usize,
-    /// Amount by which, of a sway its amplitude: the gain as a share of it, the delay in s; and the standard error.
+    /// Size of the change, for a periodic one its amplitude: of the gain as a share of it, of the delay in s; and the
+    /// standard error.
     pub by: [f64; 2],
-    /// Probability of so much by chance, among all of its course.
+    /// Probability of such a size by chance, among all changes with its course.
     pub p_value: f64,
 }
 
-/// The most unlikely jump, drift and sway of a response over samples: `columns` span it, each the derivative of the one
-/// before. Empty where there is too little, or something is not a number.
+/// Returns the most significant jump, drift and periodic change of a response over samples: `columns` span it, each the
+/// derivative of the previous one. Empty if there are too few data, or a value is not a number.
 pub fn unsteady(columns: &[Vec<f64>], u: &[f64], samples: Range<usize>, sample_time_s: f64) -> Vec<Unsteady> {
     found(columns, u, samples, sample_time_s).unwrap_or_default()
 }
@@ -62,7 +63,7 @@ fn found(columns: &[Vec<f64>], u: &[f64], samples: Range<usize>, sample_time_s: 
             }
         })
         .collect();
-    // The level is not a response; the derivative of the last column is none of them.
+    // The level is not a response; the derivative of the last column is not among the columns.
     let gain = (0..p).map(|j| if j <= last { fit.b[j] } else { 0.0 }).collect();
     let delay = (0..p)
         .map(|j| if j > 0 && j <= last { -fit.b[j - 1] } else { 0.0 })

@@ -1,39 +1,39 @@
-//! A stretch of the records that carries the fit.
+//! Search for a stretch of the records that dominates the fit.
 //!
-//! A channel that is turned over for a second, or a pause, is not a change that stays. Without block c the parameters
-//! would be elsewhere by
+//! A channel with a reversed sign for a second, or a pause, is not a lasting change. Without block c the parameters
+//! would differ by
 //!
 //! `delta_c = -(A - A_c)^-1 h_c`, `A = J' G J`, `h = J' g`
 //!
-//! with the columns of J the directions that are examined (the jackknife of a group, to first order: B. Efron, *The
+//! with the columns of J the directions that are tested (the jackknife of a group, to first order: B. Efron, *The
 //! Jackknife, the Bootstrap and Other Resampling Plans*, 1982, chapter 3). By chance a block of n moves a parameter by
-//! about `1/sqrt n` of its standard error. One that moves it by [`MOVED`] of them, and by as much of what all the
-//! others do together, `sqrt(sum delta^2)`, is named: the sum of squares over all blocks is the variance of the
-//! estimate, which that block alone makes several times the stated one.
+//! about `1/sqrt n` of its standard error. A block is reported if it moves a parameter by [`MOVED`] of them, and by as
+//! much relative to all the others together, `sqrt(sum delta^2)`: the sum of squares over all blocks is the variance of
+//! the estimate, and that block alone makes it several times the stated variance.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::search::{Constancy, pseudo_inverse};
 
-/// Standard errors by which a block moves a parameter.
+/// Standard errors by which a block moves a parameter if it is reported.
 const MOVED: f64 = 2.0;
-/// The same relative to random blocks, where there are few of them.
+/// The same relative to what a block moves by chance, for few blocks.
 const BY_CHANCE: f64 = 4.5;
 /// Least number of blocks.
 const FEWEST: usize = 5;
 
-/// A block, and what is elsewhere without it.
+/// A block, and the parameters that change without it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Stretch {
     pub record: usize,
     /// First sample; `None` for the end after the last block of a record.
     pub from: usize,
     pub to: Option<usize>,
-    /// Name of each parameter that moves, and by how many of its standard errors.
+    /// Name of each parameter that moves, and its change in standard errors.
     pub moves: Vec<(String, f64)>,
 }
 
-/// The block that carries most, where one carries too much.
+/// Returns the block with the most influence, if it is too large.
 pub(super) fn carrying(of: &Constancy<'_>) -> Option<Stretch> {
     let (n, m) = (of.blocks.len(), of.directions.len());
     if n < FEWEST || m == 0 || of.variance <= 0.0 {
@@ -54,7 +54,7 @@ pub(super) fn carrying(of: &Constancy<'_>) -> Option<Stretch> {
         .collect();
     let whole = parts.iter().fold(DMatrix::zeros(m, m), |sum, (_, a)| sum + a);
     let inverse = pseudo_inverse(&whole)?;
-    // A prior, a bound or a delay on the grid leaves a sum of scores.
+    // With a prior, a bound or a delay on the grid the sum of scores is not zero.
     let step = &inverse * parts.iter().fold(DVector::zeros(m), |sum, (h, _)| sum + h);
     parts.iter_mut().for_each(|(h, a)| *h -= &*a * &step);
     let moved: Option<Vec<DVector<f64>>> = parts

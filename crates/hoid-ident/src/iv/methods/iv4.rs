@@ -6,11 +6,10 @@
 //! 3. Autoregression `L v = eps` of the residual.
 //! 4. Instruments simulated with the second A and B; IV estimate of the equation filtered with L.
 //!
-//! Consistent whatever v is; of the smallest variance where L makes v white. In the closed-loop
-//! form the simulations start from the noise-free input. The book takes L of the order na + nb, as
-//! an example; here it is four times that, because v of a process that is sampled fast (`A = F`,
-//! `v = F n` with noise n) has zeros near the unit circle, which an autoregression needs many terms
-//! for.
+//! Consistent whatever v is; of the smallest variance if L makes v white. In the closed-loop form the simulations start
+//! from the noise-free input. The book uses the order na + nb for L, as an example; here it is four times as high,
+//! because v of a process that is sampled fast (`A = F`, `v = F n` with noise n) has zeros near the unit circle, for
+//! which an autoregression needs many terms.
 
 use hoid_model::Structure;
 
@@ -32,7 +31,7 @@ pub(super) const ALGORITHM: Algorithm = Algorithm {
 
 /// Order of the autoregression, as a multiple of na + nb.
 const ORDERS: usize = 4;
-/// Rows for each term of the autoregression, at least.
+/// Least number of rows per term of the autoregression.
 const ROWS_EACH: usize = 10;
 
 fn solve(problem: &IvProblem<'_>, _: &Criterion<'_>, _: IterationLimits) -> Result<IvSolution, IdentError> {

@@ -1,5 +1,5 @@
-//! The methods of instrumental variables. A new one is a file next to these with its [`Algorithm`],
-//! its `mod` line and its line in the list below.
+//! The methods of instrumental variables. A new method is a file in this folder with its [`Algorithm`], its `mod` line
+//! and its line in the list below.
 
 mod iv4;
 mod rivbj;
@@ -11,10 +11,10 @@ use hoid_model::Structure;
 
 use super::algorithm::Algorithm;
 
-/// The list of the methods: variant, and the file that holds its algorithm.
+/// The list of the methods: variant, and module with its algorithm.
 macro_rules! methods {
     ($($(#[$doc:meta])* $method:ident = $file:ident,)+) => {
-        /// Which instrumental variable method.
+        /// A method of instrumental variables.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         #[non_exhaustive]
         pub enum IvMethod {
@@ -44,27 +44,27 @@ methods! {
 }
 
 impl IvMethod {
-    /// Short name: `iv4`, `sriv`, `rivbj`.
+    /// Returns the short name: `iv4`, `sriv`, `rivbj`.
     pub fn name(self) -> &'static str {
         self.algorithm().name
     }
 
-    /// Its definition, in a line without a full stop.
+    /// Returns the description, in a line without a full stop.
     pub fn help(self) -> &'static str {
         self.algorithm().help
     }
 
-    /// Where it comes from.
+    /// Returns the source in the literature.
     pub fn source(self) -> &'static str {
         self.algorithm().source
     }
 
-    /// The structure that the method fits.
+    /// Returns the structure that the method fits.
     pub fn structure(self) -> Structure {
         self.algorithm().structures[0]
     }
 
-    /// The structure that the method fits, as a list.
+    /// Returns the structure that the method fits, as a list.
     pub fn structures(self) -> &'static [Structure] {
         self.algorithm().structures
     }

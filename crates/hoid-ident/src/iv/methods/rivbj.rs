@@ -1,16 +1,15 @@
 //! Refined instrumental variable for `u = (B/F) q^-nk e + (C/D) eps` (P. C. Young, *Recursive
 //! Estimation and Time-Series Analysis*, 2nd ed. 2011, ch. 7).
 //!
-//! The equation is filtered with `D/(C F)` of the iteration before, so that its noise is eps; C and
-//! D are those of the ARMA model of `u - (B/F) q^-nk e`, fitted by the prediction error method
-//! (with nc = 0, by least squares) in each iteration.
+//! The equation is filtered with `D/(C F)` of the previous iteration, so that its noise is eps; C and D are those of
+//! the ARMA model of `u - (B/F) q^-nk e`, fitted by the prediction error method (with nc = 0, by least squares) in each
+//! iteration.
 //!
-//! **Covariance.** B and F solve `Z' eps = 0`, C and D `psi' eps = 0` with psi their negative
-//! gradient. With both stacked, psi_theta the gradient for all parameters and `W = [Z, psi]`, the
-//! covariance is `sigma^2 (W' psi_theta)^-1 W' W (psi_theta' W)^-1`. In an open loop it falls into
-//! Young's `sigma^2 (Z'Z)^-1` and the covariance of the ARMA model; in a closed loop C and D
-//! inherit errors of the system. Where the noise model is too small, the colour that is left in eps
-//! is taken into account for B and F.
+//! **Covariance.** B and F solve `Z' eps = 0`, C and D `psi' eps = 0` with psi their negative gradient. With both
+//! stacked, psi_theta the gradient for all parameters and `W = [Z, psi]`, the covariance is
+//! `sigma^2 (W' psi_theta)^-1 W' W (psi_theta' W)^-1`. In an open loop it separates into Young's `sigma^2 (Z'Z)^-1` and
+//! the covariance of the ARMA model; in a closed loop C and D inherit errors of the system. If the noise model is too
+//! small, the remaining colour of eps is taken into account for B and F.
 
 use hoid_model::{Orders, Structure};
 
@@ -62,7 +61,7 @@ fn solve(
     })
 }
 
-/// C and D for a system with stable F.
+/// Returns C and D for a system with stable F.
 fn noise_of(
     system: &[f64],
     problem: &IvProblem<'_>,
@@ -122,7 +121,7 @@ fn covariance(
 ) -> Option<Vec<f64>> {
     let o = criterion.orders;
     let noise = o.nb..o.nb + o.nc + o.nd;
-    // Rows that both the equation and the residuals have.
+    // Rows that are in both the equation and the residuals.
     let nd = o.nd;
     let first = (problem.first + nd).max(criterion.first);
     let mut workspace = Workspace::of_thread();

@@ -1,8 +1,7 @@
-//! Products of eps and the columns of psi, for a record in each lane.
+//! Products of eps and the columns of psi, for one record in each lane.
 //!
-//! A column that is the one before it, a sample later, needs no pass of its own:
-//! `sum x(t-1) y(t-1)` over a span is `sum x(t) y(t)` except for the samples at both ends, as in
-//! [`crate::linalg::products`].
+//! A column that is the previous one delayed by one sample needs no pass of its own: `sum x(t-1) y(t-1)` over a span is
+//! `sum x(t) y(t)` except for the samples at both ends, as in [`crate::linalg::products`].
 
 use hoid_lanes::Number;
 
@@ -23,12 +22,12 @@ impl Columns {
         1 + self.nb + self.nd + self.nf
     }
 
-    /// True for a column that is the one before it, a sample later.
+    /// True for a column that is the previous one delayed by one sample.
     fn follows(&self, column: usize) -> bool {
         column > 1 && column != 1 + self.nb && column != 1 + self.nb + self.nd
     }
 
-    /// The values of a column in these rows of the span.
+    /// Returns the values of a column in these rows of the span.
     #[inline(always)]
     pub fn rows<'r>(
         &self,
@@ -50,8 +49,8 @@ impl Columns {
         &signal[(from - lag) * width..(to - lag) * width]
     }
 
-    /// Adds the products over these rows for which a pass is needed: those of a column that follows
-    /// none with all others.
+    /// Adds the products over these rows for which a pass is necessary: those of a column that does not follow another
+    /// with all others.
     #[inline(always)]
     pub fn add_products<R: Number>(
         &self,
@@ -70,7 +69,7 @@ impl Columns {
             let mut others = [0; 4];
             let mut count = 0;
             for j in 0..p1 {
-                // Those before this one have met it already.
+                // Previous leading columns have been multiplied with it already.
                 if j >= i || self.follows(j) {
                     others[count] = j;
                     count += 1;
@@ -100,8 +99,8 @@ impl Columns {
         }
     }
 
-    /// The products of the columns that both follow others: those of the columns before them over
-    /// the same rows, `sign` times their products in one row more.
+    /// Adds the products of the columns that both follow others: those of the previous columns over the same rows, plus
+    /// `sign` times their products in one more row.
     #[inline(always)]
     pub fn add_row<R: Number>(&self, zero: R, signals: &SignalBuffers, row: usize, sign: f64, products: &mut [f64]) {
         let (p1, width) = (self.count(), zero.lanes());
@@ -118,7 +117,7 @@ impl Columns {
         }
     }
 
-    /// All products from those that were summed, with the initial states projected out.
+    /// Computes all products from the summed ones, with the initial states projected out.
     #[inline(always)]
     pub fn complete<R: Number>(&self, zero: R, inside: &[R], nf: usize, products: &mut [f64]) {
         let (p1, width) = (self.count(), zero.lanes());

@@ -1,12 +1,12 @@
-//! Filters of the signals of a span, of a record in each lane; every signal has its past in front.
+//! Filters of the signals of a span, for one record in each lane; every signal is preceded by its past.
 
 use hoid_lanes::Number;
 
 use super::{lane_products::add_scaled, signal_buffers::SignalBuffers};
 
-/// All signals of a span whose past is known, in one pass, where the poles are two, and B and D
-/// short: s and r wait for their own last values side by side, and what is not multiplied later is
-/// not kept. The same operations as one after the other. False for other orders.
+/// Computes all signals of a span with known past in one pass, for two poles and short B and D: the recursions of s and
+/// r run in parallel, and values that are not needed later are not stored. The operations are the same as one after the
+/// other. Returns false for other orders.
 #[inline(always)]
 pub(super) fn all_at_once<R: Number>(
     zero: R,
@@ -37,7 +37,7 @@ fn row<R: Number>(zero: R, rows: &[f64], index: usize) -> R {
     zero.load(&rows[index * zero.lanes()..])
 }
 
-/// The same, zeros from row `end` on.
+/// The same, with zeros from row `end` on.
 #[inline(always)]
 fn row_below<R: Number>(zero: R, rows: &[f64], index: usize, end: usize) -> R {
     if index < end { row(zero, rows, index) } else { zero }
@@ -93,7 +93,7 @@ fn all_of_orders<R: Number, const NB: usize, const ND: usize>(
     }
 }
 
-/// `s = e/F`, `w = B s` (in the place of r) and `v = u - w` from place `at` on.
+/// Computes `s = e/F`, `w = B s` (in place of r) and `v = u - w` from place `at` on.
 #[inline(always)]
 pub(super) fn respond<R: Number>(
     zero: R,
@@ -104,7 +104,7 @@ pub(super) fn respond<R: Number>(
 ) {
     let (width, end) = (zero.lanes(), at + e.len());
     if (b.len(), f.len()) == (2 * width, 2 * width) {
-        // The orders of the operator in one pass.
+        // The orders of the operator: in one pass.
         let (b0, b1) = (zero.load(b), zero.load(&b[width..]));
         let (f1, f2) = (zero.load(f), zero.load(&f[width..]));
         let (mut s1, mut s2) = (
@@ -135,7 +135,7 @@ pub(super) fn respond<R: Number>(
     }
 }
 
-/// `r = w/F`, which takes the place of w from place `at` on, and `x_f = D r`.
+/// Computes `r = w/F` in place of w from place `at` on, and `x_f = D r`.
 #[inline(always)]
 pub(super) fn filter_response<R: Number>(zero: R, [d, f]: [&[f64]; 2], r: &mut [f64], x_f: &mut [f64], at: usize) {
     let width = zero.lanes();
@@ -154,7 +154,7 @@ pub(super) fn filter_response<R: Number>(zero: R, [d, f]: [&[f64]; 2], r: &mut [
     whiten(zero, d, r, x_f, at);
 }
 
-/// `y = x/F` from place `at` on, where y continues from what is before.
+/// Computes `y = x/F` from place `at` on, continuing from the previous values of y.
 #[inline(always)]
 fn divide<R: Number>(zero: R, f: &[f64], x: &[f64], y: &mut [f64], at: usize) {
     y[at..at + x.len()].copy_from_slice(x);
@@ -162,7 +162,7 @@ fn divide<R: Number>(zero: R, f: &[f64], x: &[f64], y: &mut [f64], at: usize) {
     divide_again(zero, f, &mut y[..end], at);
 }
 
-/// `y <- y/F` from place `at` on; before it is what was divided already.
+/// Computes `y <- y/F` from place `at` on; the values before it have been filtered already.
 #[inline(always)]
 fn divide_again<R: Number>(zero: R, f: &[f64], y: &mut [f64], at: usize) {
     let width = zero.lanes();
@@ -186,7 +186,7 @@ fn divide_again<R: Number>(zero: R, f: &[f64], y: &mut [f64], at: usize) {
     }
 }
 
-/// `y = D x`, x from place `at` on.
+/// Computes `y = D x`, x from place `at` on.
 #[inline(always)]
 pub(super) fn whiten<R: Number>(zero: R, d: &[f64], x: &[f64], y: &mut [f64], at: usize) {
     let width = zero.lanes();
@@ -210,7 +210,7 @@ pub(super) fn whiten<R: Number>(zero: R, d: &[f64], x: &[f64], y: &mut [f64], at
     }
 }
 
-/// `y = D x` of order N in one pass; x starts N rows before y.
+/// Computes `y = D x` of order N in one pass; x starts N rows before y.
 #[inline(always)]
 fn whiten_by<R: Number, const N: usize>(zero: R, d: &[f64], x: &[f64], y: &mut [f64]) {
     let width = zero.lanes();
@@ -228,7 +228,7 @@ fn whiten_by<R: Number, const N: usize>(zero: R, d: &[f64], x: &[f64], y: &mut [
     }
 }
 
-/// `y = B x`, x from place `at` on.
+/// Computes `y = B x`, x from place `at` on.
 #[inline(always)]
 fn fir<R: Number>(zero: R, b: &[f64], x: &[f64], y: &mut [f64], at: usize) {
     let width = zero.lanes();

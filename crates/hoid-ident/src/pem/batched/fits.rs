@@ -14,9 +14,9 @@ use crate::{
     pem::fit_settings::FitSettings,
 };
 
-/// A fit to each record; `None` for what is not searched side by side: anything but Box-Jenkins
-/// models without C, with their initial states estimated, without constraints, priors or a robust
-/// loss; records of different lengths; registers that this processor has not.
+/// Fits each record; `None` for cases that are not searched in lanes: anything except Box-Jenkins models without C,
+/// with their initial states estimated, without constraints, priors or a robust loss; records of different lengths;
+/// registers that this processor does not have.
 pub(crate) fn fit_each(
     settings: &FitSettings,
     records: &[&Record],
@@ -67,7 +67,7 @@ pub(crate) fn fit_each(
     )
 }
 
-/// Poles proposed by the averages of each record.
+/// Returns the poles proposed by the averages of each record.
 fn poles_of_averages(
     constrained: &[Result<(ConstrainedCriterion<'_, '_>, SampleTime), &IdentError>],
     path: InstructionSet,

@@ -1,14 +1,12 @@
-//! The responses to the initial states of 1/F, of a record in each lane, and what is best reported
-//! of the states.
+//! The responses to the initial states of 1/F, for one record in each lane, and the least squares states.
 //!
-//! With h the impulse response of 1/F and g that of D/F, a state that enters w k samples after its
-//! first value adds `x_k h(t-k)` to w and takes `x_k g(t-k)` from the residuals. The columns
-//! `g(t-k)` over the residuals are made orthogonal by the factor of Cholesky of their products,
-//! twice, as once leaves what rounding makes of columns that are nearly parallel (Y. Yamamoto et
-//! al., *Electronic Trans. Numerical Analysis* 44 (2015) 306-326). As they are shifts of one, the
-//! first matrix takes nf products. The criterion alone has an orthonormal basis by Gram and Schmidt
-//! ([`crate::criterion::initial_state_responses`]), the same except for rounding; a lane whose
-//! columns depend on each other is left to it.
+//! With h the impulse response of 1/F and g that of D/F, a state that enters w k samples after its first value adds
+//! `x_k h(t-k)` to w and subtracts `x_k g(t-k)` from the residuals. The columns `g(t-k)` over the residuals are
+//! orthogonalised by the Cholesky factor of their products, twice, as once leaves the rounding errors of nearly
+//! parallel columns (Y. Yamamoto et al., *Electronic Trans. Numerical Analysis* 44 (2015) 306-326). As they are shifts
+//! of one signal, the first matrix takes nf products. The criterion alone has an orthonormal basis by Gram and Schmidt
+//! ([`crate::criterion::initial_state_responses`]), the same except for rounding; it is used for a lane with dependent
+//! columns.
 
 use hoid_lanes::Number;
 
@@ -18,30 +16,29 @@ use super::{
     signal_buffers::SignalBuffers,
 };
 
-/// Samples of an impulse response between two looks at whether it has died away.
+/// Number of samples of an impulse response between two tests of whether it has died away.
 const LOOK: usize = 128;
-/// Size of the last values of a response that has died away; it started with 1.
+/// Size of the last values of a response that has died away, relative to its first value of 1.
 const NOTHING: f64 = 1e-17;
-/// Share of a column's square that must not lie in the space of those before it.
+/// Least share of a column's square that is outside the space of the previous columns.
 const OWN: f64 = 1e-12;
 
-/// The responses: h and g are in [`SignalBuffers::h`] and [`SignalBuffers::g`] with nf zeros before
-/// and after, the orthogonal columns q in [`SignalBuffers::q`].
+/// The responses: h and g are in [`SignalBuffers::h`] and [`SignalBuffers::g`], preceded and followed by nf zeros, the
+/// orthogonal columns q in [`SignalBuffers::q`].
 pub(super) struct InitialStateResponses<R> {
     /// Rows of a column, from the first residual on.
     pub rows: usize,
     nd: usize,
     nf: usize,
-    /// Samples of h.
+    /// Number of samples of h.
     length: usize,
-    /// Factors by rows: that of the columns, each row over the diagonal element of its column, and
-    /// that of q.
+    /// Factors by rows: that of the columns, each row divided by the diagonal element of its column, and that of q.
     first: Vec<R>,
     second: Vec<R>,
 }
 
 impl<R: Number> InitialStateResponses<R> {
-    /// The entries of a given number of residuals.
+    /// Computes the responses of a given number of residuals.
     #[inline(always)]
     pub fn of(
         zero: R,
@@ -90,8 +87,7 @@ impl<R: Number> InitialStateResponses<R> {
         }
         for k in 1..nf {
             for i in k..nf {
-                // The row that enters in front, and the last that leaves, of the columns before
-                // these.
+                // The row that enters at the front, and the last that leaves, of the previous columns.
                 let entering = self.at(zero, signals, k - 1, -1) * self.at(zero, signals, i - 1, -1);
                 let last = rows as isize - 1;
                 let leaving = self.at(zero, signals, k - 1, last) * self.at(zero, signals, i - 1, last);
@@ -129,27 +125,27 @@ impl<R: Number> InitialStateResponses<R> {
         self.second = s;
     }
 
-    /// Column k as it was: g, k samples later.
+    /// Returns the original column k: g delayed by k samples.
     #[inline(always)]
     fn shift<'r>(&self, signals: &'r SignalBuffers, k: usize, width: usize) -> &'r [f64] {
         let first = self.nf + self.nd - k;
         &signals.g[first * width..(first + self.rows) * width]
     }
 
-    /// Its element in a row, which may be the one before the first.
+    /// Returns its element in a row, which may be the row before the first.
     #[inline(always)]
     fn at(&self, zero: R, signals: &SignalBuffers, k: usize, row: isize) -> R {
         zero.load(&signals.g[(self.nf + self.nd - k).wrapping_add_signed(row) * zero.lanes()..])
     }
 
-    /// Column k, orthogonal to those before it.
+    /// Returns column k, orthogonal to the previous ones.
     #[inline(always)]
     fn column<'r>(&self, signals: &'r SignalBuffers, k: usize, width: usize) -> &'r [f64] {
         &signals.q[k * self.rows * width..(k + 1) * self.rows * width]
     }
 
-    /// Takes the best initial states into w (in the place of r), v and eps: w starts in row
-    /// `regressed` of the span, the residuals in row `counted`.
+    /// Adds the best initial states to w (in place of r), v and eps: w starts in row `regressed` of the span, the
+    /// residuals in row `counted`.
     #[inline(always)]
     pub fn eliminate(&self, zero: R, signals: &mut SignalBuffers, regressed: usize, counted: usize) {
         let (width, nf) = (zero.lanes(), self.nf);
@@ -172,7 +168,7 @@ impl<R: Number> InitialStateResponses<R> {
             let q = &signals.q[k * self.rows * width..(k + 1) * self.rows * width];
             add_scaled(-x[k], q, &mut signals.eps[from..to]);
         }
-        // From the share of each q to that of the columns as they were.
+        // From the coefficients of each q to those of the original columns.
         for k in (0..nf).rev() {
             for j in 0..k {
                 x[j] = x[j] - self.first[k * nf + j] * x[k];
@@ -188,8 +184,8 @@ impl<R: Number> InitialStateResponses<R> {
         add_shifts(zero, &minus, &signals.h, nf, &mut signals.v[from..to]);
     }
 
-    /// Components of each column of psi in the space of the responses, a row for each column. eps,
-    /// the first, has none left.
+    /// Returns the components of each column of psi in the space of the responses, a row for each column. eps, the
+    /// first, has none left.
     #[inline(always)]
     pub fn components(&self, zero: R, columns: &Columns, signals: &SignalBuffers, counted: usize) -> Vec<R> {
         let (width, nf, count) = (zero.lanes(), self.nf, columns.count());
@@ -214,7 +210,7 @@ impl<R: Number> InitialStateResponses<R> {
         inside
     }
 
-    /// `y <- L^-1 y` with the second factor.
+    /// Computes `y <- L^-1 y` with the second factor.
     #[inline(always)]
     fn forward(&self, y: &mut [R]) {
         for k in 0..self.nf {
@@ -226,7 +222,7 @@ impl<R: Number> InitialStateResponses<R> {
     }
 }
 
-/// The factor of Cholesky in the place of the lower triangle of s, and the lanes without one.
+/// Computes the Cholesky factor in place of the lower triangle of s, and marks the lanes without one.
 #[inline(always)]
 fn factor<R: Number>(zero: R, nf: usize, s: &mut [R], dependent: &mut [bool]) {
     for k in 0..nf {
@@ -251,7 +247,7 @@ fn factor<R: Number>(zero: R, nf: usize, s: &mut [R], dependent: &mut [bool]) {
     }
 }
 
-/// `y(t) += sum_k x_k s(t-k)`; row `at` of s is that of t = 0.
+/// Computes `y(t) += sum_k x_k s(t-k)`; row `at` of s is that of t = 0.
 #[inline(always)]
 fn add_shifts<R: Number>(zero: R, x: &[R], s: &[f64], at: usize, y: &mut [f64]) {
     let width = zero.lanes();
@@ -271,8 +267,8 @@ fn add_shifts<R: Number>(zero: R, x: &[R], s: &[f64], at: usize, y: &mut [f64]) 
     }
 }
 
-/// Impulse response of 1/F until it has died away in all lanes or `longest` is reached, with nf
-/// zeros before and after; zero in a lane in which it has died away before. Returns its length.
+/// Computes the impulse response of 1/F until it has died away in all lanes or its length is `longest`, preceded and
+/// followed by nf zeros; zero in a lane after it has died away there. Returns its length.
 #[inline(always)]
 fn impulse_response<R: Number>(zero: R, f: &[f64], longest: usize, h: &mut [f64]) -> usize {
     let (width, nf) = (zero.lanes(), f.len() / zero.lanes());

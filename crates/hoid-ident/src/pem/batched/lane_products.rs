@@ -1,8 +1,8 @@
-//! Products and sums of two signals with a record in each lane.
+//! Products and sums of two signals with one record in each lane.
 
 use hoid_lanes::Number;
 
-/// `x' y` for four y.
+/// Computes `x' y` for four y.
 #[inline(always)]
 pub(super) fn four_products<R: Number>(zero: R, x: &[f64], [a, b, c, d]: [&[f64]; 4]) -> [R; 4] {
     let width = zero.lanes();
@@ -19,7 +19,7 @@ pub(super) fn four_products<R: Number>(zero: R, x: &[f64], [a, b, c, d]: [&[f64]
     [sums.0, sums.1, sums.2, sums.3]
 }
 
-/// `x' y` for two y.
+/// Computes `x' y` for two y.
 #[inline(always)]
 pub(super) fn two_products<R: Number>(zero: R, x: &[f64], [a, b]: [&[f64]; 2]) -> [R; 2] {
     let width = zero.lanes();
@@ -36,7 +36,7 @@ pub(super) fn two_products<R: Number>(zero: R, x: &[f64], [a, b]: [&[f64]; 2]) -
     [sums.0, sums.1]
 }
 
-/// `y += k x`.
+/// Computes `y += k x`.
 #[inline(always)]
 pub(super) fn add_scaled<R: Number>(k: R, x: &[f64], y: &mut [f64]) {
     let width = k.lanes();

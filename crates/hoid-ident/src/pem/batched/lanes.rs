@@ -1,5 +1,4 @@
-//! The searches in the lanes: each record has a lane until its search has ended, then the next
-//! takes its place.
+//! The searches in the lanes: each record has a lane until its search has ended, then the next record uses it.
 
 use std::cell::Cell;
 
@@ -13,8 +12,7 @@ use crate::{
     optimize::{Linearisation, Objective},
 };
 
-/// Runs all searches to their end, side by side; the records are of one length and the orders the
-/// same.
+/// Runs all searches to their end in parallel lanes; the records have equal length and the same orders.
 pub(super) fn search(open: Vec<&mut impl LinearisationClient>, path: InstructionSet, workspace: &mut Workspace) {
     let first = open.first().map(|client| client.criterion());
     let lanes = first.and_then(|c| Some(Lanes::new(c.orders, c.first, c.data.first()?.u.len(), path.lanes()?)));
@@ -23,7 +21,7 @@ pub(super) fn search(open: Vec<&mut impl LinearisationClient>, path: Instruction
     }
 }
 
-/// The records in the lanes, and what a pass over them needs.
+/// The records in the lanes, and the data of a pass over them.
 pub(super) struct Lanes {
     orders: Orders,
     first: usize,
@@ -43,11 +41,11 @@ pub(super) struct Memory {
 }
 
 thread_local! {
-    /// The memory that the last fits on this thread have left: fresh pages cost as much as a fit.
+    /// The memory of the last fits on this thread: new pages cost as much as a fit.
     static LEFT: Cell<Option<Memory>> = const { Cell::new(None) };
 }
 
-/// Largest number of numbers of a signal that are kept.
+/// Largest number of values of a signal that are kept.
 const KEPT: usize = 1 << 18;
 
 impl Drop for Lanes {
@@ -119,7 +117,7 @@ impl Lanes {
         }
     }
 
-    /// The criterion of all lanes.
+    /// Evaluates the criterion of all lanes.
     pub fn pass(&mut self, path: InstructionSet) {
         path.with_lanes(Pass {
             orders: self.orders,
@@ -142,12 +140,12 @@ impl Lanes {
         }
     }
 
-    /// Result of a pass in a lane.
+    /// Returns the result of a pass in a lane.
     pub fn linearisation(&self, lane: usize) -> Linearisation {
         let o = &self.orders;
         let p = o.parameters();
         let product = |i: usize, j: usize| self.memory.sums.products[(i * (p + 1) + j) * self.width + lane];
-        // psi holds x_b, -v and -x_f.
+        // psi contains x_b, -v and -x_f.
         let sign = |i: usize| if i < o.nb { 1.0 } else { -1.0 };
         Linearisation {
             sum_of_squares: product(0, 0),

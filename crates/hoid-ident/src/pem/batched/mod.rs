@@ -1,16 +1,15 @@
-//! Fits of one model to each of many records, side by side.
+//! Fits of one model to each of many records, in parallel lanes.
 //!
-//! A search is a chain of passes over its record, each a chain of filters that wait for their own
-//! last value ([`crate::criterion`]). Searches of different records wait for nothing of each other:
-//! each has a lane of the registers, and when it has ended the next record takes its place; the
-//! search on the averaged records ([`crate::initial_guess::continuation`]) goes first in the same
-//! way. What needs more than the criterion (the border of stability, starts where the averages do
-//! not suffice, dependent responses to the initial states) is done alone.
+//! A search is a chain of passes over its record, each a chain of recursive filters ([`crate::criterion`]). Searches of
+//! different records are independent: each has a lane of the registers, and when it has ended the next record uses the
+//! lane; the search on the averaged records ([`crate::initial_guess::continuation`]) is done first in the same way.
+//! Cases that need more than the criterion (the border of stability, starts if the averages do not suffice, dependent
+//! responses to the initial states) are computed one by one.
 //!
 //! | module | contents |
 //! |---|---|
 //! | `fits` | the fit of each record |
-//! | `lanes` | which record is in which lane, and where it is to be linearised |
+//! | `lanes` | assignment of records to lanes, and the points of linearisation |
 //! | `pass` | the criterion and its derivatives for the records in all lanes |
 //! | `initial_state_responses` | the responses to the initial states, and the states of least squares |
 //! | `columns` | products of eps and the columns of psi |

@@ -6,7 +6,6 @@ pub(super) struct NormalEquations {
     /// Products of eps and the columns of psi without their signs, `[eps, x_b.., v.., x_f..]` by
     /// rows, the initial states projected out.
     pub products: Vec<f64>,
-    /// Lanes whose responses to the initial states are not independent: their products are not
-    /// valid.
+    /// Lanes whose responses to the initial states are linearly dependent: their products are not valid.
     pub dependent: Vec<bool>,
 }

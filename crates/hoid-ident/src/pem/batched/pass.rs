@@ -1,19 +1,18 @@
-//! The criterion and its derivatives for several records at once, each with a theta of its own.
+//! The criterion and its derivatives for several records at once, each with its own theta.
 //!
 //! The criterion ([`crate::criterion`]) of one Box-Jenkins model without C, with its initial states
 //! eliminated, for a record in each lane:
 //!
 //! `s = e(t-nk)/F`,  `w = B s`,  `v = u - w`,  `eps = D v`,  `x_b = D s`,  `r = w/F`,  `x_f = D r`
 //!
-//! The columns of psi are shifts of `x_b`, `-v` and `-x_f`. A recursion over t waits for its own
-//! last value, and eight records fill the waiting time. All signals of some samples are made and
-//! multiplied before the next samples are started, so that they stay in the nearest memory; only
-//! the record itself is read from further away. The first of these spans reaches as far as the free
-//! responses do, because the initial states must be known before w is filtered again.
+//! The columns of psi are shifts of `x_b`, `-v` and `-x_f`. A recursion over t has a latency per sample, which eight
+//! records in parallel hide. All signals of a span of samples are computed and multiplied before the next span, so that
+//! they remain in the first-level cache; only the record itself is read from further away. The first of these spans
+//! extends as far as the free responses do, because the initial states must be known before w is filtered again.
 //!
-//! Every operation acts on each lane alone, and what one lane needs longer than another is zero
-//! there: the bits of a lane depend neither on the registers nor on its neighbours. The sums run
-//! over time in another order than those of the criterion alone: they differ from it by rounding.
+//! Every operation acts on each lane separately, and samples that one lane needs longer than another are zero in the
+//! latter: the result of a lane is bitwise independent of the registers and of the other lanes. The sums over time have
+//! another order than those of the criterion alone: they differ from it by rounding.
 
 use hoid_lanes::LaneTask;
 use hoid_lanes::Number;
@@ -27,7 +26,7 @@ use super::{
     signal_buffers::SignalBuffers,
 };
 
-/// Samples that are made and multiplied at a time.
+/// Number of samples that are computed and multiplied at a time.
 const SPAN: usize = 64;
 
 /// One pass.
@@ -40,7 +39,7 @@ pub(super) struct Pass<'a> {
     /// Input and output, by rows.
     pub e: &'a [f64],
     pub u: &'a [f64],
-    /// theta, a row for each parameter.
+    /// theta, one row for each parameter.
     pub theta: &'a [f64],
     pub signals: &'a mut SignalBuffers,
     pub sums: &'a mut NormalEquations,
@@ -109,8 +108,7 @@ impl LaneTask for Pass<'_> {
                 inside = states.components(zero, &columns, signals, counted);
                 columns.add_row(zero, signals, counted, 1.0, products);
             }
-            // In spans of the same samples however long the first is: its length is that of the
-            // slowest lane.
+            // In spans of the same samples whatever the length of the first: its length is that of the slowest lane.
             let mut done = counted;
             while done < history + count {
                 let next = if done == counted && from == begin {

@@ -1,11 +1,11 @@
-//! Rows of numbers, one for each lane, that start at the border of a line of the nearest memory.
+//! Rows of numbers, one number for each lane, aligned to cache lines.
 
 use std::ops::{Deref, DerefMut};
 
-/// Bytes of a line.
+/// Bytes of a cache line.
 const LINE: usize = 64;
 
-/// A row for each sample. A row that lies across two lines takes two reads.
+/// A row for each sample. A row across two cache lines takes two reads.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
     all: Vec<f64>,
@@ -14,7 +14,7 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    /// Room for a given number of numbers, whose values are whatever was there.
+    /// Allocates a given number of values, which are not initialised.
     pub fn make_room(&mut self, count: usize) {
         let spare = LINE / size_of::<f64>();
         if self.all.len() < count + spare {

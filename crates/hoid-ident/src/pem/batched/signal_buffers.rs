@@ -1,9 +1,9 @@
-//! The signals of a span of samples, with the end of the span before in front.
+//! The signals of a span of samples, preceded by the end of the previous span.
 
 use super::rows::Rows;
 
-/// Signals of a span, a row for each sample and in it a number for each lane. The rows before the
-/// first hold the end of the span before.
+/// Signals of a span, a row for each sample with a number for each lane. The rows before the first contain the end of
+/// the previous span.
 #[derive(Debug, Default)]
 pub(super) struct SignalBuffers {
     pub s: Rows,
@@ -20,7 +20,7 @@ pub(super) struct SignalBuffers {
 }
 
 impl SignalBuffers {
-    /// Makes room for spans of a given number of samples, with zeros before the first.
+    /// Allocates spans of a given number of samples, with zeros before the first.
     pub fn begin(&mut self, history: usize, longest: usize, width: usize) {
         for signal in [
             &mut self.s,
@@ -35,7 +35,7 @@ impl SignalBuffers {
         }
     }
 
-    /// Keeps the end of a span for the next.
+    /// Copies the end of a span to the front for the next.
     pub fn carry(&mut self, history: usize, count: usize, width: usize) {
         for signal in [&mut self.s, &mut self.v, &mut self.x_b, &mut self.r, &mut self.x_f] {
             signal.copy_within(count * width..(count + history) * width, 0);

@@ -1,8 +1,8 @@
-//! Quotients of polynomials after a delay, while a text is read.
+//! Quotients of polynomials with a delay, during parsing.
 
 use crate::polynomial;
 
-/// `num/den e^{-s tau}` while it is read: not yet proper, its delay not yet positive.
+/// `num/den e^{-s tau}` during parsing: not yet proper, and its delay not yet positive.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Ratio {
     pub num: Vec<f64>,
@@ -39,7 +39,7 @@ impl Ratio {
         }
     }
 
-    /// `self + sign other`; none if their delays differ.
+    /// Returns `self + sign other`; `None` if their delays differ.
     pub fn plus(&self, other: &Self, sign: f64) -> Option<Self> {
         if self.delay_s != other.delay_s {
             return None;

@@ -1,13 +1,13 @@
-//! Reads an expression in s by descending through its grammar ([`super`]).
+//! Recursive descent parser of an expression in s ([`super`]).
 
 use super::{coefficients::EXAMPLES, ratio::Ratio};
 
-/// Degree beyond which a denominator is a typing error, and beyond which its roots are rounding.
+/// Degree above which a denominator is a typing error, and its roots are dominated by rounding.
 const HIGHEST_DEGREE: usize = 50;
-/// Parentheses inside of parentheses.
+/// Largest depth of nested parentheses.
 const DEEPEST: usize = 50;
 
-/// The characters that are left, and how deep in parentheses they stand.
+/// The remaining characters, and the depth of parentheses.
 pub(super) struct Reader {
     signs: Vec<char>,
     at: usize,
@@ -16,7 +16,7 @@ pub(super) struct Reader {
 
 impl Reader {
     pub fn new(text: &str) -> Self {
-        // Typographic signs come with text that is copied from papers.
+        // Text copied from papers contains typographic signs.
         let plain = |sign| match sign {
             '\u{2212}' | '\u{2013}' => '-',
             '\u{b7}' | '\u{d7}' | '\u{22c5}' => '*',
@@ -30,7 +30,7 @@ impl Reader {
         }
     }
 
-    /// The next sign that is not a blank, which is not taken.
+    /// Returns the next character that is not a blank, without consuming it.
     fn next(&mut self) -> Option<char> {
         while self.signs.get(self.at).is_some_and(|sign| sign.is_whitespace()) {
             self.at += 1;
@@ -201,7 +201,7 @@ impl Reader {
         Ok(inside)
     }
 
-    /// `exp(-0.1s)` or `e^(-0.1s)`.
+    /// Parses `exp(-0.1s)` or `e^(-0.1s)`.
     fn delay(&mut self) -> Result<Ratio, String> {
         const EXPECTED: &str = "exp(-0.1s), a delay in s";
         let begin = self.at;
@@ -235,7 +235,7 @@ impl Reader {
         if signs.get(end) == Some(&'.') {
             end += 1 + digits(end + 1);
         }
-        // An e that no digits follow is the one of a delay.
+        // An e without digits after it belongs to a delay.
         if matches!(signs.get(end), Some('e' | 'E')) {
             let sign = usize::from(matches!(signs.get(end + 1), Some('+' | '-')));
             let exponent = digits((end + 1 + sign).min(signs.len()));
@@ -253,7 +253,7 @@ impl Reader {
         }
     }
 
-    /// The result of a step must be finite and of a reasonable degree.
+    /// Checks that the result of a step is finite and of a reasonable degree.
     fn checked(&mut self, ratio: Ratio, at: usize) -> Result<Ratio, String> {
         if ratio.num.len().max(ratio.den.len()) > HIGHEST_DEGREE + 1 {
             self.at = at;
