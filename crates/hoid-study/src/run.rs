@@ -1,9 +1,9 @@
-//! Running a study: blocks over threads, parts on disk, resume.
+//! Execution of a study: blocks over threads, parts on disk, resume.
 //!
-//! A block is written as one file a table when it is finished, traces first, next to its place and then renamed, and at
-//! last its seal (`seal`). A study that was killed therefore has whole blocks and nothing else, and continues with the
-//! blocks that have no seal or do not agree with it. When all blocks are there, the parts are joined in the order of
-//! the plan; which thread or machine made a part does not show.
+//! A finished block is written as one file per table, traces first, each next to its place and then renamed, and
+//! finally its seal (`seal`). A killed study therefore has complete blocks only, and continues with the blocks that
+//! have no seal or do not agree with it. When all blocks are complete, the parts are joined in the order of the plan;
+//! the result does not depend on the thread or machine that computed a part.
 
 use std::{
     path::{Path, PathBuf},
@@ -25,45 +25,45 @@ use crate::{
     shard::Shard,
 };
 
-/// How a study is run.
+/// Options of running a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RunOptions {
-    /// A shard of the study; none for all.
+    /// Shard of the study; none for all.
     pub shard: Option<Shard>,
-    /// Threads; none for one a core.
+    /// Number of threads; none for one per core.
     pub jobs: Option<usize>,
-    /// Continue with a study that was stopped.
+    /// Continue a stopped study.
     pub resume: bool,
     /// Write the tables as CSV instead of Parquet.
     pub csv: bool,
 }
 
-/// How far a study is.
+/// Progress of a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
-    /// Estimates that are done, those of an earlier run included.
+    /// Completed estimates, including those of an earlier run.
     pub done: u64,
-    /// Estimates in all.
+    /// Total number of estimates.
     pub total: u64,
-    /// Estimates that an earlier run had done.
+    /// Estimates completed by an earlier run.
     pub known: u64,
 }
 
 /// Result of a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Outcome {
-    /// True when all blocks of the study (or of its shard) are there.
+    /// True if all blocks of the study (or of its shard) are complete.
     pub finished: bool,
     /// Estimates made by this run.
     pub estimates: u64,
-    /// The tables; empty for a shard, which waits to be merged.
+    /// The tables; empty for a shard, which is to be merged.
     pub tables: Vec<PathBuf>,
     /// Warnings about the directory: damaged blocks that were computed again.
     pub notes: Vec<String>,
 }
 
-/// Runs a study into a directory. `progress` is called from any thread after each estimate; `go_on`
-/// is called before each estimate, and what it stops can be resumed.
+/// Runs a study in a directory. `progress` is called from any thread after each estimate; `go_on`
+/// is called before each estimate, and a study that it stops can be resumed.
 ///
 /// # Errors
 /// [`StudyError::Occupied`] when the directory holds a study without `resume`, [`StudyError::OtherStudy`] when it is
