@@ -66,9 +66,9 @@ pub struct Outcome {
 /// is called before each estimate, and a study that it stops can be resumed.
 ///
 /// # Errors
-/// [`StudyError::Occupied`] when the directory holds a study without `resume`, [`StudyError::OtherStudy`] when it is
-/// another one, [`StudyError::SourceThere`] if there is another plan, [`StudyError::Io`] when a file cannot be written
-/// or another process works on the directory.
+/// [`StudyError::Occupied`] if the directory holds a study and `resume` is not set, [`StudyError::OtherStudy`] if it is
+/// a different one, [`StudyError::SourceThere`] if there is another plan, [`StudyError::Io`] if a file cannot be
+/// written or another process uses the directory.
 pub fn run(
     plan: &Plan,
     directory: &Path,
@@ -106,7 +106,7 @@ pub fn run(
         let done = done.fetch_add(n, Ordering::Relaxed) + n;
         progress(Progress { done, total, known });
     };
-    // Once one block was stopped, the next do not start with simulating their runs.
+    // After a block has been stopped, the next ones do not start to simulate their runs.
     let stopped = AtomicBool::new(false);
     let one = |block: &Block| -> Result<bool, StudyError> {
         if stopped.load(Ordering::Relaxed) {
@@ -157,7 +157,7 @@ pub(crate) fn write_tables(
     write_block(directory, plan_sha256, block.index, &all)
 }
 
-/// Blocks that are whole, those that are to be computed, and why some of these are damaged.
+/// Complete blocks, those to be computed, and the reasons why some of these are damaged.
 fn sorted(directory: &Path, plan_sha256: &str, mine: &[Block]) -> (Vec<Block>, Vec<Block>, Vec<(u64, String)>) {
     let (mut there, mut open, mut damaged) = (Vec::new(), Vec::new(), Vec::new());
     for block in mine {
@@ -173,7 +173,7 @@ fn sorted(directory: &Path, plan_sha256: &str, mine: &[Block]) -> (Vec<Block>, V
     (there, open, damaged)
 }
 
-/// Makes the directory ready, or finds what it holds.
+/// Prepares the directory, or reads what it holds.
 fn prepare(plan: &Plan, directory: &Path, manifest: &RunRecord, resume: bool) -> Result<RunRecord, StudyError> {
     let shown = || directory.display().to_string();
     if let Some(found) = RunRecord::read(directory)? {
@@ -199,8 +199,8 @@ fn prepare(plan: &Plan, directory: &Path, manifest: &RunRecord, resume: bool) ->
     Ok(manifest.clone())
 }
 
-/// Makes a directory that is known ready to continue: output in progress is removed, and what an
-/// earlier program left without seals is named as sealed from here on, for it has no block yet.
+/// Prepares a directory for continuation: partial output is removed, and one that an earlier
+/// version left without seals is marked as sealed, since it has no block yet.
 pub(crate) fn ready(directory: &Path, found: &RunRecord, record: &RunRecord) -> Result<(), StudyError> {
     if found.complete {
         return remove_parts(directory);
@@ -212,7 +212,7 @@ pub(crate) fn ready(directory: &Path, found: &RunRecord, record: &RunRecord) -> 
     Ok(())
 }
 
-/// Does the open blocks on `jobs` threads, or one a core; true when each was finished.
+/// Runs the open blocks on `jobs` threads, or one per core; true if all were finished.
 pub(crate) fn on_threads<T: Sync>(
     jobs: Option<usize>,
     open: &[T],
