@@ -128,7 +128,7 @@ fn bad_plans_name_line_and_remedy() {
     }
 }
 
-/// Options of an analysis: as in the registry, checked before anything runs.
+/// Options of analyses run as by `hoid identify`: as in the registry, checked before anything runs.
 #[test]
 fn options_of_an_operator_are_checked() {
     let of = |text: &str| {
