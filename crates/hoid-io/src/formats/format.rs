@@ -20,11 +20,11 @@ pub(crate) struct Format {
     pub(crate) name: &'static str,
     /// The extensions in lower case, the default one first.
     pub(super) endings: &'static [&'static str],
-    /// How its bytes are read.
+    /// Reader of the format.
     pub(crate) reading: Reading,
-    /// How a table of results is written.
+    /// Writer of a table of results.
     pub(crate) writing: Writing,
-    /// How a record is written, if not as a table of its channels.
+    /// Writer of a record, if it is not written as a table of its channels.
     pub(crate) record: Option<RecordWriter>,
 }
 
@@ -53,7 +53,7 @@ pub(crate) enum Reading {
     Arrays(ArraysReader),
 }
 
-/// How the format takes columns.
+/// Kind of writer of the format.
 pub(crate) enum Writing {
     /// Row by row, in bounded memory.
     Rows(RowsStart),

@@ -1,8 +1,8 @@
-//! Contents of a file of named arrays: paths, each with a value.
+//! Contents of a file of named arrays: paths with values.
 
 use super::array::Array;
 
-/// How the lines of a matrix are named.
+/// Notation of the lines of a matrix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Indexing {
     Matlab,
@@ -69,7 +69,7 @@ pub(crate) struct Contents {
     pub(crate) comments: Vec<String>,
     /// Notes on reading.
     pub(crate) notes: Vec<String>,
-    /// How the lines of a matrix are named.
+    /// Notation of the lines of a matrix.
     pub(crate) indexing: Indexing,
     /// True if each structure holds its own times on a common clock, so that its columns can be
     /// aligned with those of another.
