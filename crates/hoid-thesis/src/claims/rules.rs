@@ -3,15 +3,15 @@
 //! 1. **A cell.** A claim is tested in each cell (a scenario, an estimator, a parameter) to which
 //!    it applies, with the measured value x, its Monte Carlo error s and a margin of 2 s.
 //!    - *Comparison* (larger, smaller, no larger than): the cell passes if x is beyond the limit by
-//!    more than the margin, fails if it is on the other side by more, and is undecided within the
-//!    margin.
+//!      more than the margin, fails if it is on the other side by more, and is undecided within the
+//!      margin.
 //!    - *Number* (around 50 %, 10 times): the cell passes if x lies within the range of the wording, widened by the
-//!    margin, and fails otherwise. It is undecided if it would pass with a margin of more than half the range: such an
-//!    x carries no information about the number. If the number is the size of an effect (so many times slower, so much
-//!    less error), an x beyond the range on the side of the larger effect *exceeds* the claim: the statement is true,
-//!    and the effect is larger.
+//!      margin, and fails otherwise. It is undecided if it would pass with a margin of more than half the range: such
+//!      an x carries no information about the number. If the number is the size of an effect (so many times slower, so
+//!      much less error), an x beyond the range on the side of the larger effect *exceeds* the claim: the statement is
+//!      true, and the effect is larger.
 //!    - If less than half of the replications give a value (models that cannot be converted) the
-//!    cell is undecided.
+//!      cell is undecided.
 //! 2. **A part** of a claim (same figure of merit, same test) holds if 90 % of its decided cells
 //!    pass. It holds, and more so, if 90 % pass or exceed the claim and fewer than 90 % pass. It
 //!    holds in part if 50 % pass or exceed, and does not hold otherwise. If less than half of its
