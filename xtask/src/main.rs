@@ -14,7 +14,7 @@
 //! | `cargo xtask ffi [--dev] [--out DIR]` | the libraries for C with header, pkg-config file, CMake package and examples, into `target/ffi/`; `--header` makes the header again, `--check` builds the examples by them (module `ffi`) |
 //! | `cargo xtask miri [ARGUMENT...]` | the boundary to C under Miri, arguments for its tests (module `miri`) |
 //! | `cargo xtask places [--dry or --dev]` | one run through every place in which hoid runs, as the table of the page "In your simulator" (module `places`) |
-//! | `cargo xtask bench [OPTION...]` | the tasks of `research/notes/speed-peers.md` beside the peers that are installed, or how cost grows (module `bench`) |
+//! | `cargo xtask bench [OPTION...]` | the tasks of `research/notes/speed-peers.md` next to the peers that are installed, or how cost grows (module `bench`) |
 //! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults`, `faults-clean`, `tracker-faults`, `mutations`, `bombs`, `hostile`, `kills`, `full-disks`, `latency`, `lab`, `lab-hour`, `lab-real`, `challenge`, `challenge-people` |
 //!
 //! Almost only the standard library is used: a task must start at once on a new machine.

@@ -42,7 +42,7 @@ impl Rows {
     }
 
     /// Marks the rows as a time series, of which some but not the last may be omitted for lack of space.
-    pub fn as_time_series(self) -> Self {
+    pub fn into_time_series(self) -> Self {
         Self { course: true, ..self }
     }
 
@@ -172,7 +172,7 @@ mod tests {
             "zeta_nm",
             "tau_e (s)",
         ];
-        let mut course = Rows::under(&[&["t in s"], names.as_slice()].concat()).as_time_series();
+        let mut course = Rows::under(&[&["t in s"], names.as_slice()].concat()).into_time_series();
         for t in 1..9 {
             let values = names.iter().map(|_| "0.0914 ± 0.0062".to_owned());
             course.add_row(std::iter::once(format!("{t}.00")).chain(values));

@@ -153,7 +153,7 @@ impl HeldStates {
 /// The held system has the numerator `d + (d f1 + b0_d) q^-1 + (d f2 + b1_d) q^-2`.
 ///
 /// # Errors
-/// As [`SecondOrder::hold`]; [`ModelError::TransferFunction`] when the leading coefficient of `den`
+/// As [`SecondOrder::zoh`]; [`ModelError::TransferFunction`] when the leading coefficient of `den`
 /// is zero.
 pub fn hold_biproper(
     num: [f64; 3],

@@ -1,4 +1,4 @@
-//! What does a fault of a recording do to a result, and does the result say so? The numbers of the
+//! What does a fault of a recording do to a result, and does the result report it? The numbers of the
 //! page `research/notes/faults.md`.
 //!
 //! `cargo xtask slow faults [--part N] [--clean N] [--only METHOD] [--rows FILE] [--program FILE] [--seed N]`: all

@@ -223,7 +223,7 @@ class BatchSettings(TypedDict, total=False):
     # fewer than five records. For operator.
     run_to_run: float | None
 
-    # Inputs beside the error, and what they are to the person: r=feedforward (a target that is
+    # Inputs except the error, and what they are to the person: r=feedforward (a target that is
     # seen; r=feedforward:0.5 with 0.5 s of its future), motion, output; one form alone as
     # r=feedforward/derivative. For operator.
     role: Sequence[str] | None
@@ -430,7 +430,7 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
             What a person's gain varies by from run to run, as a part of it: in the error bars
             of fewer than five records. For operator.
         role : Sequence[str]
-            Inputs beside the error, and what they are to the person: r=feedforward (a target
+            Inputs except the error, and what they are to the person: r=feedforward (a target
             that is seen; r=feedforward:0.5 with 0.5 s of its future), motion, output; one form
             alone as r=feedforward/derivative. For operator.
         individual : Sequence[str]

@@ -245,7 +245,7 @@ def identify_operator(
 
 
 def _roles(record: Record, inputs: Sequence[str] | None, roles: Mapping[str, str] | None) -> list[str]:
-    """The inputs beside the error, each with its role, as the library reads them.
+    """The inputs in addition to the error, each with its role, as the library reads them.
 
     >>> _roles(record, ["e", "r"], {"r": "feedforward:0.5"})
     ['r=feedforward:0.5']

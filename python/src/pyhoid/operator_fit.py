@@ -253,7 +253,7 @@ class OperatorFit(Model, Result):
         """The responses to several inputs, that to the error first; empty for one input.
 
         Each has input, role, form, parameters (name, value, standard_error, interval, determined, ...)
-        and response (gain and phase with errors over frequency). Those beside the error have preview (s),
+        and response (gain and phase with errors over frequency). Those in addition to the error have preview (s),
         p_value (of the best form by chance) and forms (those that were compared; form None is no
         response), and form None where no response was found.
 

@@ -36,6 +36,8 @@ pub trait BatchAnswer: Answers + Serialize + DeserializeOwned {
 
 /// Any result of a batch fit.
 #[derive(Debug, Clone)]
+// A result is read once, and not kept in numbers.
+#[allow(clippy::large_enum_variant)]
 pub enum BatchResult {
     /// The operator of a person, its form by evidence.
     Operator(Identified),

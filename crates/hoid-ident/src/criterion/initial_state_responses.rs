@@ -211,7 +211,7 @@ impl InitialStateResponses {
                     .iter()
                     .all(|x| x.abs() < DEAD)
         };
-        // A basis vector has the size one, an impulse response begins with one.
+        // A basis vector has the size one, an impulse response starts with one.
         self.h.iter().all(|h| h.len() < rows) && self.basis().all(dead)
     }
 

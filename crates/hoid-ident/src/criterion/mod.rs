@@ -48,7 +48,7 @@
 //! | `initial_state` | what is assumed about the time before a record |
 //! | `polynomials` | A, B, C, D and F as parts of theta |
 //! | `further_input` | a further input: orders, values, signals |
-//! | `further` | inputs beside e |
+//! | `further` | inputs in addition to e |
 //! | `signals`, `whitening` | the signals of a record at one theta |
 //! | `initial_state_responses` | what a record does not report about its past, eliminated exactly |
 //! | `stationary_noise` | the noise before the record, when it was stationary |

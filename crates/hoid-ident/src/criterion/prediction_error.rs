@@ -38,7 +38,7 @@ pub(crate) struct Criterion<'a> {
     /// Square roots of the weights of the residuals of each record, from the first residual on;
     /// none if all count the same.
     pub weights: Option<&'a [Vec<f64>]>,
-    /// Inputs beside e, each with its own B, F and nk; their coefficients follow those of
+    /// Inputs in addition to e, each with its own B, F and nk; their coefficients follow those of
     /// [`Self::orders`] in theta.
     pub further: Vec<FurtherInput<'a>>,
 }

@@ -2,7 +2,7 @@
 //!
 //! A person who sees the target follows it also without an error: what a fit of one input finds is then neither their
 //! response to the error nor the loop that they close ([`crate::family::SeenChannel`]). Each channel with the name of a
-//! target is tried as a second input, in the forms of a gain and of its derivatives, beside the form of the fit; the
+//! target is tried as a second input, in the forms of a gain and of its derivatives, with the form of the fit; the
 //! doubt is raised where the best of them explains far more than chance.
 
 use hoid_model::{Finding, Form, Record};
@@ -39,7 +39,7 @@ pub fn of_family(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[Record
             forms: vec![Form::Gain, Form::Derivative, Form::DerivativeLead],
             ..SeenChannel::new(name, ChannelRole::Feedforward)
         };
-        // What cannot be an input, as a channel that does not move, says nothing against the fit.
+        // A channel that cannot be an input, because it does not move, is no evidence against the fit.
         let (found, apart) = again.responds_to(records, channel).ok()?;
         (found.p_value < BY_CHANCE[usize::from(!apart)]).then(|| {
             Finding::doubt(

@@ -67,7 +67,7 @@ pub(super) struct Chosen<'p, 'a> {
     /// All forms that were compared.
     pub forms: Vec<FormFigures>,
     pub prediction: &'p Prediction<'a>,
-    /// The channels beside the error, as they were compared.
+    /// The channels in addition to the error, as they were compared.
     pub channels: Vec<ChannelFit>,
     /// The records, detrended.
     pub records: &'p [Record],
@@ -214,7 +214,7 @@ impl<'a> Chosen<'_, 'a> {
             return None;
         }
         let data = match (&self.lines.channels, self.lines.describing) {
-            (Some(at), _) => Lines::Channels(at.criterion(fit.layout().form, &self.lines.in_form)),
+            (Some(at), _) => Lines::Channels(Box::new(at.criterion(fit.layout().form, &self.lines.in_form))),
             (None, Some(describing)) => Lines::Response(LineData::new(describing)),
             (None, None) => return None,
         };

@@ -1,7 +1,7 @@
 //! Several inputs at the lines of what excites the loop: their responses without a noise model.
 //!
 //! Where a target r and a disturbance d have lines of their own, the coefficients of a run over that of the exciting
-//! signal, `u_k = U_k/X_k` and `x_ik = X_ik/X_k`, are the same in all runs but for the remnant. Their means obey
+//! signal, `u_k = U_k/X_k` and `x_ik = X_ik/X_k`, are the same in all runs except for the remnant. Their means obey
 //!
 //! `mean u = sum_i Y_i(j omega) mean x_i + n`
 //!
@@ -39,7 +39,7 @@ use crate::{
 
 /// Starts from which the search runs to its end.
 const SEARCHES: usize = 4;
-/// Bins off the lines from which the remnant at a line is taken.
+/// Bins between the lines from which the remnant at a line is taken.
 const NEIGHBOURS: usize = 8;
 /// Rounds in which the variances are brought up to date.
 const ROUNDS: usize = 2;
@@ -438,7 +438,7 @@ impl ChannelCriterion {
         self
     }
 
-    /// Points from which searches begin.
+    /// Points from which searches start.
     fn grid(&self) -> Vec<Vec<f64>> {
         let (form, muscles) = (self.layout.form, self.layout.neuromuscular);
         let of_operator = &self.limits[..self.layout.operator_elements()];

@@ -85,6 +85,16 @@ pub(super) struct Seen<'s> {
     whole: Vec<Record>,
 }
 
+/// The forms of the further inputs at the lines.
+pub(super) struct Compared<'a> {
+    /// The forms that were compared.
+    pub fits: Vec<ChannelFit>,
+    /// The inputs with a response, with starts for the search.
+    pub channels: Vec<Channel<'a>>,
+    /// The same as fits at the lines have them.
+    pub in_form: Vec<InForm>,
+}
+
 impl<'s> Seen<'s> {
     /// The channels, and the records as far as all of them have samples.
     ///
@@ -286,7 +296,7 @@ impl<'s> Seen<'s> {
         at: &AtChannelLines<'_>,
         operators: &[Form],
         begun: Vec<Vec<Channel<'a>>>,
-    ) -> Result<(Vec<ChannelFit>, Vec<Channel<'a>>, Vec<InForm>), IdentError> {
+    ) -> Result<Compared<'a>, IdentError> {
         let best_of = |channels: &[InForm]| {
             let fits = operators
                 .iter()
@@ -354,7 +364,11 @@ impl<'s> Seen<'s> {
                 ..begun.clone()
             });
         }
-        Ok((compared, channels, in_use))
+        Ok(Compared {
+            fits: compared,
+            channels,
+            in_form: in_use,
+        })
     }
 
     /// The responses to e and to each channel, by one regression, without a form.
@@ -829,7 +843,7 @@ mod tests {
         let together =
             |fit: &crate::family::FamilyFit| fit.verdict.findings().iter().any(|f| f.kind == "inputs-together");
         assert!(!together(&fit));
-        // Where the target alone moves the loop, that is said.
+        // Where the target alone moves the loop, that is reported.
         let alone = disturbed(&operator, Some(&target), (0, 0.0), 3);
         let alone = estimator().fit(std::slice::from_ref(&alone)).unwrap();
         assert!(
@@ -837,7 +851,7 @@ mod tests {
             "{:?}",
             alone.channels[0]
         );
-        // With one input the response to e is another one, and that is said.
+        // With one input the response to e is another one, and that is reported.
         let one = FamilyEstimator {
             channels: Vec::new(),
             forms: vec![Form::Gain],

@@ -59,7 +59,7 @@ pub(super) struct DiagnosticInputs<'a> {
     pub has_covariance: bool,
     /// Smallest relative standard error of the response over the band of manual control.
     pub response_error: Option<f64>,
-    /// Whether the inputs are told apart by what excites them, and not by their supposed forms.
+    /// Whether the inputs are separated by their excitation, and not by their assumed forms.
     pub apart: bool,
     /// The forms that the data leave, the one in front first.
     pub weighed: &'a [WeighedForm],

@@ -181,7 +181,7 @@ pub(super) fn operator_of(
     let layout = fit.layout();
     let p = fit.parameters();
     let mut mapped = fit.criterion.model_of(fit.eta(), record)?;
-    // From e to u: without the coefficients of channels beside it.
+    // From e to u: without the coefficients of channels in addition to it.
     mapped.theta.truncate(mapped.orders.parameters());
     let of_theta =
         (errors.covariances.as_ref()).map(|c| mapped.covariance_of_theta(&c.clustered, p, layout.positions(record)));

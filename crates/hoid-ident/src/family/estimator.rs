@@ -10,7 +10,7 @@ use super::{
     assembly::{AtLines, Chosen, OtherForm},
     channel::{ChannelFit, SeenChannel},
     channel_lines::{AtChannelLines, ChannelLines, InForm, tells_apart},
-    channels::Seen,
+    channels::{Compared, Seen},
     comparison::{Comparison, Tried},
     coordinates::Grid,
     intersample::Intersample,
@@ -243,7 +243,11 @@ impl FamilyEstimator {
         let (mut channels, mut in_form) = (Vec::new(), Vec::new());
         if let Some(lines) = &channel_lines {
             let at = self.at_lines(lines, &prediction);
-            let (compared, in_use, forms_in_use) = seen.choose_at_lines(&at, &forms, std::mem::take(&mut begun))?;
+            let Compared {
+                fits: compared,
+                channels: in_use,
+                in_form: forms_in_use,
+            } = seen.choose_at_lines(&at, &forms, std::mem::take(&mut begun))?;
             for start in &mut starts {
                 let Some(found) = at.fit(start.form, &forms_in_use) else {
                     continue;

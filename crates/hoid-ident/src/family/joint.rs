@@ -49,7 +49,7 @@ pub(super) enum Lines<'d> {
     /// The response to the error.
     Response(LineData<'d>),
     /// The responses to several inputs.
-    Channels(ChannelCriterion),
+    Channels(Box<ChannelCriterion>),
 }
 
 impl Lines<'_> {
@@ -68,7 +68,7 @@ impl Lines<'_> {
         delay_range_s: (f64, f64),
     ) -> Arc<dyn Objective + Send + Sync> {
         let data = match self {
-            Self::Channels(criterion) => return Arc::new(criterion.clone().of_lines_alone(excess)),
+            Self::Channels(criterion) => return Arc::new(criterion.as_ref().clone().of_lines_alone(excess)),
             Self::Response(data) => data,
         };
         let points: Vec<MeasuredResponse> = (data.points.iter())

@@ -38,7 +38,7 @@ pub(super) struct FamilyLayout {
     pub channels: Vec<ChannelInLayout>,
 }
 
-/// The response to a channel beside the error.
+/// The response to a channel in addition to the error.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ChannelInLayout {
     pub form: Form,
@@ -88,7 +88,7 @@ impl FamilyLayout {
         layout
     }
 
-    /// The same with channels beside the error.
+    /// The same with channels in addition to the error.
     pub fn with_channels(mut self, channels: &[ChannelInLayout]) -> Self {
         let noise = self.limits.split_off(self.elements.len());
         for positions in &mut self.positions {

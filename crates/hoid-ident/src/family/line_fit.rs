@@ -34,7 +34,7 @@ pub struct LineFit {
     pub termination: Termination,
     /// Covariance from the variances of the lines.
     pub(super) by_lines: Option<Vec<f64>>,
-    /// Coordinates of channels beside the error, of their own.
+    /// Coordinates of channels in addition to the error, of their own.
     #[serde(default)]
     pub(super) of_channels: Vec<f64>,
 }

@@ -19,7 +19,7 @@ const PRIOR_FREEDOM: f64 = 8.0;
 /// Runs from which on their scatter determines c.
 pub(super) const FEWEST_RUNS: usize = 3;
 
-/// A variance by the scatter of so many runs, drawn towards that of the remnant beside the line.
+/// A variance by the scatter of so many runs, drawn towards that of the remnant next to the line.
 pub(super) fn moderated(runs: usize, of_runs: Option<f64>, beside: f64, excess: f64) -> f64 {
     let nu = 2.0 * (runs as f64 - 1.0);
     match of_runs {

@@ -25,7 +25,7 @@
 //! | `channel` | a further input: as requested, in a form, its results |
 //! | `channels` | what a person sees besides the error |
 //! | `channel_lines` | the responses to all of it at the lines |
-//! | `comparison` | what each form is worth beside the others |
+//! | `comparison` | what each form is worth next to the others |
 //! | `assembly` | from the searches of the forms that count to the result |
 //! | `estimated` | the operator of a record with its errors |
 //! | `result` | [`FamilyFit`] |

@@ -4,7 +4,7 @@
 //! The poles show which is the lag and which are the neuromuscular system
 //! ([`super::pole_reading`]).
 //!
-//! The exact model of an operator ([`FamilyOperator::hold`]) has fewer parameters than B has
+//! The exact model of an operator ([`FamilyOperator::zoh`]) has fewer parameters than B has
 //! coefficients, so that estimated polynomials lie next to it. The operator is the one whose exact
 //! model M(x) is nearest to the response H of the polynomials over the band of manual control,
 //!

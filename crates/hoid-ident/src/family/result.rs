@@ -93,7 +93,7 @@ pub struct FamilyFit {
     pub forms: Vec<FormFigures>,
     /// Those that the data leave, over which estimates are averaged: the one in front first.
     pub weighed: Vec<WeighedForm>,
-    /// Results of the channels beside the error, in the order in which they were requested.
+    /// Results of the channels in addition to the error, in the order in which they were requested.
     #[serde(default)]
     pub channels: Vec<ChannelFit>,
     /// Variation of the gain of the person beyond these runs, as a part of it: standard deviation of their mean. Zero

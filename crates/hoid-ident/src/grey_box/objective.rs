@@ -25,7 +25,7 @@ use super::parametrisation::{HeldSamples, Mapped, Parametrisation};
 pub(crate) struct PhysicalCriterion<'a, P> {
     pub layout: P,
     pub data: Vec<Data<'a>>,
-    /// The values of each input beside e, record by record.
+    /// The values of each input in addition to e, record by record.
     pub further: Vec<Vec<&'a [f64]>>,
     pub initial: InitialState,
     pub first: usize,

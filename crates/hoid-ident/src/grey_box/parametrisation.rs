@@ -11,7 +11,7 @@ use crate::criterion::further_input::InputOrders;
 #[derive(Debug, Clone)]
 pub(crate) struct Mapped {
     pub orders: Orders,
-    /// Orders of inputs beside e, whose coefficients follow in theta.
+    /// Orders of inputs in addition to e, whose coefficients follow in theta.
     pub further: Vec<InputOrders>,
     pub theta: Vec<f64>,
     pub columns: Vec<Vec<f64>>,
@@ -75,7 +75,7 @@ pub(crate) trait Parametrisation: Clone {
     fn orders(&self, nk: usize) -> Orders;
     /// Places in eta of the polynomials C that must be stable and have no limits of their own.
     fn stable_blocks(&self) -> Vec<Range<usize>>;
-    /// Orders of the inputs beside e, at the shortest delay; none by default.
+    /// Orders of the inputs in addition to e, at the shortest delay; none by default.
     fn further(&self) -> Vec<InputOrders> {
         Vec::new()
     }

@@ -4,7 +4,7 @@
 //! `F y_i = B_i q^-nk e`, `F dy_i/dp = (dB_i/dp) q^-nk e - (dF/dp) y_i` for p of 1/T_I, omega_nm,
 //! zeta_nm and tau_e. For a gain and a lead B and F are those of
 //! [`hoid_model::delayed_operator`], else those of
-//! [`FamilyOperator::zoh_powers_within`](hoid_model::FamilyOperator::hold_powers_within).
+//! [`FamilyOperator::zoh_powers_within`](hoid_model::FamilyOperator::zoh_powers_within).
 
 use hoid_core::filter::{divide_in_place, fir};
 use hoid_model::{

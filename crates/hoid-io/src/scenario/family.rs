@@ -198,9 +198,9 @@ impl Source<'_> {
         let delay_s = given.tau_f_s + preview_s;
         // Rounding of a sum is not an error of the user.
         let delay_s = if delay_s.abs() < 1e-12 { 0.0 } else { delay_s };
-        if !(delay_s >= 0.0) {
+        if delay_s < 0.0 {
             return Err(self.keys(&format!(
-                "feedforward.tau_f_s is {}, expected no less than {}: nobody answers to what is not shown",
+                "feedforward.tau_f_s is {}, expected no less than {}: a response to what is not shown is impossible",
                 given.tau_f_s, -preview_s
             )));
         }

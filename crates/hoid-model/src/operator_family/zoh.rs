@@ -105,11 +105,11 @@ impl FamilyOperator {
         self.zoh_within(whole_samples(self.tau_e_s(), sample_time)?, sample_time)
     }
 
-    /// As [`FamilyOperator::hold`], with the sample in which the delay lies chosen by the caller:
+    /// As [`FamilyOperator::zoh`], with the sample in which the delay lies chosen by the caller:
     /// `delta = tau - sample Ts` may be 0 or Ts at the borders, where the two meet.
     ///
     /// # Errors
-    /// As [`FamilyOperator::hold`].
+    /// As [`FamilyOperator::zoh`].
     pub fn zoh_within(&self, sample: usize, sample_time: SampleTime) -> Result<HeldFamily, ModelError> {
         let variables = self.variables();
         let Rational { numerator, .. } = self.form().rational(&variables);
@@ -123,7 +123,7 @@ impl FamilyOperator {
     /// time and the poles do not.
     ///
     /// # Errors
-    /// As [`FamilyOperator::hold`].
+    /// As [`FamilyOperator::zoh`].
     pub fn zoh_powers_within(&self, sample: usize, sample_time: SampleTime) -> Result<Vec<HeldFamily>, ModelError> {
         let poles = self.held_poles(&self.variables(), sample, sample_time.s());
         let power = |i: usize| std::array::from_fn(|j| Dual::constant(f64::from(u8::from(i == j))));

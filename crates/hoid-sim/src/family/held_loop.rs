@@ -9,7 +9,7 @@
 //! exactly, for inputs that are held ([`hoid_model::held_system`]). An operator without
 //! neuromuscular part may pass e on at once: of the held error that would be one sample or the next,
 //! and it is taken from the error interpolated around `t - delta - Ts/2`, as
-//! [`FamilyOperator::hold`](hoid_model::FamilyOperator::hold) has it. Where that part and D meet
+//! [`FamilyOperator::zoh`](hoid_model::FamilyOperator::hold) has it. Where that part and D meet
 //! within a sample, both equations are solved together.
 
 use hoid_model::{

@@ -1,9 +1,9 @@
 //! The survey's other methods as comparators: those that Part II of the thesis describes (section 2.4) and that need
 //! more than the samples so far: the lines, what comes after, a second run. The recursive ones are in `hoid_survey`.
 //!
-//! A comparator follows a record and says, at times that are asked for, what the operator's
+//! A comparator follows a record and states, at times that are asked for, what the operator's
 //! response is at some frequencies, and its parameters where it has them. Each is small, after the
-//! source that it names, tuned on runs of its own (`research/notes/survey-methods.md` says
+//! source that it names, tuned on runs of its own (`research/notes/survey-methods.md` states
 //! how), and reached by the plan of a [survey](crate::survey), not by `track --method`: these are
 //! here to be compared with.
 //!

@@ -117,7 +117,7 @@ impl FamilyReport<'_> {
                 }
             }
             if verbose {
-                let mut rows = text::table(&["form", "loss", "AIC beside the best"]);
+                let mut rows = text::table(&["form", "loss", "AIC minus the best"]);
                 for form in &channel.forms {
                     rows.add_row([
                         form.form.map_or("no response", |form| form.name()).to_owned(),

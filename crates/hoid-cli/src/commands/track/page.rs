@@ -122,7 +122,7 @@ fn rows_shown(tracked: &Tracked) -> String {
     } else {
         header.extend(trace.parameter_names().into_iter().take(COEFFICIENTS_SHOWN));
     }
-    let mut rows = text::table(&header.iter().map(String::as_str).collect::<Vec<_>>()).as_time_series();
+    let mut rows = text::table(&header.iter().map(String::as_str).collect::<Vec<_>>()).into_time_series();
     for row in picked {
         let mut cells = vec![format!("{:.2}", trace.times_s()[row])];
         if with_operator {
