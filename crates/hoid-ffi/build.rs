@@ -1,4 +1,4 @@
-//! The stack in WebAssembly, which is 1 MB otherwise: a filter that starts takes most of that.
+//! Stack size in WebAssembly, which is 1 MB by default: the initialisation of a filter takes most of that.
 
 #![allow(clippy::print_stdout)]
 

@@ -1,4 +1,4 @@
-//! A chore that runs next to another.
+//! A task that runs in parallel with another.
 
 use std::{
     env,
@@ -9,8 +9,8 @@ use std::{
 
 use crate::process::target_directory;
 
-/// A chore of this program in a process of its own. What it reports is kept until it is waited for, so that it does not
-/// be between the lines of another.
+/// A task of this program in a separate process. Its output is kept until the task is awaited, so that it does not mix
+/// with that of another.
 pub struct Background {
     name: &'static str,
     child: Child,
@@ -34,7 +34,7 @@ impl Background {
         Ok(Self { name, child, said })
     }
 
-    /// Waits for its end and shows what it has reported.
+    /// Waits for its end and shows its output.
     pub fn end(mut self) -> Result<(), String> {
         let name = self.name;
         let status = self.child.wait().map_err(|e| format!("cargo xtask {name}: {e}"))?;
@@ -46,7 +46,7 @@ impl Background {
     }
 }
 
-/// Nothing continues after a chore that has failed.
+/// A running task is killed after another has failed.
 impl Drop for Background {
     fn drop(&mut self) {
         let _ = self.child.kill();

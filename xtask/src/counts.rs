@@ -1,6 +1,6 @@
-//! How many tests passed, over crates and the Python package.
+//! Number of passed tests, over crates and the Python package.
 
-/// Tests that passed, failed and were left out.
+/// Numbers of passed, failed and skipped tests.
 #[derive(Debug, Default, PartialEq)]
 pub struct Counts {
     pub passed: usize,
@@ -22,8 +22,8 @@ impl Counts {
         }
     }
 
-    /// Adds a line such as `test result: ok. 7 passed; 0 failed; 0 ignored; ...`; other lines count
-    /// nothing.
+    /// Adds a line such as `test result: ok. 7 passed; 0 failed; 0 ignored; ...`; other lines are
+    /// ignored.
     pub fn add(&mut self, line: &str) {
         let Some(numbers) = line.strip_prefix("test result: ") else {
             return;
@@ -42,7 +42,7 @@ impl Counts {
         }
     }
 
-    /// Adds the last line of pytest, as
+    /// Adds the last line of pytest, such as
     /// `=== 2 failed, 85 passed, 1 skipped in 61.20s (0:01:01) ===`.
     pub fn add_pytest(&mut self, line: &str) {
         let Some((numbers, time)) = line.trim_matches(['=', ' ']).rsplit_once(" in ") else {

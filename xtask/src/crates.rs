@@ -1,8 +1,8 @@
-//! Rules for the dependencies of the workspace, with all features, by `cargo metadata`: licences, crates that are not
-//! wanted, one version of each, and not more of them than there are reasons for.
+//! Rules for the dependencies of the workspace, with all features, by `cargo metadata`: licences, unwanted crates, one
+//! version of each, and a limited number.
 //!
-//! An expression of licences is one of SPDX (Annex D: `OR` binds less than `AND`, that less than `WITH`), with the `/`
-//! of older manifests for `OR`. Advisories need the network and are examined by the hosted workflows.
+//! A licence expression is one of SPDX (Annex D: `OR` binds less than `AND`, that less than `WITH`), with the `/` of
+//! older manifests for `OR`. Advisories need the network and are examined by the hosted workflows.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::process::{cargo_command, output};
 
-/// Licences under which hoid can be handed on as `MIT OR Apache-2.0` is.
+/// Licences compatible with the distribution of hoid under `MIT OR Apache-2.0`.
 const ALLOWED: [&str; 11] = [
     "0BSD",
     "Apache-2.0",
@@ -25,7 +25,7 @@ const ALLOWED: [&str; 11] = [
     "Zlib",
 ];
 
-/// Crates that are not wanted, by name or by the start of a name that ends with `*`, and why.
+/// Unwanted crates, by name or by the start of a name that ends with `*`, with reasons.
 const BANNED: [(&str, &str); 16] = [
     (
         "*-sys",
@@ -47,7 +47,7 @@ const BANNED: [(&str, &str); 16] = [
     ("ansi_term", "it is not maintained"),
     ("lazy_static", "std::sync::OnceLock and LazyLock"),
 ];
-/// Those of [`BANNED`] that are here all the same, and why.
+/// Crates of [`BANNED`] that are tolerated, with reasons.
 const TOLERATED: [(&str, &str); 5] = [
     ("core-foundation-sys", "the system of macOS"),
     ("js-sys", "the browser, which hoid is not built for"),
@@ -59,7 +59,7 @@ const TOLERATED: [(&str, &str); 5] = [
     ),
 ];
 
-/// Crates of which several versions are here, and what asks for the older ones. Each is built twice.
+/// Crates with several versions, and the dependents of the older ones. Each version is built.
 const SEVERAL: [(&str, usize, &str); 9] = [
     ("bitflags", 2, "png, of resvg: feature pdf-png"),
     ("getrandom", 3, "const-random and ahash, of parquet"),
@@ -76,11 +76,11 @@ const SEVERAL: [(&str, usize, &str); 9] = [
     ("syn", 2, "zerocopy and windows-core, and the test of imports"),
 ];
 
-/// The tree of `hoid-cli` on Linux, its own crates included: another crate needs a reason, and a
-/// line in the table of dependencies of ARCHITECTURE.md.
+/// Maximum size of the tree of `hoid-cli` on Linux, including its own crates: another crate needs a
+/// reason, and a line in the table of dependencies of ARCHITECTURE.md.
 const MOST_CRATES: usize = 155;
 
-/// Checks all of it.
+/// Checks all rules.
 pub fn check() -> Result<(), String> {
     let mut metadata = cargo_command();
     metadata.args(["metadata", "--format-version", "1", "--locked", "--all-features"]);
@@ -117,7 +117,7 @@ pub fn check() -> Result<(), String> {
     Err(format!("{}\n(the rules are in xtask/src/crates.rs)", wrong.join("\n")))
 }
 
-/// A crate that is not of the workspace.
+/// A crate outside the workspace.
 struct Package {
     name: String,
     version: String,
@@ -140,7 +140,7 @@ fn packages(metadata: &Value) -> Vec<Package> {
     all.into_iter().flatten().filter_map(package).collect()
 }
 
-/// Problems with where a crate comes from and its licence.
+/// Problems with the origin of a crate and its licence.
 fn licence_of(package: &Package) -> Option<String> {
     let Package {
         name, version, source, ..
@@ -165,7 +165,7 @@ fn licence_of(package: &Package) -> Option<String> {
     }
 }
 
-/// Whether an expression lets hoid hand the crate on; none if it cannot be read.
+/// True if an expression permits the distribution of the crate; none if it cannot be parsed.
 fn allows(expression: &str) -> Option<bool> {
     let spaced = expression.replace('/', " OR ").replace('(', " ( ").replace(')', " ) ");
     let words: Vec<&str> = spaced.split_whitespace().collect();
@@ -219,7 +219,7 @@ fn take(rest: &mut &[&str], word: &str) -> bool {
     }
 }
 
-/// Why a crate is not wanted.
+/// Reason why a crate is unwanted.
 fn ban_of(package: &Package) -> Option<String> {
     let name = package.name.as_str();
     if TOLERATED.iter().any(|(known, _)| *known == name) {
@@ -239,7 +239,7 @@ fn ban_of(package: &Package) -> Option<String> {
     Some(format!("{name} {} is banned: {why}", package.version))
 }
 
-/// Crates of more versions than stated, and statements that are no longer true.
+/// Crates with more versions than stated, and outdated statements.
 fn several(packages: &[Package]) -> Vec<String> {
     let mut versions: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
     for package in packages {

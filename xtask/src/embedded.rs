@@ -1,7 +1,7 @@
-//! The kernel on bare processors: built for Cortex-M4F and RISC-V, run under QEMU, and its digits next to those of the
-//! host and of `hoid track`.
+//! The kernel on bare processors: built for Cortex-M4F and RISC-V, run under QEMU, and compared digit by digit with the
+//! host and with `hoid track`.
 //!
-//! Missing programs are reported and left out, with the command that installs them.
+//! Missing programs are reported and skipped, with the command that installs them.
 
 use std::{
     env, fs,
@@ -11,10 +11,10 @@ use std::{
 
 use crate::process::{AS_TESTS, cargo, installed_targets, output, target_directory};
 
-/// The processor that is run, and the one that is built for.
+/// The target that is run, and the one that is only built.
 pub const CORTEX: &str = "thumbv7em-none-eabihf";
 const RISC_V: &str = "riscv32imac-unknown-none-elf";
-/// Seconds of the run that QEMU is given where the whole is not asked for: it runs at a fiftieth of the host's speed.
+/// Length of the run under QEMU by default, s: QEMU runs at a fiftieth of the host's speed.
 const SHORT_S: usize = 15;
 const RATE_HZ: usize = 100;
 
@@ -74,7 +74,7 @@ pub fn embedded(arguments: &[String]) -> Result<(), String> {
     Ok(())
 }
 
-/// The trace of `hoid track` for a run of C4, whose e and u are left in `run.csv`.
+/// The trace of `hoid track` for a run of C4, whose e and u are written to `run.csv`.
 fn tracked(target: &Path, directory: &Path) -> Result<String, String> {
     cargo(&AS_TESTS, &[])?;
     let hoid = || {
@@ -135,7 +135,7 @@ fn columns(table: &str, names: &[&str]) -> Result<Vec<Vec<String>>, String> {
     Ok(lines.map(row).collect())
 }
 
-/// Each line that was reported must be one of the trace, to the last digit.
+/// Checks that each output line equals one of the trace, to the last digit.
 fn compared(place: &str, told: &str, track: &str) -> Result<(), String> {
     let table: Vec<&str> = told.lines().filter(|line| !line.starts_with('#')).collect();
     let names: Vec<&str> = table.first().copied().unwrap_or_default().split(',').collect();

@@ -1,4 +1,4 @@
-//! The libraries for C: built, and laid out so that pkg-config and CMake find them.
+//! The libraries for C: built, and installed so that pkg-config and CMake find them.
 //!
 //! ```text
 //! include/hoid.h
@@ -8,7 +8,7 @@
 //! share/hoid/examples/
 //! ```
 //!
-//! The folder may be moved: no file in it names its place.
+//! The folder may be moved: no file in it contains its path.
 
 use std::{
     env, fs,
@@ -37,7 +37,7 @@ const EXAMPLES: [&str; 7] = [
 
 const USAGE: &str = "usage: cargo xtask ffi [--dev] [--out DIR] | --header | --check";
 
-/// Builds the libraries, makes the header, or checks that other tools find them.
+/// Builds the libraries, generates the header, or checks that other tools find them.
 pub fn ffi(arguments: &[String]) -> Result<(), String> {
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let target = target_directory();
@@ -113,7 +113,7 @@ fn build(profile: &str, out: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// Names as built, and as installed.
+/// File names as built, and as installed.
 fn libraries() -> Vec<(&'static str, &'static str)> {
     if cfg!(windows) {
         vec![
@@ -185,7 +185,7 @@ fn cmake() -> String {
     )
 }
 
-/// A version serves requests for itself and for older ones of its first number, zero's second.
+/// A version is compatible with older ones of the same major version (of the same minor version for 0).
 fn cmake_version(version: &str) -> String {
     let mut parts = version.split('.');
     let same = match (parts.next(), parts.next()) {
@@ -234,7 +234,7 @@ fn tried(program: &Path, libraries: &Path) -> Result<(), String> {
     }
 }
 
-/// The example in C by what pkg-config reports, with the shared and with the static library.
+/// Builds the C example with pkg-config, with the shared and with the static library.
 fn found_by_pkg_config(out: &Path) -> Result<(), String> {
     if !(is_here("pkg-config") && is_here("cc")) {
         return Ok(());
@@ -268,7 +268,7 @@ fn found_by_pkg_config(out: &Path) -> Result<(), String> {
     tried(&alone, Path::new(""))
 }
 
-/// The examples by CMake.
+/// Builds the examples with CMake.
 fn found_by_cmake(out: &Path) -> Result<(), String> {
     if !is_here("cmake") {
         return Ok(());

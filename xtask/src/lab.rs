@@ -1,8 +1,7 @@
-//! The page of `hoid lab`: that the built file is what its sources build, the page in a browser, the page that needs no
-//! program after it, and the studies that need a browser: a long session (`hour.mjs`), operators in real time
-//! (`real.mjs`).
+//! The page of `hoid lab`: check that the built file corresponds to its sources, tests in a browser, the page without a
+//! server, and the studies that need a browser: a long session (`hour.mjs`), operators in real time (`real.mjs`).
 //!
-//! All need npm, what looks at a page a browser; missing items are reported and left out.
+//! All of them need npm, and those that load a page a browser; missing programs are reported and skipped.
 
 use std::{
     env, fs,
@@ -18,7 +17,7 @@ use crate::{
 /// The studies in a browser in real time: their names, and their scripts in `browser-test`.
 pub const STUDIES: [(&str, &str); 2] = [("lab-hour", "hour.mjs"), ("lab-real", "real.mjs")];
 
-/// Checks the built page, then drives it in a browser, for a minute in real time at the end.
+/// Checks the built page, then tests it in a browser, finally for a minute in real time.
 pub fn lab() -> Result<(), String> {
     if !npm_is_there()? {
         return Ok(());
@@ -32,7 +31,7 @@ pub fn lab() -> Result<(), String> {
     in_browser("dev", "hour.mjs", &["1".to_owned()])
 }
 
-/// The page that needs no program after it: one file, with an experiment and the tracker in it.
+/// Builds the page without a server: one file with an experiment and the tracker.
 pub fn alone(arguments: &[String]) -> Result<(), String> {
     let (mut config, mut out) = (None, None);
     let mut rest = arguments.iter();
@@ -56,12 +55,13 @@ pub fn alone(arguments: &[String]) -> Result<(), String> {
     Ok(())
 }
 
-/// Builds that page with the kernel of a profile; where it is, nothing if Rust cannot build for WebAssembly here.
+/// Builds that page with the kernel of a profile and returns its path; nothing if the WebAssembly target is not
+/// installed.
 fn page_alone(profile: &str, config: Option<&Path>, out: &Path) -> Result<Option<PathBuf>, String> {
     let Some(kernel) = webassembly(profile)? else {
         return Ok(None);
     };
-    // For the features of the tests, as they have compiled it.
+    // With the features of the tests, as already compiled.
     cargo(&["build", "--workspace", "--example", "tables"], &[])?;
     let program = target_directory().join("debug/examples");
     let told = output(Command::new(program.join(format!("tables{}", env::consts::EXE_SUFFIX))).args(config))?;
@@ -75,13 +75,13 @@ fn page_alone(profile: &str, config: Option<&Path>, out: &Path) -> Result<Option
     Ok(Some(out.to_owned()))
 }
 
-/// A file of what is built here.
+/// Path of a build product.
 fn built(name: &str) -> PathBuf {
     let folder = target_directory().join("lab-page");
     absolute(folder.join(name)).unwrap_or_else(|_| folder.join(name))
 }
 
-/// One of the studies, with arguments of its own.
+/// Runs one of the studies, with its arguments.
 pub fn study(script: &str, arguments: &[String]) -> Result<(), String> {
     if npm_is_there()? {
         in_browser("release", script, arguments)?;
@@ -89,7 +89,7 @@ pub fn study(script: &str, arguments: &[String]) -> Result<(), String> {
     Ok(())
 }
 
-/// Installs what the page is built and driven with; false if there is no npm, which is reported.
+/// Installs the tools for building and testing the page; false if there is no npm, which is reported.
 fn npm_is_there() -> Result<bool, String> {
     let there = npm(&["--version"]).stdout(Stdio::null()).stderr(Stdio::null()).status();
     if !there.is_ok_and(|status| status.success()) {
@@ -126,7 +126,7 @@ fn npm(arguments: &[&str]) -> Command {
     command
 }
 
-/// The program that was built.
+/// Path of the built program.
 fn program(folder: &str) -> PathBuf {
     target_directory()
         .join(folder)

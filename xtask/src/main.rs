@@ -1,4 +1,4 @@
-//! The project's own chores.
+//! The development tasks of the project.
 //!
 //! | command | does |
 //! |---|---|
@@ -17,7 +17,7 @@
 //! | `cargo xtask bench [OPTION...]` | the tasks of `research/notes/speed-peers.md` next to the peers that are installed, or how cost grows (module `bench`) |
 //! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults`, `faults-clean`, `tracker-faults`, `mutations`, `bombs`, `hostile`, `kills`, `full-disks`, `latency`, `lab`, `lab-hour`, `lab-real`, `challenge`, `challenge-people` |
 //!
-//! Little but the standard library: a chore must start at once on a fresh machine.
+//! Almost only the standard library is used: a task must start at once on a new machine.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod background;
@@ -77,9 +77,8 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs all tests, passing further arguments on to `cargo test`, and closes with their number over
-/// all crates and the Python package, whose tests are left out where the arguments choose some
-/// tests of Rust.
+/// Runs all tests, passing further arguments on to `cargo test`, and prints their number over all
+/// crates and the Python package, whose tests are skipped if the arguments select tests of Rust.
 fn test(arguments: &[String]) -> Result<(), String> {
     let mut command = cargo_command();
     command.args(["test", "--workspace", "--no-fail-fast"]).args(arguments);
@@ -91,7 +90,7 @@ fn test(arguments: &[String]) -> Result<(), String> {
         let mut required = Some(required.end());
         let mut built = Ok(None);
         let status = each_line(&mut command, |line| {
-            // Not before the first test runs: until then cargo keeps other builds waiting, and they it.
+            // Not before the first test runs: until then cargo blocks other builds, and they block it.
             if let Some(required) = required.take() {
                 built = required.and_then(|()| Background::begin(python::BUILD).map(Some));
             }
@@ -118,10 +117,9 @@ struct Slow {
     name: &'static str,
     package: &'static str,
     example: &'static str,
-    /// The package whose program it runs.
+    /// The package whose program is run.
     program: Option<&'static str>,
-    /// `release`; `dev` where sums that overflow are searched for, as in the tests; what is shipped where its times are
-    /// reported.
+    /// `release`; `dev` for detecting overflow, as in the tests; the shipped profile if times are reported.
     profile: &'static str,
 }
 
@@ -173,7 +171,7 @@ const SLOW: [Slow; 16] = [
     slow_of("challenge-people", "hoid-challenge", "challenge_people"),
 ];
 
-/// Runs one of them, with further arguments of its own.
+/// Runs one of them, with its arguments.
 fn slow(arguments: &[String]) -> Result<(), String> {
     let names = || {
         let all = SLOW.iter().map(|slow| slow.name);

@@ -1,8 +1,8 @@
-//! The boundary to C under Miri, an interpreter that knows of every read and write whether the memory is there,
-//! initialised and not lent to someone else, and of every allocation whether it was freed.
+//! The C boundary under Miri, an interpreter that checks of every memory access whether the memory is allocated,
+//! initialised and not borrowed elsewhere, and of every allocation whether it was freed.
 //!
-//! It runs the tests of `hoid-ffi` in which pointers are trusted, with few samples (`cfg(miri)`). It is a part of the
-//! nightly toolchain: where that has none, this reports it with what installs it.
+//! It runs the tests of `hoid-ffi` that use raw pointers, with few samples (`cfg(miri)`). Miri is part of the nightly
+//! toolchain; if it is missing, the installation command is reported.
 
 use std::process::Command;
 
@@ -11,16 +11,16 @@ use crate::process::{output, run};
 /// On x86-64 the mathematical functions are written in assembly, which is not interpreted.
 const TARGET: &str = "riscv64gc-unknown-linux-gnu";
 
-/// Tests in which nothing but memory is worked on; the others run compilers and other programs.
+/// Tests that only access memory; the others run compilers and other programs.
 const TESTS: [&str; 5] = ["--lib", "--test", "every_function", "--test", "hostile"];
 
-/// Interprets the tests; arguments choose among them.
+/// Interprets the tests; arguments select some of them.
 pub fn miri(arguments: &[String]) -> Result<(), String> {
     if let Some(lacking) = lacking() {
         println!("skipped: hoid-ffi under Miri ({lacking})");
         return Ok(());
     }
-    // Files are read, and numbers must be the same twice.
+    // Files are read, and numbers must be reproducible.
     let flags = "-Zmiri-disable-isolation -Zmiri-deterministic-floats";
     run(Command::new("rustup")
         .args(["run", "nightly"])
@@ -35,7 +35,7 @@ pub fn miri(arguments: &[String]) -> Result<(), String> {
 fn lacking() -> Option<&'static str> {
     const INSTALL: &str = "rustup toolchain install nightly --profile minimal --component miri --component rust-src";
     let told = |arguments: &[&str]| output(Command::new("rustup").args(arguments)).unwrap_or_default();
-    // `nightly-2026-01-31-...` is another one.
+    // `nightly-2026-01-31-...` is a different toolchain.
     let is_nightly = |line: &str| {
         let behind = line.strip_prefix("nightly");
         behind.is_some_and(|behind| !behind.trim_start_matches('-').starts_with(|c: char| c.is_ascii_digit()))

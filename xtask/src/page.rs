@@ -2,10 +2,10 @@
 
 use std::{fs, path::Path};
 
-/// Puts a text between the markers of its passage in a page of the book, or leaves the page as it is in a dry run.
+/// Writes a text between the markers of its passage in a page of the book; a dry run leaves the page unchanged.
 ///
 /// # Errors
-/// A page that cannot be read or written, or that has no such markers.
+/// A page that cannot be read or written, or without these markers.
 pub fn write(page: &str, passage: &str, text: &str, dry: bool) -> Result<(), String> {
     if dry {
         return Ok(());

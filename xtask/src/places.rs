@@ -1,8 +1,8 @@
-//! Everywhere hoid runs: one run through each place, its digits next to those of `hoid track`, the time of a sample and
-//! what is shipped, as a table between the markers of the page "In your simulator".
+//! All interfaces of hoid: one run through each, with its digits compared with those of `hoid track`, the time per
+//! sample and the size of the shipped files, as a table between the markers of the page "In your simulator".
 //!
-//! The places are in `python/tests/places`, which the tests run too (`test_places.py`); here are their requirements,
-//! built by the profile of shipped programs. What is not installed is a row of the table that reports it.
+//! The interfaces are in `python/tests/places`, which the tests run too (`test_places.py`); here their requirements are
+//! built with the profile of shipped programs. A missing program is a row of the table that reports it.
 
 use std::{env, process::Command};
 
@@ -15,7 +15,7 @@ use crate::{
 
 const PAGE: &str = "guides/simulators.md";
 
-/// Measures; `--dry` leaves the page as it is, `--dev` takes what the tests have compiled and leaves it too.
+/// Measures; `--dry` leaves the page unchanged, `--dev` uses the builds of the tests and leaves the page unchanged too.
 pub fn places(arguments: &[String]) -> Result<(), String> {
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let (shipped, dry) = match words.as_slice() {

@@ -1,4 +1,4 @@
-//! Commands that the chores run: their output, and what they report when they fail.
+//! Commands run by the tasks: their output, and their error messages.
 
 use std::{
     env,
@@ -7,7 +7,7 @@ use std::{
     process::{Command, ExitStatus, Stdio},
 };
 
-/// Runs a command, and prints and shows each line of its output.
+/// Runs a command, and prints and passes on each line of its output.
 pub fn each_line(command: &mut Command, mut show: impl FnMut(&str)) -> Result<ExitStatus, String> {
     let shown = format!("{command:?}");
     let cannot_run = |error: std::io::Error| format!("cannot run {shown}: {error}");
@@ -39,7 +39,7 @@ pub fn run(command: &mut Command) -> Result<(), String> {
     }
 }
 
-/// Runs a command and returns what it prints.
+/// Runs a command and returns its output.
 pub fn output(command: &mut Command) -> Result<String, String> {
     let shown = format!("{command:?}");
     match command.stderr(Stdio::inherit()).output() {
@@ -49,7 +49,7 @@ pub fn output(command: &mut Command) -> Result<String, String> {
     }
 }
 
-/// The profile of shipped programs: programs, libraries, wheels.
+/// The profile of shipped programs, libraries and wheels.
 pub const SHIPPED: &str = "shipped";
 
 /// Arguments of the builds for chores: of the same features as the tests, so that nothing is compiled twice. Not
@@ -57,13 +57,13 @@ pub const SHIPPED: &str = "shipped";
 /// C, into the folder `deps`.
 pub const AS_TESTS: [&str; 6] = ["build", "--workspace", "--bins", "--examples", "--test", "symbols"];
 
-/// Where cargo builds.
+/// The target directory of cargo.
 pub fn target_directory() -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), |named| root.join(named))
 }
 
-/// The targets that Rust can build for here; none if rustup is not at hand.
+/// The installed targets of Rust; none without rustup.
 pub fn installed_targets() -> Vec<String> {
     let told = output(Command::new("rustup").args(["target", "list", "--installed"])).unwrap_or_default();
     told.lines().map(str::to_owned).collect()

@@ -1,4 +1,4 @@
-//! Builds for other processors, for the places in which hoid runs and their tests.
+//! Builds for other processors, for the interfaces of hoid and their tests.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use crate::{
 };
 
 const WASM: &str = "wasm32-unknown-unknown";
-/// Reports the places that what runs on other processors has just been built.
+/// Variable that informs `places` that these builds are up to date.
 pub const BUILT: &str = "HOID_PLACES_BUILT";
 
 /// Builds the C ABI for WebAssembly by this profile and the kernel for a Cortex-M4 by `release`, as its own chore does;
@@ -21,7 +21,7 @@ pub fn other_processors(profile: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// Builds the C ABI for WebAssembly by this profile; where it is, nothing if the target is not installed.
+/// Builds the C ABI for WebAssembly with this profile and returns its path; nothing if the target is not installed.
 pub fn webassembly(profile: &str) -> Result<Option<PathBuf>, String> {
     if !is_there(WASM) {
         return Ok(None);
@@ -36,14 +36,14 @@ pub fn webassembly(profile: &str) -> Result<Option<PathBuf>, String> {
         "--target",
         WASM,
     ];
-    // For the tests' profile with its symbols, or what runs at build time would be compiled once more.
+    // With the profile of the tests including its symbols, otherwise build scripts would be compiled again.
     let stripped = format!("profile.{SHIPPED}.strip=true");
     cargo(&[&build[..], &["--config", &stripped]].concat(), &[])?;
     let folder = if profile == "dev" { "debug" } else { profile };
     Ok(Some(target_directory().join(WASM).join(folder).join("hoid_ffi.wasm")))
 }
 
-/// Whether Rust can build for a target here; reported where it cannot.
+/// True if a target is installed; otherwise that is reported.
 fn is_there(target: &str) -> bool {
     let there = installed_targets().iter().any(|one| one == target);
     if !there {

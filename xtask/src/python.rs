@@ -1,8 +1,8 @@
-//! The tests of the Python package: a fresh virtual environment, the wheel, pytest.
+//! The tests of the Python package: a new virtual environment, the wheel, pytest.
 //!
-//! The wheel is built with the profile of the tests and in their target folder, so that what they
-//! have compiled is not compiled again; the test requirements come from PyPI. `HOID_PYTHON` names
-//! another interpreter than `python3`.
+//! The wheel is built with the profile and in the target folder of the tests, so that nothing is
+//! compiled twice; the test requirements come from PyPI. `HOID_PYTHON` gives an interpreter other
+//! than `python3`.
 //!
 //! `cargo xtask test` does the first two steps next to those of Rust (module `beside`): what they need is not what
 //! compiles and tests Rust, and both leave a processor idle at times.
@@ -19,11 +19,11 @@ use crate::{
     processors::{BUILT, other_processors},
 };
 
-/// Names of the chores that `cargo xtask test` starts next to itself.
+/// Names of the tasks that `cargo xtask test` runs in parallel.
 pub const REQUIRE: &str = "python-require";
 pub const BUILD: &str = "python-build";
 
-/// Oldest Python that the package supports.
+/// Oldest Python version that the package supports.
 const OLDEST: (u32, u32) = (3, 10);
 
 /// Builds and installs the wheel, and runs pytest with these arguments.
@@ -33,20 +33,20 @@ pub fn test(arguments: &[String]) -> Result<Counts, String> {
     pytest(arguments)
 }
 
-/// A fresh environment with all that the tests require but the wheel: needs nothing of Rust.
+/// Creates a new environment with all requirements of the tests except the wheel: does not need Rust.
 pub fn require() -> Result<(), String> {
     begin(Wheel::OfTests).map(|_| ())
 }
 
-/// Builds the wheel and all that its tests run, and installs it where `require` has been.
+/// Builds the wheel and all programs that its tests run, and installs it after `require`.
 pub fn build() -> Result<(), String> {
-    // The same command line as the tests', to compare with, and the examples that the book runs.
+    // The same command line as that of the tests, for comparison, and the examples of the book.
     cargo(&[&AS_TESTS[..], &["--quiet"]].concat(), &[])?;
     other_processors("dev")?;
     install(Wheel::OfTests)
 }
 
-/// Runs the tests where `build` has been.
+/// Runs the tests after `build`.
 pub fn pytest(arguments: &[String]) -> Result<Counts, String> {
     let mut counts = Counts::default();
     let mut command = Command::new(Wheel::OfTests.python());
@@ -71,17 +71,17 @@ pub fn pytest(arguments: &[String]) -> Result<Counts, String> {
     Ok(counts)
 }
 
-/// How the wheel is built and what comes with it.
+/// Build profile of the wheel and its requirements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Wheel {
-    /// As the tests have compiled it, with what they require.
+    /// As compiled by the tests, with their requirements.
     OfTests,
-    /// As it is shipped, with what the places need.
+    /// As shipped, with the requirements of the interfaces.
     Shipped,
 }
 
 impl Wheel {
-    /// Where its environment is.
+    /// Folder of its environment.
     fn folder(self) -> PathBuf {
         target_directory().join("python").join(match self {
             Self::OfTests => "venv",
@@ -97,7 +97,7 @@ impl Wheel {
         })
     }
 
-    /// The requirements of the package (`[project.optional-dependencies]`) that come with it.
+    /// The optional requirements of the package (`[project.optional-dependencies]`) installed with it.
     const fn extra(self) -> &'static str {
         match self {
             Self::OfTests => "test",
@@ -106,14 +106,15 @@ impl Wheel {
     }
 }
 
-/// A fresh environment with the package in it; its interpreter. The tests need the workspace to be built before.
+/// Creates a new environment with the package and returns its interpreter. The tests need the workspace to be built
+/// before.
 pub fn environment(wheel: Wheel) -> Result<PathBuf, String> {
     begin(wheel)?;
     install(wheel)?;
     Ok(wheel.python())
 }
 
-/// A fresh environment with what the wheel and its tests require.
+/// Creates a new environment with the requirements of the wheel and its tests.
 fn begin(wheel: Wheel) -> Result<(), String> {
     fresh_environment(&wheel.folder())?;
     let project = package()?.join("pyproject.toml");
@@ -126,7 +127,7 @@ fn begin(wheel: Wheel) -> Result<(), String> {
     pip(&wheel.python(), &[others, &required].concat())
 }
 
-/// The requirements that an extra of a project names, as pip takes them.
+/// The requirements of an extra of a project, in the format of pip.
 fn requirements<'a>(project: &'a str, extra: &str) -> Vec<&'a str> {
     let extras = project
         .split_once("[project.optional-dependencies]")
@@ -135,7 +136,7 @@ fn requirements<'a>(project: &'a str, extra: &str) -> Vec<&'a str> {
         .split_once(&format!("\n{extra} = ["))
         .map_or("", |(_, rest)| rest);
     let mut found = Vec::new();
-    // Every other part is within quotes, where brackets are of a requirement: `dask[distributed]`.
+    // Every other part is in quotes, where brackets belong to a requirement: `dask[distributed]`.
     for (number, part) in list.split('"').enumerate() {
         match number % 2 {
             1 => found.push(part),
@@ -178,7 +179,7 @@ pub fn package() -> Result<PathBuf, String> {
     Ok(root.ok_or("the folder of xtask has no parent")?.join("python"))
 }
 
-/// A virtual environment with nothing in it.
+/// Creates an empty virtual environment.
 fn fresh_environment(directory: &Path) -> Result<(), String> {
     let base = interpreter()?;
     let _ = fs::remove_dir_all(directory);
@@ -189,7 +190,7 @@ fn fresh_environment(directory: &Path) -> Result<(), String> {
     })
 }
 
-/// An interpreter that is not too old.
+/// An interpreter that is recent enough.
 fn interpreter() -> Result<String, String> {
     let named = env::var("HOID_PYTHON").ok();
     let names: Vec<String> = match named {

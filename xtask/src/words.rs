@@ -61,7 +61,7 @@ const BANNED: [(&str, &str); 48] = [
     ("what is supposed", "the prior"),
 ];
 
-/// Files with words of the list, and why.
+/// Files with words of the list, and the reasons.
 const EXCEPTIONS: [(&str, &str); 2] = [
     ("xtask/src/words.rs", "the list itself"),
     ("crates/hoid-thesis/src/claims/", "quotations"),
@@ -142,7 +142,7 @@ fn banned_in(prose: &str) -> Vec<(&'static str, &'static str)> {
     BANNED.into_iter().filter(|(phrase, _)| is_there(phrase)).collect()
 }
 
-/// Without what is in backticks or braces.
+/// Removes text in backticks or braces.
 fn without_code(line: &str) -> String {
     let (mut prose, mut in_code, mut depth) = (String::new(), false, 0_u32);
     for c in line.chars() {
@@ -221,7 +221,7 @@ fn of_python(text: &str) -> Vec<(usize, String)> {
     prose
 }
 
-/// The lines outside of code blocks.
+/// The lines outside code blocks.
 fn of_markdown(text: &str) -> Vec<(usize, String)> {
     let mut in_block = false;
     let mut prose = Vec::new();

@@ -1,5 +1,5 @@
-//! `study`, `group` and `track` on 200 disks each that are full before all is written. The numbers of
-//! `research/notes/mutations.md`.
+//! `study`, `group` and `track` on 200 disks each that fill before the output is complete. The
+//! numbers of `research/notes/mutations.md`.
 //!
 //! `cargo xtask slow full-disks [ROUNDS] [SEED]`, on Linux, as an administrator.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]

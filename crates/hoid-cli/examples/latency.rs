@@ -1,9 +1,9 @@
-//! How long `hoid stream` takes to answer a sample, and what happens when readers stop, either side starts again,
-//! clocks jump and datagrams are hostile. The numbers of `research/notes/latency.md`.
+//! Response time of `hoid stream` to a sample, and its behaviour when readers stop, either side restarts, clocks jump
+//! and datagrams are hostile. The numbers of `research/notes/latency.md`.
 //!
-//! `cargo xtask slow latency [--seconds N] [--seed N] [--program FILE] [--python FILE]`: each way and rate for 600 s,
-//! by default. Over LabStreamingLayer where the interpreter has pyhoid and pylsl, as that of `cargo xtask places`. It
-//! fails when a sample is lost that is not counted, or one is lost though no one stopped; never for a time.
+//! `cargo xtask slow latency [--seconds N] [--seed N] [--program FILE] [--python FILE]`: each transport and rate for
+//! 600 s by default. Over LabStreamingLayer if the interpreter has pyhoid and pylsl, as that of `cargo xtask places`.
+//! It fails if a lost sample is not counted, or if one is lost although no side stopped; never for a response time.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../tests/common/live/mod.rs"]
@@ -22,7 +22,7 @@ use live::{
 };
 
 const RATES_HZ: [usize; 2] = [100, 1000];
-/// So long readers rest.
+/// Duration of a pause of a reader.
 const PAUSE: Duration = Duration::from_secs(2);
 const HOSTILE: usize = 20_000;
 
@@ -89,7 +89,7 @@ fn shown(time: Duration) -> String {
     format!("{:.2} ms", 1e3 * time.as_secs_f64())
 }
 
-/// The row of LabStreamingLayer, and how many samples were lost; or why there is none.
+/// The row of LabStreamingLayer, and the number of lost samples; or the reason why there is none.
 fn over_lsl(python: PathBuf, rate_hz: usize, seconds: usize) -> Result<(String, usize), String> {
     let output = Command::new(python)
         .args(["-m", "places.pace", &rate_hz.to_string(), &seconds.to_string()])
@@ -104,18 +104,18 @@ fn over_lsl(python: PathBuf, rate_hz: usize, seconds: usize) -> Result<(String, 
     Ok((row.to_owned(), missing.parse().unwrap()))
 }
 
-/// Where this example was built: the folder of the profile.
+/// Folder of the build profile of this example.
 fn profile() -> PathBuf {
     let path = std::env::current_exe().unwrap();
     path.ancestors().nth(2).unwrap().to_owned()
 }
 
-/// The program that is built next to this example.
+/// The program built with this example.
 fn beside_this() -> PathBuf {
     profile().join(format!("hoid{}", std::env::consts::EXE_SUFFIX))
 }
 
-/// The interpreter that the places or the tests have left.
+/// The interpreter that the places or the tests have installed.
 fn interpreter() -> PathBuf {
     let of = |environment: &str| profile().join("../python").join(environment).join("bin/python");
     let found = ["venv-shipped", "venv"].map(of).into_iter().find(|path| path.exists());

@@ -16,26 +16,25 @@ use crate::{
     interrupt,
 };
 
-/// Everything that a command can run into.
+/// Errors of commands.
 #[derive(Debug, Error)]
 pub enum CliError {
     /// The arguments are contradictory or invalid.
     #[error("{0}")]
     Usage(String),
-    /// A file with other columns than were requested, and the command that names them.
+    /// A file with columns other than those requested, and the command that names them.
     #[error("{0}")]
     OtherColumns(String),
-    /// A stream that cannot be read, understood or written.
+    /// A stream that cannot be read, parsed or written.
     #[error("{0}")]
     Stream(String),
-    /// A result that was made and could not be printed.
+    /// A result that could not be printed.
     #[error("standard output cannot be written: {0}; what was asked is missing, or is cut: make room for it")]
     Output(std::io::Error),
-    /// A result that was printed, and reports that the data do not determine the requested
-    /// quantity.
+    /// A printed result for which the data do not determine the requested quantity.
     #[error("the data do not determine the requested quantity: {0}")]
     NotDetermined(String),
-    /// Work that was interrupted and can be resumed.
+    /// Interrupted work that can be resumed.
     #[error("{0}")]
     Stopped(String),
     #[error(transparent)]
@@ -60,13 +59,13 @@ pub enum CliError {
     #[cfg(feature = "lab")]
     #[error(transparent)]
     Lab(Box<hoid_lab::LabError>),
-    /// The reproduction cannot be made.
+    /// A reproduction that failed.
     #[error(transparent)]
     Thesis(#[from] ThesisError),
 }
 
 impl From<AnalysisError> for CliError {
-    /// Options that contradict each other or the data are wrong usage.
+    /// Options that contradict each other or the data are usage errors.
     fn from(error: AnalysisError) -> Self {
         match error {
             AnalysisError::Ident(error) => Self::Ident(error),
@@ -91,7 +90,7 @@ impl From<AnalysisError> for CliError {
     }
 }
 
-/// An option as it is typed.
+/// An option as the user types it.
 fn typed(name: &str) -> String {
     match estimator_setting(name) {
         Some(setting) => format!("--{}", flag(setting.name)),
@@ -101,7 +100,7 @@ fn typed(name: &str) -> String {
 
 #[cfg(feature = "lab")]
 impl From<hoid_lab::LabError> for CliError {
-    /// A configuration that cannot be used is wrong usage.
+    /// An invalid configuration is a usage error.
     fn from(error: hoid_lab::LabError) -> Self {
         match error {
             hoid_lab::LabError::Config { .. } => Self::Usage(error.to_string()),
@@ -111,7 +110,7 @@ impl From<hoid_lab::LabError> for CliError {
 }
 
 impl CliError {
-    /// Problems with options, before anything is read.
+    /// Converts problems with options, before anything is read.
     pub fn of_options(error: AnalysisError) -> Self {
         match error {
             AnalysisError::Ident(IdentError::BadOption {
@@ -123,10 +122,10 @@ impl CliError {
         }
     }
 
-    /// Exit code for the verdict of a printed result.
+    /// Error for the verdict of a printed result.
     ///
     /// # Errors
-    /// [`CliError::NotDetermined`] where the data do not determine the requested quantity.
+    /// [`CliError::NotDetermined`] if the data do not determine the requested quantity.
     pub fn of_verdict(verdict: &Verdict) -> Result<(), Self> {
         match verdict.level {
             VerdictLevel::NotDetermined => {
@@ -137,7 +136,7 @@ impl CliError {
         }
     }
 
-    /// 2 for wrong usage, 1 for data and tasks that give no result, 128 and its number after a signal.
+    /// 2 for usage errors, 1 for data and tasks without a result, 128 plus the number after a signal.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_)

@@ -1,14 +1,14 @@
-//! An operator of the family that polynomials represent, shown to people.
+//! An operator of the family that corresponds to polynomials, as text.
 
 use hoid::ident::family::{FamilyConversion, PoleRole};
 use hoid::model::{GainUnit, NotConvertible};
 
 use crate::text;
 
-/// A conversion, or why there is none.
+/// A conversion, or the reason why there is none.
 pub type Converted = Result<FamilyConversion, NotConvertible>;
 
-/// As a table and sentences.
+/// Formats a conversion as a table and sentences.
 pub fn to_text(found: &Converted, gain: &GainUnit) -> String {
     let found = match found {
         Ok(found) => found,

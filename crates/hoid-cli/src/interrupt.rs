@@ -1,8 +1,8 @@
-//! Interrupts: Ctrl-C, and where the system has them SIGTERM and SIGHUP, which end a command with
-//! its files whole. SIGXFSZ (a limit of the size of files) is an error of writing instead of an end.
+//! Interrupts: Ctrl-C and, if the system has them, SIGTERM and SIGHUP, which end a command without
+//! truncated files. SIGXFSZ (a limit of the size of files) becomes a write error.
 //!
-//! By default output in progress is removed and the program ends with 128 and the number of the
-//! signal. A command that can stop, or has something to report at its end, sets its own answer.
+//! By default output in progress is removed and the program ends with 128 plus the number of the
+//! signal. A command that can be stopped, or reports at its end, sets its own handler.
 
 use std::sync::{
     Mutex, MutexGuard, PoisonError,
@@ -12,14 +12,14 @@ use std::sync::{
 type Handler = Box<dyn FnMut(i32) + Send>;
 
 static HANDLER: Mutex<Option<Handler>> = Mutex::new(None);
-/// The last signal, for the exit code of what was stopped by it.
+/// The last signal, for the exit code of the interrupted command.
 static LAST: AtomicI32 = AtomicI32::new(SIGINT);
 const SIGINT: i32 = 2;
 
-/// Ends the program at an interrupt from here on. A program without this is ended by the system,
-/// and the next one sweeps what it leaves.
+/// From now on, an interrupt ends the program with cleanup. Without this the system ends the
+/// program, and the next one removes its partial output.
 pub fn catch() {
-    // Where interrupts cannot be caught the command runs all the same.
+    // If interrupts cannot be caught the command runs all the same.
     let _ = listen(|signal| {
         LAST.store(signal, Ordering::Relaxed);
         match answer().as_mut() {
@@ -29,7 +29,7 @@ pub fn catch() {
     });
 }
 
-/// Answers interrupts from here on in another way. It is called on a thread of its own.
+/// Sets another handler of interrupts. It is called on a separate thread.
 pub fn on_interrupt(new: impl FnMut(i32) + Send + 'static) {
     *answer() = Some(Box::new(new));
 }
@@ -40,7 +40,7 @@ pub fn end(code: i32) -> ! {
     std::process::exit(code)
 }
 
-/// The exit code after an interrupt, as shells have it.
+/// The exit code after an interrupt, by the convention of shells.
 pub fn exit_code() -> i32 {
     128 + LAST.load(Ordering::Relaxed)
 }
@@ -56,10 +56,10 @@ fn listen(heard: impl Fn(i32) + Send + 'static) -> std::io::Result<()> {
         flag,
         iterator::Signals,
     };
-    // A signal with a handler does not end the program: the write reports EFBIG.
+    // A signal with a handler does not end the program: the write returns EFBIG.
     flag::register(SIGXFSZ, std::sync::Arc::default())?;
     let mut signals = Signals::new([SIGINT, SIGTERM])?;
-    // As `nohup` wants it.
+    // As `nohup` requires.
     if !is_ignored(SIGHUP) {
         signals.add_signal(SIGHUP)?;
     }
@@ -74,8 +74,7 @@ fn listen(heard: impl Fn(i32) + Send + 'static) -> Result<(), ctrlc::Error> {
     ctrlc::set_handler(move || heard(SIGINT))
 }
 
-/// Whether the program was started with a signal ignored, where Linux reports it; elsewhere a signal
-/// is taken for one that is not.
+/// True if the program was started with a signal ignored, if Linux reports it; otherwise false.
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

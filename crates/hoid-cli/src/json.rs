@@ -1,12 +1,11 @@
-//! Results as JSON objects, the contract with other programs: what `hoid::analysis` does not write, and how
-//! one is printed.
+//! Results as JSON objects, the interface to other programs: those that `hoid::analysis` does not write, and printing.
 
 pub use hoid::analysis::json::*;
 use serde_json::Value;
 
 use crate::{error::CliError, output};
 
-/// Prints one object, indented, and nothing else.
+/// Prints one object, indented, without any other output.
 ///
 /// # Errors
 /// The errors of [`output::print`].

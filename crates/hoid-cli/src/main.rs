@@ -1,9 +1,9 @@
 //! The command line `hoid`. Only this crate prints: results to standard output, everything else to
 //! standard error.
 //!
-//! Exit code 0: done; 1: the data or the task cannot give a result, or it cannot be written; 2: wrong usage; 128 and
-//! its number for a signal. `args` states what can be typed, `commands` what it does, one file a command; `json` and
-//! `text` are the two forms of a result.
+//! Exit code 0: success; 1: the data or the task give no result, or it cannot be written; 2: usage error; 128 plus the
+//! number of a signal. `args` defines the arguments, `commands` contains one file per command; `json` and `text` are
+//! the two formats of a result.
 
 mod args;
 mod commands;

@@ -1,4 +1,4 @@
-//! Orders and starts of `hoid track` and `hoid stream` as they are typed.
+//! Parsing of orders and starts of `hoid track` and `hoid stream`.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use hoid::ident::{
 
 use crate::error::CliError;
 
-/// The orders that were typed; the delay is next to them.
+/// The given orders; the delay is separate.
 pub fn named_orders(orders: Option<&str>, nk: Option<&DelayRange>) -> Result<NamedOrders, CliError> {
     let read = orders.filter(|text| !text.trim().is_empty()).map(NamedOrders::read);
     let all = match read {
@@ -31,7 +31,7 @@ pub fn named_orders(orders: Option<&str>, nk: Option<&DelayRange>) -> Result<Nam
     Ok(all)
 }
 
-/// `name=number,name=number`, each name once.
+/// Parses `name=number,name=number`, each name once.
 pub fn parse_numbers(text: &str) -> Result<Vec<(String, f64)>, String> {
     named_pairs(text)
         .map_err(|expected| format!("expected {expected}"))?
@@ -43,7 +43,7 @@ pub fn parse_numbers(text: &str) -> Result<Vec<(String, f64)>, String> {
         .collect()
 }
 
-/// A start from `f1=..,b0=..`, each coefficient once.
+/// Parses a start `f1=..,b0=..`, each coefficient once.
 pub fn start(text: &str) -> Result<BTreeMap<String, f64>, CliError> {
     let numbers = parse_numbers(text).map_err(|reason| CliError::Usage(format!("--start: {reason}")))?;
     Ok(numbers.into_iter().collect())

@@ -1,6 +1,6 @@
-//! Standard output and standard error. A reader that closes the pipe early (`hoid ... | head`) has
-//! what it wanted: the command continues with its files, and nothing is reported. Any other output
-//! that cannot be written, such as a full disk, is an error.
+//! Standard output and standard error. If a reader closes the pipe early (`hoid ... | head`), the
+//! command continues with its files, and nothing is reported. Any other write error, such as a full
+//! disk, is an error.
 
 use std::{
     io::{self, ErrorKind, IsTerminal, Write},
@@ -22,13 +22,13 @@ use crate::error::CliError;
 /// Writes a result to standard output.
 ///
 /// # Errors
-/// [`CliError::Output`] for errors that the operating system reports, but not for a pipe that its
-/// reader has closed.
+/// [`CliError::Output`] for errors that the operating system reports, except for a pipe closed by
+/// its reader.
 pub fn print(text: &str) -> Result<(), CliError> {
     printed(io::stdout().lock().write_all(text.as_bytes()))
 }
 
-/// Writes a page for people to standard output, its sentences wrapped at the width of the screen.
+/// Writes a page of text to standard output, with its sentences wrapped at the width of the screen.
 ///
 /// # Errors
 /// As [`print`].
@@ -40,8 +40,8 @@ pub fn show(page: &str) -> Result<(), CliError> {
     }
 }
 
-/// The page with its verdict in colour: what a terminal shows that takes colours and was not asked
-/// for none (`NO_COLOR`).
+/// The page with its verdict in colour, for a terminal that supports colours unless `NO_COLOR` is
+/// set.
 fn coloured(page: &str) -> String {
     let colour = |level| match level {
         VerdictLevel::Trustworthy => AnsiColor::Green,
@@ -60,11 +60,11 @@ fn coloured(page: &str) -> String {
         .unwrap_or_else(|| page.to_owned())
 }
 
-/// Narrowest and widest line of a page: below, words are cut; above, the eye loses the line.
+/// Minimum and maximum width of a page: below, words are cut; above, lines are hard to follow.
 const WIDTHS: (usize, usize) = (60, 110);
 
-/// Columns of the screen: those of `COLUMNS`, else of the terminal; none if a page goes into a
-/// file, which keeps its lines whole.
+/// Width of the screen in columns: `COLUMNS`, otherwise that of the terminal; none for a page in a
+/// file, whose lines are not wrapped.
 pub fn width() -> Option<usize> {
     let told = std::env::var("COLUMNS").ok().and_then(|text| text.parse().ok());
     let asked = || {
@@ -74,8 +74,8 @@ pub fn width() -> Option<usize> {
     told.or_else(asked).map(|columns| columns.clamp(WIDTHS.0, WIDTHS.1))
 }
 
-/// A page with the lines of its sentences wrapped; tables have the width that they were made with.
-/// What continues a point of a list is below its words.
+/// Wraps the sentences of a page; tables keep their width. Continuation lines of a list item are
+/// indented.
 fn wrapped(page: &str, width: usize) -> String {
     let mut text = String::with_capacity(page.len() + page.len() / 16);
     for line in page.split_inclusive('\n') {
@@ -105,19 +105,18 @@ fn wrapped(page: &str, width: usize) -> String {
     text
 }
 
-/// The report after the answer: words, and what they are reported about.
+/// Remarks to be printed after the result, each with the files that it concerns.
 static NOTICES: Mutex<Vec<(String, Vec<String>)>> = Mutex::new(Vec::new());
 
 /// Prefix of a warning.
 const WARNING: &str = "warning: ";
 
-/// Keeps a warning, as [`notice`].
+/// Keeps a warning, like [`notice`].
 pub fn warning(of: &str, words: &str) {
     notice(of, format!("{WARNING}{words}"));
 }
 
-/// Keeps a remark until the answer is printed; what is reported about several files is reported
-/// once.
+/// Keeps a remark until the result is printed; a remark on several files is printed once.
 pub fn notice(of: &str, words: String) {
     let mut all = NOTICES.lock().unwrap_or_else(PoisonError::into_inner);
     match all.iter_mut().find(|(known, _)| *known == words) {
@@ -127,7 +126,7 @@ pub fn notice(of: &str, words: String) {
     }
 }
 
-/// Writes the remarks that were kept to standard error.
+/// Writes the kept remarks to standard error.
 pub fn tell_notices() {
     let all = std::mem::take(&mut *NOTICES.lock().unwrap_or_else(PoisonError::into_inner));
     for (words, files) in all {
@@ -143,7 +142,7 @@ pub fn tell_notices() {
     }
 }
 
-/// Outcome of something that was written to standard output.
+/// Result of a write to standard output.
 ///
 /// # Errors
 /// As [`print`].
@@ -160,22 +159,22 @@ pub fn printed(written: io::Result<()>) -> Result<(), CliError> {
 
 static READER_LEFT: AtomicBool = AtomicBool::new(false);
 
-/// Whether the reader of standard output has closed the pipe.
+/// True if the reader of standard output has closed the pipe.
 pub fn reader_left() -> bool {
     READER_LEFT.load(Ordering::Relaxed)
 }
 
 /// Writes a warning, a note or an error to standard error.
 pub fn message(text: &str) {
-    // When even standard error is closed there is no place for a message.
+    // If even standard error is closed there is no place for a message.
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
 
-/// A progress bar on standard error with rate and time left; invisible where standard error is not
-/// a terminal.
+/// A progress bar on standard error with rate and remaining time; hidden if standard error is not a
+/// terminal.
 pub fn progress(total: usize, what: &str) -> ProgressBar {
     let bar = ProgressBar::new(total as u64);
-    // Should the template be wrong, the plain bar does as well.
+    // With an invalid template, the plain bar is used.
     if let Ok(style) =
         ProgressStyle::with_template(&format!("{{bar:30}} {{pos}}/{{len}} {what}, {{per_sec}}, {{eta}} left"))
     {
@@ -184,8 +183,8 @@ pub fn progress(total: usize, what: &str) -> ProgressBar {
     bar
 }
 
-/// Does work that may last, with the time since its start on standard error, and a bar with the
-/// time left as soon as it reports how far it is; nothing if standard error is not a terminal.
+/// Runs a long computation with the elapsed time on standard error, and a bar with the remaining
+/// time once it reports progress; nothing if standard error is not a terminal.
 pub fn watched<T>(what: &'static str, work: impl FnOnce() -> T) -> T {
     let bar = ProgressBar::new_spinner().with_message(what);
     if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}, {elapsed}") {

@@ -18,7 +18,7 @@ use crate::{
 /// The option that may be a file.
 const PRIOR: &str = "prior";
 
-/// The recursion that was requested.
+/// The requested recursion.
 ///
 /// # Errors
 /// [`CliError::Usage`].
@@ -41,7 +41,7 @@ pub fn request(args: &RecursionArgs) -> Result<TrackRequest, CliError> {
     })
 }
 
-/// A recursion over a record, as it was requested.
+/// The requested recursion over a record.
 ///
 /// # Errors
 /// As [`request`].
@@ -57,7 +57,7 @@ pub fn tracking(args: &TrackArgs) -> Result<Tracking, CliError> {
     })
 }
 
-/// Searches the orders that a plan leaves open, and shows how far it is.
+/// Selects the orders that a plan leaves open, with a progress display.
 ///
 /// # Errors
 /// The errors of the search.
@@ -65,7 +65,7 @@ pub fn choose(plan: &TrackPlan, span: &Record) -> Result<(TrackOptions, Option<C
     searching(plan, |each| plan.choose(span, each))
 }
 
-/// Work in which the orders that a plan leaves open are searched, with how far it is; `work` calls what it is given after
+/// Runs a computation that selects the open orders of a plan, with a progress display; `work` calls its argument after
 /// every candidate.
 pub fn searching<T>(plan: &TrackPlan, work: impl FnOnce(&(dyn Fn() + Sync)) -> T) -> T {
     if plan.is_settled() {
@@ -78,10 +78,10 @@ pub fn searching<T>(plan: &TrackPlan, work: impl FnOnce(&(dyn Fn() + Sync)) -> T
     done
 }
 
-/// The method of a name as typed; of an earlier name it is shown what it is called now.
+/// The method with a given name; for an earlier name, the present one is reported.
 ///
 /// # Errors
-/// A name that no method has.
+/// An unknown name of a method.
 pub fn method_of(name: &str) -> Result<Method, CliError> {
     if let Some((_, renamed)) = survey::renamed(name) {
         output::notice("", format!("note: {renamed}"));
@@ -89,10 +89,10 @@ pub fn method_of(name: &str) -> Result<Method, CliError> {
     Ok(survey::method(name)?)
 }
 
-/// The method with the options that were typed.
+/// The method with the given options.
 ///
 /// # Errors
-/// [`CliError::Usage`] for an option of another method, or a text that is not a value of it.
+/// [`CliError::Usage`] for an option of another method, or an invalid value.
 fn method(args: &RecursionArgs) -> Result<Method, CliError> {
     let usage = |name: &str, text: &str| CliError::Usage(format!("--{} {text}", flag(name)));
     let mut method = method_of(&args.method)?;
@@ -115,7 +115,7 @@ fn method(args: &RecursionArgs) -> Result<Method, CliError> {
     Ok(method)
 }
 
-/// The file of `--prior`, where it is one.
+/// The file of `--prior`, if it is one.
 pub fn prior_file(args: &RecursionArgs) -> Option<&Path> {
     let prior = args.settings.given().find(|(name, _)| *name == PRIOR);
     prior

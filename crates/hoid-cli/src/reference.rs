@@ -1,7 +1,7 @@
-//! Pages and types that are made from the registry of methods: the book's page of options and the
+//! Pages and types generated from the registry of methods: the book's page of options and the
 //! keywords of the Python package.
 //!
-//! `HOID_UPDATE_DOCS=1 cargo test -p hoid-cli` renews them.
+//! `HOID_UPDATE_DOCS=1 cargo test -p hoid-cli` updates them.
 
 use hoid::analysis::registry::estimators;
 use hoid::ident::settings::{Kind, MethodSpec, Setting};
@@ -76,7 +76,7 @@ fn options_page(methods: &[MethodSpec]) -> String {
     page
 }
 
-/// The keyword in Python, which keeps the word lambda for itself.
+/// The keyword in Python, where lambda is reserved.
 fn keyword(name: &str) -> &str {
     match name {
         "lambda" => "forgetting_factor",
@@ -115,7 +115,7 @@ fn quoted(words: &[&str]) -> String {
         .join(", ")
 }
 
-/// Lines of at most 96 columns, each behind `indent`.
+/// Lines of at most 96 columns, each after `indent`.
 fn wrapped(text: &str, indent: &str) -> String {
     let mut lines = vec![indent.to_owned()];
     for word in text.split_whitespace() {
@@ -137,7 +137,7 @@ struct Keywords<'a> {
 }
 
 impl<'a> Keywords<'a> {
-    /// The entries of the methods, without what Python has in another way.
+    /// The options of the methods, except those that Python has in another form.
     fn of(methods: &'a [MethodSpec], without: &[&str]) -> Self {
         let mut settings: Vec<(&Setting, Vec<&str>)> = Vec::new();
         for spec in methods {
@@ -220,7 +220,7 @@ fn python_settings(methods: &[MethodSpec], batch: &[MethodSpec]) -> String {
             .collect::<String>()
     };
     let recursive = Keywords::of(methods, &[]);
-    // The orders have keywords of their own there.
+    // The orders have their own keywords there.
     let batch = Keywords::of(batch, &["orders"]);
     let methods_text: Vec<String> = methods
         .iter()
@@ -280,8 +280,8 @@ mod tests {
         );
     }
 
-    /// Every option of the registry of estimators is a flag of `hoid identify`, with its default
-    /// where clap knows one.
+    /// Every option of the registry of estimators is a flag of `hoid identify`, with its default if
+    /// clap knows one.
     #[test]
     fn identify_has_the_options_of_the_registry() {
         let mut cli = Cli::command();
@@ -307,7 +307,7 @@ mod tests {
         }
     }
 
-    /// An option that is declared once is there wherever options are.
+    /// An option that is declared once is available wherever options are.
     #[test]
     fn a_new_option_needs_no_other_edit() {
         let mut methods = registry();

@@ -1,8 +1,7 @@
-//! Tables for people: three rules, as in print, and as wide as the screen.
+//! Tables of text: three rules, as in print, and limited to the width of the screen.
 //!
 //! On a narrow screen cells are wrapped between words, never within a word or a number with its error. A table that is
-//! too wide even so becomes a list for each row, and a series of values a transposed table, with as many of its times
-//! as there is room for.
+//! still too wide becomes a list for each row, and a time series a transposed table with as many times as fit.
 
 use std::fmt;
 
@@ -20,16 +19,16 @@ const STYLE: TableStyle = {
 };
 /// Blanks to the left and right of a cell.
 const PADDING: usize = 2;
-/// A blank between two columns.
+/// Blanks between two columns.
 const BETWEEN: usize = 1;
-/// A blank at which no line is broken.
+/// A blank at which lines are not broken.
 const FIXED_BLANK: &str = "\u{a0}";
 
-/// Rows under a header: the first column to the left, the others to the right.
+/// Rows under a header: the first column is left-aligned, the others are right-aligned.
 pub struct Rows {
     header: Vec<String>,
     rows: Vec<Vec<String>>,
-    /// True if rows are instants of one course.
+    /// True if the rows are times of a series.
     course: bool,
 }
 
@@ -42,7 +41,7 @@ impl Rows {
         }
     }
 
-    /// Rows of which some may be left out for want of room, but not the last.
+    /// Marks the rows as a time series, of which some but not the last may be omitted for lack of space.
     pub fn into_time_series(self) -> Self {
         Self { course: true, ..self }
     }
@@ -51,7 +50,7 @@ impl Rows {
         self.rows.push(cells.into_iter().map(Into::into).collect());
     }
 
-    /// The table on a screen of a given number of columns; of any width without.
+    /// The table for a screen of the given width; unlimited without.
     fn on(&self, width: Option<usize>) -> String {
         let whole = self.drawn(None);
         let Some(width) = width else { return whole };
@@ -66,7 +65,7 @@ impl Rows {
         }
     }
 
-    /// A course with its times above and its names before, for a narrow screen; none if not even the last fits.
+    /// A time series transposed, with its times as headings, for a narrow screen; none if not even the last fits.
     fn on_its_side(&self, width: usize) -> Option<String> {
         let last = self.rows.len().checked_sub(1).filter(|_| self.course)?;
         (1..=self.rows.len()).rev().find_map(|count| {
@@ -147,7 +146,7 @@ impl fmt::Display for Rows {
     }
 }
 
-/// A number and its error are one word.
+/// Joins a number and its error to one word.
 fn kept_together(text: &str) -> String {
     text.replace(" ± ", &format!("{FIXED_BLANK}±{FIXED_BLANK}"))
 }
@@ -211,7 +210,7 @@ mod tests {
         for kept in ["anna", "13.5\u{a0}±\u{a0}1.9", "margin", "(deg)", "range"] {
             assert!(narrow.contains(kept), "{kept}\n{narrow}");
         }
-        // No width between, at which a line is longer than the screen.
+        // There is no width at which a line is longer than the screen.
         for width in 20..110 {
             let page = rows().on(Some(width));
             let is_table = page.contains('─');

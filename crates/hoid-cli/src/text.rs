@@ -1,4 +1,4 @@
-//! Results as tables for people.
+//! Results as tables of text.
 
 use hoid::analysis::{Account, Setting};
 use hoid::ident::{
@@ -16,9 +16,9 @@ use hoid::report::numbers;
 
 use crate::table::Rows;
 
-/// Rows of a search that are printed; all of them are in the JSON.
+/// Number of printed candidates of a search; all of them are in the JSON.
 const CANDIDATES_SHOWN: usize = 8;
-/// Faults of a record that are shown one by one.
+/// Maximum number of faults of a record listed individually.
 const FAULTS_SHOWN: usize = 10;
 
 /// A table in the plain style of all output.
@@ -26,26 +26,26 @@ pub fn table(header: &[&str]) -> Rows {
     Rows::under(header)
 }
 
-/// Value and standard error as two texts with the digits that the error allows.
+/// Value and standard error as two texts with the digits that the error permits.
 pub fn with_uncertainty(e: &Estimate) -> (String, String) {
     numbers::with_uncertainty(e.value, e.standard_error)
 }
 
-/// Verdict on the result, on top of it.
+/// The verdict, for the top of the page.
 pub fn verdict(verdict: &Verdict) -> String {
     format!("{verdict}\n\n")
 }
 
-/// Content after the page.
+/// Hint at the end of the page.
 pub const MORE: &str = "More with -v: what else was tried, tests, every setting; --report DIR writes a page.\n";
 
-/// The same where only settings are.
+/// The same if there are only settings.
 pub const MORE_SETTINGS: &str = "More with -v: every setting.\n";
 
-/// Records that are named one by one.
+/// Maximum number of records listed by name.
 const RECORDS_SHOWN: usize = 4;
 
-/// The records in use, and the processing of them.
+/// The records used, and the steps applied to them.
 pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbose: bool) -> String {
     let line = |((file, record), account): ((&String, &Record), &Account)| {
         let mut lines = format!(
@@ -76,7 +76,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbo
     };
     let mut text = String::new();
     for (k, one) in all.enumerate() {
-        // The processing applied to a record is always reported, once for identical records.
+        // The steps applied to a record are always reported, once for identical records.
         if verbose || k < shown || !quiet(one.1) {
             text.push_str(&line(one));
         }
@@ -93,7 +93,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbo
     text
 }
 
-/// The constants of u that were estimated with a fit.
+/// The constants of u estimated with the fit.
 pub fn levels(files: &[String], accounts: &[Account]) -> String {
     let line = |(file, account): (&String, &Account)| {
         let level = account.level.as_ref()?;
@@ -102,7 +102,7 @@ pub fn levels(files: &[String], accounts: &[Account]) -> String {
     files.iter().zip(accounts).filter_map(line).collect()
 }
 
-/// Every option that shaped the result.
+/// Every option that affects the result.
 pub fn settings(settings: &[Setting]) -> String {
     let of = |given: bool| {
         let list = settings.iter().filter(|one| one.given == given);
@@ -116,7 +116,7 @@ pub fn settings(settings: &[Setting]) -> String {
     format!("\nSettings given: {}.\nBy default: {}.\n", of(true), of(false))
 }
 
-/// Orders m of the remnant that a grey box tried; nothing when it was one.
+/// Orders m of the remnant tried by a grey-box fit; nothing if there was only one.
 pub fn remnant_orders(grey_box: &GreyBoxFit) -> String {
     if grey_box.candidates().len() < 2 {
         return String::new();
@@ -138,7 +138,7 @@ pub fn remnant_orders(grey_box: &GreyBoxFit) -> String {
     format!("{rows}\n\n")
 }
 
-/// The operators of the records after the first, where a grey box has parameters for each.
+/// The operators of the records after the first, if a grey-box fit has parameters for each.
 pub fn other_records(grey_box: &GreyBoxFit, files: &[String], gain: &GainUnit) -> String {
     let differs = |k: &usize| grey_box.operator_parameters(*k) != grey_box.operator_parameters(0);
     let mut text = String::new();
@@ -156,7 +156,7 @@ pub fn coefficients(fit: &Fit) -> String {
     format!("{}\n", estimates(what, named))
 }
 
-/// How the search ended.
+/// Termination of the search.
 pub fn search(fit: &Fit) -> String {
     let t = fit.termination();
     format!(
@@ -167,7 +167,7 @@ pub fn search(fit: &Fit) -> String {
     )
 }
 
-/// Problems with the model itself; nothing mostly.
+/// Problems of the model itself; usually none.
 pub fn instability(fit: &Fit) -> &'static str {
     if fit.model().is_stable() {
         ""
@@ -176,7 +176,7 @@ pub fn instability(fit: &Fit) -> &'static str {
     }
 }
 
-/// A number of something as text: "1 step", "2 steps".
+/// A count as text: "1 step", "2 steps".
 pub fn counted(n: u64, what: &str) -> String {
     match n {
         1 => format!("1 {what}"),
@@ -184,7 +184,7 @@ pub fn counted(n: u64, what: &str) -> String {
     }
 }
 
-/// How much of u the model explains, in a line.
+/// Share of u that the model explains, in one line.
 pub fn fit_line(fit: &Fit, q: &GoodnessOfFit) -> String {
     if fit.model().structure().has_input() {
         format!(
@@ -224,10 +224,10 @@ pub fn quality(fit: &Fit, q: &GoodnessOfFit) -> String {
     text
 }
 
-/// Half the width of an interval of 95 % of a normal distribution, in standard errors.
+/// Half width of a 95 % interval of a normal distribution, in standard errors.
 const NORMAL_95: f64 = 1.959_963_984_540_054;
 
-/// The ends of the interval of 95 % by the standard error, with three digits; empty without one.
+/// The ends of the 95 % interval from the standard error, with three digits; empty without one.
 pub fn interval(e: &Estimate) -> (String, String) {
     let end = |sign: f64| {
         let error = e.standard_error.filter(|error| error.is_finite());
@@ -236,7 +236,7 @@ pub fn interval(e: &Estimate) -> (String, String) {
     (end(-1.0), end(1.0))
 }
 
-/// Three digits: an interval has no more.
+/// Formats three significant digits, which suffice for an interval.
 pub fn significant(value: f64) -> String {
     hoid::model::numbers::significant(value, 3)
 }
@@ -249,7 +249,7 @@ pub fn plus_minus(e: &Estimate) -> String {
     }
 }
 
-/// Name, value ± standard error, interval of 95 % and unit of parameters, a row each.
+/// Name, value ± standard error, 95 % interval and unit of parameters, one row each.
 pub fn estimates<'a>(what: &str, all: impl IntoIterator<Item = (&'a str, String, Estimate)>) -> Rows {
     let all: Vec<(&str, String, Estimate)> = all.into_iter().collect();
     let with_units = all.iter().any(|(_, unit, _)| !unit.is_empty());
@@ -264,7 +264,7 @@ pub fn estimates<'a>(what: &str, all: impl IntoIterator<Item = (&'a str, String,
     rows
 }
 
-/// The operator's parameters, or why there are none.
+/// The parameters of the operator, or the reason why there are none.
 pub fn operator(found: &Result<OperatorEstimate, NotConvertible>, gain: &GainUnit) -> String {
     match found {
         Ok(o) => {
@@ -281,7 +281,7 @@ pub fn operator(found: &Result<OperatorEstimate, NotConvertible>, gain: &GainUni
     }
 }
 
-/// T_n and K_n, or why there are none.
+/// T_n and K_n, or the reason why there are none.
 pub fn remnant(found: &Result<RemnantEstimate, NotConvertible>) -> String {
     match found {
         Ok(r) => {
@@ -299,7 +299,7 @@ fn not_convertible(reason: &NotConvertible) -> String {
     format!("not convertible: {reason}")
 }
 
-/// Crossover and margins in a line.
+/// Crossover and margins in one line.
 pub fn margins(m: &MarginEstimates) -> String {
     let or_none = |value: Option<Estimate>, unit: &str| match value {
         Some(e) => {
@@ -325,7 +325,7 @@ pub fn margins(m: &MarginEstimates) -> String {
     )
 }
 
-/// Crossover and margins of a loop that is known in a line, and each crossover where there are several.
+/// Crossover and margins of a known loop in one line, and each crossover if there are several.
 pub fn crossings(all: &Crossings) -> String {
     let mut line = margins(&all.margins().into());
     if all.gain.len() > 1 {
@@ -339,9 +339,9 @@ pub fn crossings(all: &Crossings) -> String {
     line
 }
 
-/// Report of there is to on the loop of an estimate next to its lowest crossover: the others, the smallest phase
-/// margin, the gain margin, and that it is not stable. Nothing is reported about one that crosses once and is stable,
-/// unless it is requested.
+/// Additional properties of the loop of an estimate besides its lowest crossover: the other crossovers, the smallest
+/// phase margin, the gain margin, and instability. Nothing is reported for a stable loop with one crossover, unless
+/// requested.
 pub fn loop_shape(shape: &LoopShape, always: bool) -> String {
     if !always && shape.crossovers.len() < 2 && shape.is_stable() != Some(false) {
         return String::new();
@@ -416,7 +416,7 @@ pub fn roots(fit: &Fit) -> String {
     format!("{rows}\n")
 }
 
-/// Results of the residuals, record by record.
+/// Residual tests, record by record.
 pub fn residual_tests(files: &[String], validations: &[Validation]) -> String {
     let mut rows = table(&["residuals of", "Ljung-Box Q", "degrees", "p", "signs"]);
     let (mut coloured, mut missed, mut feedback) = (false, false, false);
@@ -465,7 +465,7 @@ pub fn residual_tests(files: &[String], validations: &[Validation]) -> String {
     text
 }
 
-/// How well the delay is known, of a search over nk: tau_e = (nk - 1) Ts.
+/// Uncertainty of the delay from a search over nk: tau_e = (nk - 1) Ts.
 pub fn delay(choice: &Choice) -> String {
     let ts = choice.fit.model().sample_time().s();
     let seconds = |nk: usize| significant((nk as f64 - 1.0).max(0.0) * ts);
@@ -490,7 +490,7 @@ pub fn candidates(choice: &Choice) -> String {
         let value = |f: &hoid::ident::order_selection::CandidateFigures| f.value(choice.criterion);
         value(a.1).total_cmp(&value(b.1))
     });
-    // The default columns, and the one that decided where it is another.
+    // The default columns, and the selection criterion if it is another one.
     let decides = !matches!(choice.criterion, Criterion::Loss | Criterion::Aic | Criterion::Bic);
     let mut header = vec!["candidate", "loss", "AIC", "BIC", ""];
     if decides {

@@ -1,4 +1,4 @@
-//! Numbers that no work could meet are reported at once, with their limit.
+//! Excessive numbers are reported at once, with their limit.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -53,7 +53,7 @@ fn limits_are_named_at_once() {
         assert_eq!(code, 2, "{arguments:?}: {message}");
         assert!(message.contains(said), "{arguments:?}: {message}");
     }
-    // A horizon beyond the record is no more than the record.
+    // A horizon beyond the record is limited to the record.
     good(
         d,
         &[

@@ -1,4 +1,4 @@
-//! Conditions compared, from what `hoid group --json` printed.
+//! Comparison of conditions, from the output of `hoid group --json`.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -102,7 +102,7 @@ fn mistakes_have_remedies() {
     }
     let (code, said) = bad(at, &["compare", "."]);
     assert!(code == 1 && said.contains("there is no group.toml"), "{said}");
-    // No one has a margin: that is reported, and nothing is determined.
+    // No person has a margin: that is reported, and nothing is determined.
     let output = hoid(at, &["compare", "results.json", "--of", "phase_margin"]);
     assert_eq!(output.status.code(), Some(1));
     assert!(String::from_utf8(output.stdout).unwrap().contains("without P03 in fo"));

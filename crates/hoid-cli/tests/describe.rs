@@ -1,5 +1,5 @@
-//! `hoid describe` as a user runs it: simulated runs, signals known by hand, and input that cannot
-//! be described.
+//! `hoid describe` from the command line: simulated runs, signals known in closed form, and input
+//! that cannot be described.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -10,7 +10,7 @@ use common::{bad, good, hoid, json};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// A record of 20 s periods at 10 Hz: `d` at five lines, `e = d`, u as told.
+/// A record of 20 s periods at 10 Hz: `d` at five lines, `e = d`, u as given.
 fn write(at: &Path, name: &str, samples: usize, u: impl Fn(f64, usize) -> f64) {
     let mut text = String::from("t,e,u,d,r\n");
     for k in 0..samples {
@@ -28,7 +28,7 @@ fn excitation(t: f64) -> f64 {
         .sum()
 }
 
-/// A fixed sequence that looks like noise.
+/// A fixed pseudo-random sequence.
 fn rough(k: usize, stream: usize) -> f64 {
     (0.37 * (k * k) as f64 + (3 * stream) as f64).sin()
 }
@@ -89,14 +89,14 @@ fn simulated_runs_have_their_loop() {
     ] {
         assert!(number(&line[key]).is_finite(), "{key}");
     }
-    // A tenth of the variance is remnant by definition, of which some is at the lines.
+    // A tenth of the variance is remnant by definition, some of it at the lines.
     let remnant = &found["remnant"];
     let (share, ratio) = (
         number(&remnant["share"]["value"]),
         number(&remnant["noise_ratio"]["value"]),
     );
     assert!(share < ratio && (0.07..0.13).contains(&ratio), "{share} {ratio}");
-    // The same without naming what is found anyway, for people.
+    // The same with automatic detection, as text.
     let page = good(at, &[&["describe", "-v"], &names[..], &options[2..]].concat());
     assert!(page.starts_with("Verdict: trustworthy\n"), "{page}");
     for text in [
@@ -106,7 +106,7 @@ fn simulated_runs_have_their_loop() {
     ] {
         assert!(page.contains(text), "{text}: {page}");
     }
-    // Three runs or more count as runs, one is doubtful.
+    // Three or more runs give errors between runs; a single one is doubtful.
     let one = json(at, &["describe", "1.csv", "--json"]);
     assert_eq!(one["verdict"]["level"], "doubtful");
     assert_eq!(one["verdict"]["findings"][0]["kind"], "few-runs");
@@ -136,7 +136,7 @@ fn what_was_recorded_late_is_put_back() {
             .collect()
     };
     // The span keeps its whole periods whatever the offset. 5 samples are the delay; the last line
-    // is turned by 207 deg and follows without a jump.
+    // is shifted by 207 deg without a phase jump.
     for options in [&[][..], &["--from", "0", "--to", "60"], &["--from", "20"]] {
         for phase in phases(options) {
             assert!(phase.abs() < 1.0, "{options:?} {phase}");
@@ -252,7 +252,7 @@ fn what_cannot_be_described_is_said() {
             "{options:?} {found}: {message}"
         );
     }
-    // Lines by hand, at harmonics of the period: one that is missing is a doubt.
+    // Given lines, at harmonics of the period: a missing one makes the result doubtful.
     let lines = ["0.62831853", "1.57079633", "2.82743339"].join(",");
     let found = json(
         at,

@@ -1,4 +1,4 @@
-//! A forcing function is designed, judged and simulated.
+//! A forcing function is designed, evaluated and simulated.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -54,7 +54,7 @@ fn a_design_is_judged_and_runs() {
         .unwrap();
     assert!(tau["standard_error"].as_f64().unwrap() < of_text["standard_error"].as_f64().unwrap());
     assert!(fs::read_to_string(at.join("t.md")).unwrap().contains("| tau_e | 0.25"));
-    // The scenario has the person, and the lines are those of the design.
+    // The scenario contains the operator, and the lines are those of the design.
     good(
         at,
         &["simulate", "--scenario", "design/scenario.toml", "--out", "run.csv"],

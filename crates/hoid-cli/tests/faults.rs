@@ -1,4 +1,4 @@
-//! Faults of recorded data, as a user meets them: no estimate beyond four standard errors of the truth silently.
+//! Faults of recorded data: no estimate deviates by more than four standard errors from the truth without a finding.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -185,7 +185,7 @@ fn wrong_units_wrong_columns_and_a_wrong_sign() {
     let found = identified(d, &[]);
     assert_eq!(found["verdict"]["level"], "not determined");
     assert_eq!(kinds(&found)[0], "time-unit");
-    // Polynomials are of any system, of a furnace too: worth knowing.
+    // Polynomial models are used for any system, also a furnace: a note only.
     let found = identified(d, &BOX_JENKINS);
     assert_eq!(found["verdict"]["level"], "trustworthy", "{found}");
     assert!(kinds(&found).contains(&"time-unit"), "{found}");
@@ -240,7 +240,7 @@ fn an_offset_is_estimated_and_biases_nothing() {
         for ((name, one, error), (_, other, _)) in estimates(&clean).iter().zip(estimates(&found)) {
             assert!((one - other).abs() < 0.01 * error, "{share}: {name} {one} {other}");
         }
-        // c moves by what was added to u, less the response to what was added to e.
+        // c changes by the constant added to u, minus the response to the constant added to e.
         let gain = estimates(&found).iter().find(|(name, ..)| name == "K_e").unwrap().1;
         let (by, (_, error)) = (level(&found).0 - level(&clean).0, level(&found));
         let added = share * of_u - gain * share * of_e;
@@ -248,7 +248,7 @@ fn an_offset_is_estimated_and_biases_nothing() {
             error > 0.0 && (by - added).abs() < 0.01 * added.abs().max(error),
             "{by} {added}"
         );
-        // As they are: reported where it matters.
+        // Unchanged data: reported where relevant.
         let kept = identified(d, &[&BOX_JENKINS[..], &["--detrend", "mean"]].concat());
         assert!(kept["records"][0]["level"].is_null());
         let page = good(d, &[&["identify", "c.csv", "-v"], &BOX_JENKINS[..]].concat());
@@ -256,7 +256,7 @@ fn an_offset_is_estimated_and_biases_nothing() {
         let family = identified(d, &["--form", "lead"]);
         assert!(family["records"][0]["level"]["value"].is_number());
     }
-    // A simulated run carries its truth, and has no level.
+    // A simulated run contains its true values, and has no level.
     let as_simulated = json(d, &[&["identify", "run.csv", "--json"], &BOX_JENKINS[..]].concat());
     assert!(as_simulated["records"][0]["level"].is_null());
 }

@@ -1,5 +1,4 @@
-//! `hoid fmu`: what goes into a unit, and the refused input. That it runs in a simulator is tested with the Python
-//! package.
+//! `hoid fmu`: contents of a unit, and refused input. The run in a simulator is tested with the Python package.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -10,7 +9,7 @@ use tempfile::TempDir;
 
 use common::{bad, good};
 
-/// The head of a shared library of Linux, and the names of the functions of that of hoid.
+/// The head of a shared library for Linux, with the function names of that of hoid.
 fn library(folder: &TempDir) {
     let mut bytes = vec![0_u8; 64];
     bytes[..6].copy_from_slice(b"\x7fELF\x02\x01");
@@ -77,7 +76,7 @@ fn what_makes_no_unit_says_why() {
         (&["--method", "rpem", "--prior", "none"], "adaptive"),
         (&["--sample-time", "0"], "sample time"),
         (&["--operator", "nowhere.toml"], "nowhere.toml"),
-        // Its control would hang on the error of the same sample.
+        // Its control would depend on the error of the same sample.
         (&["--operator", "quick.toml"], "tau_e"),
         (&["--operator", "C4", "--method", "rpem"], "--operator"),
         (&["--seed", "3"], "--operator"),

@@ -32,7 +32,7 @@ fn experiment() -> TempDir {
     ];
     let said = good(directory.path(), &arguments);
     assert!(said.contains("8 runs") && said.contains("truth.csv"), "{said}");
-    // A short range of the delay keeps the test short.
+    // A narrow range of the delay makes the test fast.
     let manifest = directory.path().join("people/group.toml");
     let text = fs::read_to_string(&manifest).unwrap();
     assert!(text.contains("[analysis]\n"), "{text}");
@@ -71,7 +71,7 @@ fn a_virtual_experiment_is_analysed_and_reported() {
     let at = directory.path();
     let said = good(at, &["group", "people", "--out", "out", "--csv", "-v"]);
     assert!(said.starts_with("Verdict: "), "{said}");
-    // What failed and what is doubtful comes before the numbers.
+    // Failures and doubtful results come before the numbers.
     let at_operators = said.find("Operators").unwrap();
     assert!(
         said.find("C3 has no operator of the whole run").unwrap() < at_operators,
@@ -114,7 +114,7 @@ fn a_virtual_experiment_is_analysed_and_reported() {
             .count()
     };
     assert!(of("C3") > 0 && of("C1") == 0, "{settling}");
-    // Again: refused, and with --resume nothing is done twice.
+    // Again: refused, and with --resume nothing is computed twice.
     let (code, message) = bad(at, &["group", "people", "--out", "out"]);
     assert!(code == 1 && message.contains("--resume"), "{message}");
     let found = json(at, &["group", "people", "--out", "out", "--csv", "--resume", "--json"]);
@@ -139,13 +139,13 @@ fn a_virtual_experiment_is_analysed_and_reported() {
                 measure["standard_error"].as_f64().unwrap(),
             );
             let end = |i: usize| measure["interval"][i].as_f64().unwrap();
-            // For a mixture over forms, so that it need not be symmetric.
+            // The posterior is a mixture over forms, so that it need not be symmetric.
             assert!(error > 0.0 && end(0) < value && value < end(1), "{measure}");
             assert!(end(1) - end(0) > 2.0 * 1.96 * error, "{measure}");
         }
         assert!(person["verdict"]["level"].is_string());
     }
-    // A file that has changed is another group.
+    // A modified file makes a different group.
     fs::write(
         at.join("people/group.toml"),
         fs::read_to_string(at.join("people/group.toml")).unwrap() + "\n# looked through\n",
@@ -222,7 +222,7 @@ fn init_looks_at_the_files_and_says_what_it_saw() {
         let next = text[at_evidence..].lines().nth(1).unwrap();
         assert!(next.starts_with(line), "{next}: {text}");
     }
-    // What is known is taken as it is.
+    // Known settings are used unchanged.
     let known = [
         "--input",
         "-e",
@@ -282,7 +282,7 @@ fn a_manifest_is_made_from_names_and_mistakes_are_named() {
     }
     let joined = text.replace("subject = \"anna\"", "then = \"nothing.csv\"\nsubject = \"anna\"");
     fs::write(at.join("joined.toml"), joined).unwrap();
-    // All runs failed: no result, and what there is to report is written.
+    // All runs failed: no result, and the available information is written.
     let output = hoid(at, &["group", "joined.toml", "--out", "joined", "--csv"]);
     let message = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(

@@ -1,5 +1,5 @@
-//! Files as they should not be: cut, with decimal commas, without units, with cells that a
-//! spreadsheet would run.
+//! Damaged and unusual files: truncated, with decimal commas, without units, with cells that a
+//! spreadsheet would execute.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -84,7 +84,7 @@ fn gains_without_units_are_not_in_degrees() {
         ("# units: e deg\n", None, None),
         ("# units: e deg\n", Some("u=V"), Some("V/deg")),
         ("", Some("e=mm,u=deg"), Some("deg/mm")),
-        // Any word is a unit, and is kept as typed.
+        // Any word is a unit, and is kept as given.
         ("# units: e deg\n", Some("u=dog"), Some("dog/deg")),
     ] {
         let rest: String = text.lines().skip(1).map(|line| format!("{line}\n")).collect();

@@ -1,5 +1,5 @@
-//! Lines of a stream as no one wrote them: each that is not a comment gives one line of JSON,
-//! nothing ends the stream, and what follows is tracked.
+//! Invalid lines of a stream: each that is not a comment gives one line of JSON, none ends the
+//! stream, and the following samples are tracked.
 #![allow(clippy::unwrap_used)]
 
 use std::{
@@ -11,7 +11,7 @@ use std::{
 use proptest::{collection::vec, prelude::*, sample::select, test_runner::RngSeed};
 use serde_json::Value;
 
-/// Cells that are numbers, nearly numbers, and something else.
+/// Cells that are numbers, nearly numbers, and other text.
 const CELLS: [&str; 28] = [
     "0",
     "-0.5",
@@ -56,7 +56,7 @@ fn line() -> impl Strategy<Value = Vec<u8>> {
     ]
 }
 
-/// Whether a line counts: neither blank nor a comment.
+/// True if a line counts: neither blank nor a comment.
 fn counts(line: &[u8]) -> bool {
     let text = String::from_utf8_lossy(line);
     let text = text.trim_matches(['\r', ' ', '\u{feff}']);
@@ -101,8 +101,8 @@ proptest! {
         let expected = hostile.iter().filter(|line| counts(line)).count() + good as usize;
         prop_assert_eq!(lines.len(), expected);
         let last = lines.last().unwrap();
-        // The bare method follows what is a number, however wild (`--method physical` holds it back);
-        // what is none reaches no estimate.
+        // The method without a guard follows all numbers, however extreme (`--method physical`
+        // holds them back); other cells reach no estimate.
         for (name, parameter) in last["parameters"].as_object().unwrap() {
             prop_assert!(parameter["value"].as_f64().is_some(), "{}: {}", name, parameter);
         }

@@ -66,7 +66,7 @@ fn identify_prints_the_json_of_the_contract() {
     assert_eq!(found["candidates"], serde_json::json!([]));
 }
 
-/// The bytes with which a file starts report what it is, and it has the width that was requested.
+/// The first bytes of a file identify its format, and it has the requested width.
 #[test]
 #[cfg(feature = "pdf-png")]
 fn a_figure_is_a_page_or_a_picture_as_its_name_says() {
@@ -83,7 +83,7 @@ fn a_figure_is_a_page_or_a_picture_as_its_name_says() {
     assert!(pdf.starts_with(b"%PDF-") && text.contains("/MediaBox [0 0 240.9") && text.contains("/Font"));
     let png = draw("bode.png");
     assert!(png.starts_with(b"\x89PNG\r\n\x1a\n"));
-    // At 300 dots an inch; the width is in the first chunk.
+    // At 300 dots per inch; the width is in the first chunk.
     let width = u32::from_be_bytes(png[16..20].try_into().unwrap());
     assert!(width.abs_diff(1004) <= 4, "{width}");
 }
@@ -180,7 +180,7 @@ fn every_structure_and_method_runs_from_the_command_line() {
         assert_eq!(found["structure"], name);
         assert!(found["fit"]["vaf_prediction"].as_f64().unwrap() > 50.0, "{name}");
     }
-    // An output alone needs no column e.
+    // With an output only, no column e is needed.
     let text = fs::read_to_string(d.join("c1.csv")).unwrap();
     fs::write(d.join("alone.csv"), text.replace(",e,", ",was_e,")).unwrap();
     for name in ["ar", "ma", "arma"] {
@@ -407,7 +407,8 @@ fn several_records_start_validation_report_and_margins() {
     assert!(page.contains("<svg") && page.contains("again.csv"), "{}", page.len());
 }
 
-/// The gain of the loop is one at three frequencies with this element: stable at the lowest crossover, not as a whole.
+/// The gain of the loop is one at three frequencies with this element: stable at the lowest crossover, but not as a
+/// whole.
 #[test]
 fn a_loop_that_is_not_stable_is_a_doubt() {
     let directory = simulated();
@@ -446,7 +447,7 @@ fn a_loop_that_is_not_stable_is_a_doubt() {
     );
 }
 
-/// What anyone tries first: a simulation without noise gives its operator back, and reports that there is no noise.
+/// A simulation without noise gives its operator back, and reports that there is no noise.
 #[test]
 fn a_simulation_without_noise_gives_its_operator_back() {
     let directory = TempDir::new().unwrap();
@@ -493,7 +494,7 @@ fn a_simulation_without_noise_gives_its_operator_back() {
     }
 }
 
-/// With noise at any share of the power of u from rounding to a thousandth the form is the same, and nothing is a doubt.
+/// With noise at any share of the power of u from rounding to a thousandth the form is the same, and there is no doubt.
 #[test]
 fn a_simulation_with_little_noise_is_identified() {
     let directory = TempDir::new().unwrap();
@@ -518,7 +519,7 @@ fn a_simulation_with_little_noise_is_identified() {
             (&"lead".into(), &"trustworthy".into()),
             "{level}"
         );
-        // For a gain: 0.3 sqrt(share), and some rounding.
+        // For a gain: 0.3 sqrt(share), plus rounding.
         let allowed = 0.3 * level.parse::<f64>().unwrap().sqrt();
         for (name, expected) in [("K_e", 0.09), ("K_e_dot", 0.036), ("tau_e", 0.28)] {
             let value = found["operator"][name]["value"].as_f64().unwrap();
@@ -527,8 +528,8 @@ fn a_simulation_with_little_noise_is_identified() {
     }
 }
 
-/// The delay of a person whose error was logged at a tenth of its rate is right by one of the two values, and by the
-/// course that is requested.
+/// For an error logged at a tenth of its rate, one of the two delays is right, and so is that for the given intersample
+/// behaviour.
 #[test]
 fn the_course_between_samples_moves_the_delay_by_half_a_sample() {
     let directory = simulated();
@@ -543,7 +544,7 @@ fn the_course_between_samples_moves_the_delay_by_half_a_sample() {
         tau(&auto) + 0.005
     );
     assert_eq!(straight["intersample"]["tau_e_if_straight"], Value::Null);
-    // One model: what is left is the centre of the prior.
+    // One model: the remaining value is the centre of the prior.
     assert!((tau(&straight) - tau(&auto) - 0.005).abs() < 1e-4 && (tau(&held) - tau(&auto)).abs() < 1e-3);
     let text = good(
         d,

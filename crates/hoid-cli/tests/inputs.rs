@@ -1,4 +1,4 @@
-//! `hoid identify` of a person who sees a target besides the error.
+//! `hoid identify` of an operator who sees a target in addition to the error.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -11,7 +11,7 @@ use tempfile::TempDir;
 
 const PURSUIT: &str = include_str!("../../../fixtures/scenario/pursuit.toml");
 
-/// Runs of the scenario, as a display shows it: the target f_t is seen.
+/// Runs of the scenario with a display of the target f_t.
 fn runs(at: &Path, scenario: &str, n: usize) -> Vec<String> {
     fs::write(at.join("task.toml"), scenario).unwrap();
     let of = |seed: usize| {
@@ -31,7 +31,7 @@ fn of<'v>(parameters: &'v Value, name: &str) -> &'v Value {
     all.iter().find(|p| p["name"] == name).unwrap()
 }
 
-/// Standard errors by which an estimate is off.
+/// Deviation of an estimate from the truth, in standard errors.
 fn off(estimate: &Value, truth: f64) -> f64 {
     (estimate["value"].as_f64().unwrap() - truth) / estimate["standard_error"].as_f64().unwrap()
 }
@@ -71,7 +71,7 @@ fn both_responses_are_found_and_one_input_is_told_off() {
         let off = off(of(parameters, name), truth);
         assert!(off.abs() < 3.5, "{name} is off by {off} errors");
     }
-    // By hand: |2.2/omega| = 1 except for the neuromuscular system.
+    // By hand: |2.2/omega| = 1, except for the neuromuscular system.
     let crossover = &two["open_loop"]["crossover_rad_s"];
     assert!(off(crossover, 2.236).abs() < 3.5, "{crossover}");
 

@@ -1,4 +1,4 @@
-//! `hoid lab` of a program that was built without it.
+//! `hoid lab` in a program built without it.
 #![cfg(not(feature = "lab"))]
 #![allow(clippy::unwrap_used)]
 

@@ -1,5 +1,5 @@
-//! One look at a file: `hoid info`, `hoid group init`, `identify`, `describe` and `track` see the same columns and the
-//! same span, and report what to type.
+//! Inspection of a file: `hoid info`, `hoid group init`, `identify`, `describe` and `track` find the same columns and
+//! the same span, and give the arguments to use.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -10,7 +10,7 @@ use tempfile::TempDir;
 
 use common::{bad, good, hoid, json, wave, write};
 
-/// A person on an integrator, recorded as time, r, y and u: two periods of 20 s, started 3 s before the first and
+/// An operator with an integrator, recorded as time, r, y and u: two periods of 20 s, started 3 s before the first and
 /// stopped 1 s after the last.
 fn recorded() -> TempDir {
     let directory = TempDir::new().unwrap();
@@ -25,7 +25,7 @@ fn recorded() -> TempDir {
     assert_eq!(rows.len(), 2400);
     let mut csv = "time,r,y,u\n".to_owned();
     for k in 0..2640_usize {
-        // Columns t, e, u, d, y, of which the last rows come first again.
+        // Columns t, e, u, d, y, with the last rows repeated at the start.
         let row = &rows[(k + 2400 - 180) % 2400];
         // No target before the first period and after the last.
         let (r, e) = (if !(180..2580).contains(&k) { 0.0 } else { row[3] }, row[1]);
@@ -40,7 +40,7 @@ fn words(line: &str) -> Vec<&str> {
     line.split(' ').collect()
 }
 
-/// The arguments of a command that was shown.
+/// The arguments of a displayed command.
 fn shown<'a>(text: &'a str, verb: &str) -> Vec<&'a str> {
     let at = text.find(&format!("hoid {verb} ")).unwrap();
     words(text[at..].lines().next().unwrap()).split_off(1)
@@ -81,7 +81,7 @@ fn one_file_has_one_reading() {
     );
     assert_eq!(manifest["conditions"]["so"]["excitation"].as_str(), Some("r"));
 
-    // Without the columns each reports which they are, and what it reports can be typed.
+    // Without the columns each command reports them, with arguments that can be used.
     for (verb, more) in [
         ("identify", &[][..]),
         ("describe", &[]),
@@ -97,7 +97,7 @@ fn one_file_has_one_reading() {
         let found = json(at, &[&command[..], &["--from", "3", "--to", "43", "--json"]].concat());
         assert_eq!(found["records"][0]["samples"], 2400, "{verb}");
     }
-    // What was typed is replaced; of another name a near one is searched for.
+    // Given values are replaced; for an unknown name a similar one is searched for.
     let (_, message) = bad(at, &["identify", file, "--input", "R"]);
     assert!(message.contains("did you mean \"r\"?"), "{message}");
     let (_, message) = bad(at, &["identify", file, "--input=e", "--output", "u"]);
@@ -143,7 +143,7 @@ fn nothing_is_guessed_where_it_is_not_certain() {
     assert_eq!(code, 1);
 }
 
-/// Samples, and estimates with their errors by name, of the people of a group.
+/// Samples, and estimates with their errors by name, for the people of a group.
 fn of_group(at: &Path, manifest: &str) -> (f64, Vec<(f64, f64)>) {
     fs::write(at.join("runs/group.toml"), manifest).unwrap();
     let _ = fs::remove_dir_all(at.join("out"));
@@ -191,7 +191,7 @@ fn whole_periods_are_kept_under_an_offset() {
             assert!((one.1 - other.1).abs() <= 1e-6 * one.1, "{of_identify:?} {of_group:?}");
         }
     }
-    // Where the file ends with the span there is nothing to move in from.
+    // If the file ends with the span, no further rows are available.
     let whole = words("--input r-y --offset u=1 --json");
     let found = json(at, &[&["identify", "runs/A_so_1.csv"][..], &whole].concat());
     assert_eq!(found["records"][0]["samples"], 2639);
@@ -235,7 +235,7 @@ fn a_delay_in_seconds_is_nk() {
     }
 }
 
-/// What `info` states of a cell is what a reader makes of it.
+/// `info` interprets a cell in the same way as the reader.
 #[test]
 fn a_cell_is_the_same_to_info_and_to_who_reads_it() {
     let directory = TempDir::new().unwrap();

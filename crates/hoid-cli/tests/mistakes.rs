@@ -1,4 +1,4 @@
-//! Contents of a file, and the report where it or the command line is not as it should be.
+//! Messages about invalid files and arguments.
 #![allow(clippy::unwrap_used)]
 
 mod common;

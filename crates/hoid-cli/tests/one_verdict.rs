@@ -14,10 +14,10 @@ const ELEMENT: &str = "90/(s(s+6))";
 const ROWS: usize = 4096;
 
 type Rows = Vec<[f64; 2]>;
-/// Name of a fault, and how it comes into a recording.
+/// Name of a fault, and the function that adds it to a recording.
 type Spoilt = (&'static str, fn(&mut Rows));
 
-/// What went wrong with both runs of a person.
+/// Faults of both runs of a person.
 const SPOILT: [Spoilt; 9] = [
     ("clean", |_| ()),
     ("clipped", |rows| {
@@ -122,7 +122,7 @@ fn a_group_finds_word_for_word_what_identify_finds() {
         let kinds = verdict["findings"].as_array().unwrap().iter();
         seen.extend(kinds.map(|finding| finding["kind"].as_str().unwrap().to_owned()));
     }
-    // The recordings do trip the rules.
+    // The recordings do have the faults.
     for kind in ["stick-at-its-end", "coarse", "faults"] {
         assert!(seen.contains(kind), "{kind}: {seen:?}");
     }

@@ -1,4 +1,4 @@
-//! Where results go: never over what they are made of, never half, never silently nowhere.
+//! Outputs: they never overwrite their inputs, are never partial, and never fail silently.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -101,7 +101,7 @@ fn places_that_take_nothing_are_known_before_the_work() {
     }
 }
 
-/// Each command that prints, quick.
+/// Each command that prints, with fast arguments.
 fn printing() -> Vec<Vec<&'static str>> {
     let mut identify = vec!["identify", "in.csv"];
     identify.extend(SETTLED);
@@ -168,7 +168,7 @@ fn printing() -> Vec<Vec<&'static str>> {
     ]
 }
 
-/// Exit code and standard error of a command whose output goes elsewhere.
+/// Exit code and standard error of a command with redirected output.
 fn printed_into(directory: &Path, arguments: &[&str], out: Stdio) -> (Option<i32>, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_hoid"))
         .args(arguments)
@@ -222,7 +222,7 @@ fn a_reader_that_leaves_early_ends_nothing_else() {
         );
         let _ = fs::remove_dir_all(directory.path().join("h"));
     }
-    // The trace is there, whole, though no one read the page.
+    // The trace is complete, although the page was not read.
     let rows = fs::read_to_string(directory.path().join("trace.csv")).unwrap();
     assert!(rows.lines().count() > 8192);
 }
@@ -253,7 +253,7 @@ fn a_limit_of_the_size_of_files_leaves_them_whole() {
         assert!(message.contains("File too large"), "{command}: {message}");
     }
     assert_eq!(fs::read(d.join("in.csv")).unwrap(), kept);
-    // What the shell made is there, and no part.
+    // The file created by the shell exists, and no part.
     assert_eq!(fs::read_dir(d).unwrap().count(), before + 1);
 }
 
@@ -286,7 +286,7 @@ structure = "arx"
 orders.nk = 29
 "#;
 
-/// True if a program started from here is not to end with its terminal (`nohup`), and rightly continues.
+/// True if a program started from here continues after its terminal is closed (`nohup`).
 #[cfg(unix)]
 fn hang_up_is_ignored() -> bool {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -294,7 +294,7 @@ fn hang_up_is_ignored() -> bool {
     ignored.is_some_and(|mask| u64::from_str_radix(mask.trim(), 16).is_ok_and(|mask| mask & 1 == 1))
 }
 
-/// Each signal that ends a program, while it writes: nothing of it is left.
+/// Each signal that ends a program, during writing: no partial output remains.
 #[cfg(unix)]
 #[test]
 fn signals_end_with_their_code_and_leave_nothing() {
@@ -335,7 +335,7 @@ fn signals_end_with_their_code_and_leave_nothing() {
     }
 }
 
-/// Estimates with errors and intervals, for a paper: what the JSON states.
+/// Estimates with errors and intervals, for a paper, equal to those in the JSON.
 #[test]
 fn a_result_is_a_table_for_a_paper() {
     let directory = simulated();

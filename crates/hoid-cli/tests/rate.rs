@@ -1,4 +1,4 @@
-//! Rates above 200 Hz: filtered and decimated automatically, stated in the result, and the same person.
+//! Rates above 200 Hz: filtered and decimated automatically, stated in the result, with the same operator.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -16,7 +16,7 @@ use tempfile::TempDir;
 
 use common::{bad, good, hoid, json};
 
-/// A run of C1, or of a person with an element, at a given number of Hz.
+/// A run of C1, or of a person with an element, at the given rate in Hz.
 fn simulate(at: &Path, person: &str, hz: f64, seed: u64) -> String {
     let file = format!("{person}-{hz}-{seed}.csv");
     let (ts, seed) = (format!("{:?}", 1.0 / hz), seed.to_string());
@@ -33,7 +33,7 @@ fn simulate(at: &Path, person: &str, hz: f64, seed: u64) -> String {
     let scenario = match person {
         "lead" => toml("lead", "K = 0.5\nT_L_s = 2.0", "1/s^2"),
         "gain" => toml("gain", "K = 3.0", "1/s"),
-        // With a remnant so smooth that at 1000 Hz nothing is determined.
+        // With a remnant so smooth that nothing is determined at 1000 Hz.
         "smooth" => toml("gain", "K = 3.0", "1/s")
             .replace(
                 "omega_nm_rad_s = 12.0\nzeta_nm = 0.3\ntau_e_s = 0.15",
@@ -136,7 +136,7 @@ fn lines_do_not_depend_on_the_rate() {
     assert_eq!(lines(&auto).len(), lines(&off).len());
     for (a, b) in lines(&auto).iter().zip(lines(&off)) {
         let distance = |name: &str| (a[name].as_f64().unwrap() - b[name].as_f64().unwrap()).abs();
-        // Without the lead of the input taken back it would be .0045 s, 1 deg at 4 rad/s.
+        // Without correcting the lead of the input, it would be .0045 s, 1 deg at 4 rad/s.
         assert!(distance("gain_db") < 0.02 && distance("phase_deg") < 0.1, "{a} {b}");
     }
     let page = good(at, &["describe", &file]);
@@ -153,7 +153,7 @@ fn a_track_at_1000_hz_is_determined() {
         let found = json(at, &arguments);
         assert_ne!(found["verdict"]["level"], "not determined", "{seed}");
         assert_eq!(found["records"][0]["preparation"][0]["to_hz"].as_f64().unwrap(), 100.0);
-        // Rows are as far apart as 100 samples of the file.
+        // Rows are 100 samples of the file apart.
         let trace = fs::read_to_string(at.join("trace.csv")).unwrap();
         let times: Vec<f64> = trace
             .lines()
@@ -222,7 +222,7 @@ fn rates_of_all_kinds() {
         let (code, message) = bad(at, &["identify", &file, &format!("--decimate={wrong}")]);
         assert!(code == 2 && message.contains("expected auto, off"), "{message}");
     }
-    // A hole is cut at, and each part is decimated.
+    // The record is cut at a gap, and each part is decimated.
     let text = fs::read_to_string(at.join(&file)).unwrap();
     let holed: String = text
         .lines()
@@ -246,7 +246,7 @@ fn a_stream_at_1000_hz_is_the_track() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let file = simulate(at, "lead", 1000.0, 1);
-    // For any worth: 20 s are few.
+    // With any verdict: 20 s are short.
     hoid(at, &["track", &file, "--to", "20", "--out", "trace.csv"]);
     let text = fs::read_to_string(at.join(&file)).unwrap();
     let rows: Vec<&str> = text
@@ -271,7 +271,7 @@ fn a_stream_at_1000_hz_is_the_track() {
         .lines()
         .map(|line| serde_json::from_str(line).unwrap())
         .collect();
-    // A line for each line, and nothing but samples after the header.
+    // One line per line, and only samples after the header.
     assert_eq!(answers.len(), rows.len() - 1);
     let last = &answers[answers.len() - 1];
     let decimated = &last["decimated"];
@@ -283,13 +283,13 @@ fn a_stream_at_1000_hz_is_the_track() {
     assert!((0.1..0.2).contains(&behind_s), "{behind_s}");
     let told = String::from_utf8(output.stderr).unwrap();
     assert!(told.contains("filtered and decimated by 10 to 100 Hz"), "{told}");
-    // For the same sample the digits are those of the track.
+    // For the same sample the digits are those of the trace.
     let trace = fs::read_to_string(at.join("trace.csv")).unwrap();
     let mut table = trace.lines().filter(|line| !line.starts_with('#'));
     let names: Vec<&str> = table.next().unwrap().split(',').collect();
     let place = names.iter().position(|name| *name == "b0").unwrap();
     let value = last["parameters"]["b0"]["value"].as_f64().unwrap();
-    // The gains stay the same within a block, so that it is the row of that time, not the first of its value.
+    // The gains are constant within a block, so that it is the row of that time, not the first of its value.
     let at = last["t"].as_f64().unwrap() - behind_s;
     let row = table
         .map(|line| {

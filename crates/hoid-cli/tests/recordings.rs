@@ -1,4 +1,4 @@
-//! Recordings as laboratories have them: prepared, looked through, and cut, from the command line.
+//! Typical recordings of laboratories: preparation, inspection and cuts from the command line.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -20,8 +20,8 @@ const FIT: [&str; 8] = [
     "run.csv",
 ];
 
-/// A simulated run, e in rad, u recorded two samples late, t from 100 s on; some rows are reported
-/// by `row`.
+/// A simulated run, e in rad, u recorded two samples late, t from 100 s on; `row` modifies the
+/// rows.
 fn recorded(row: impl Fn(usize, [f64; 3]) -> Vec<[f64; 3]>) -> TempDir {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
@@ -202,7 +202,7 @@ fn trouble_is_shown_and_handled_only_as_asked() {
     ] {
         assert!(text.contains(words), "{words}: {text}");
     }
-    // Nothing is repaired unasked.
+    // Data are repaired only on request.
     let (code, message) = bad(at, &["identify", "run.csv"]);
     assert!(code == 1 && message.contains("expected increasing time"), "{message}");
     let (code, message) = bad(at, &["identify", "run.csv", "--drop-repeated"]);

@@ -1,4 +1,4 @@
-//! Results of the screen: the answer first and on one page, details on demand, remarks after it and
+//! Output on the screen: the result first and on one page, details on request, remarks after it and
 //! once, at any width; help, completions and manual pages.
 
 #![allow(clippy::unwrap_used)]
@@ -29,7 +29,7 @@ const FIT: [&str; 8] = [
     "nd=1",
 ];
 
-/// Standard output on a screen of a given number of columns.
+/// Standard output on a screen of the given width.
 fn at_width(directory: &Path, columns: &str, arguments: &[&str]) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_hoid"))
         .args(arguments)
@@ -71,7 +71,7 @@ fn the_answer_comes_first_and_fits_on_a_screen() {
     ] {
         assert!(all.contains(part), "{part}: {all}");
     }
-    // The answer is the same.
+    // The result is the same.
     let answer = page.split("More with -v").next().unwrap();
     assert!(all.starts_with(answer), "{all}");
 }
@@ -105,7 +105,7 @@ fn pages_keep_to_the_width_of_the_screen() {
 fn what_is_said_of_several_files_is_said_once_and_after_the_answer() {
     let directory = simulated();
     let d = directory.path();
-    // The same row twice in both files.
+    // The same row is duplicated in both files.
     for name in ["1.csv", "2.csv"] {
         let text = fs::read_to_string(d.join(name)).unwrap();
         let row = text.lines().nth(4000).unwrap();
@@ -143,7 +143,7 @@ fn mistakes_are_answered_with_what_was_meant() {
     assert!(code == 1 && message.contains("did you mean \"f_t\"?"), "{message}");
     let (code, message) = bad(d, &["simulate", "--condition", "C1", "--out", "none/x.csv"]);
     assert!(code == 1 && !message.contains(".part"), "{message}");
-    // Before any work, and nothing is left behind.
+    // Before any work, and without output files.
     fs::write(d.join("file"), "").unwrap();
     for arguments in [
         &["demo", "--out", "file/x"][..],
@@ -158,7 +158,7 @@ fn mistakes_are_answered_with_what_was_meant() {
     }
 }
 
-/// Files as people have them: other names, decimal commas, no units, t in ms.
+/// Typical files of users: other names, decimal commas, no units, t in ms.
 #[test]
 fn files_of_a_newcomer_are_read_or_answered_with_what_to_do() {
     let directory = simulated();
@@ -214,7 +214,7 @@ fn files_of_a_newcomer_are_read_or_answered_with_what_to_do() {
         page("mine.csv", &["--unit", "e=degrees,u=radians"]),
         page("mine.csv", &["--unit", "e=deg,u=rad"])
     );
-    // Other columns than e and u, and no units: six columns on 80.
+    // Columns other than e and u, and no units: six columns on 80.
     let info = at_width(d, "80", &["info", "mine.csv"]);
     assert!(info.contains(" column") && !info.contains("unit"), "{info}");
     assert!(info.lines().all(|line| line.chars().count() <= 80), "{info}");

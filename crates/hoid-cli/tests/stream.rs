@@ -18,14 +18,14 @@ use tempfile::TempDir;
 
 use common::{bad, good, json, physical};
 
-/// Far beyond what a line takes, so that a slow machine fails no test and a line that never comes
-/// does not hang.
+/// Far beyond the latency of a line, so that no test fails on a slow machine and a missing line
+/// does not block.
 const PATIENCE: Duration = Duration::from_secs(60);
 const AT_ONCE: [&str; 8] = [
     "--method", "rpem", "--nk", "29", "--orders", "nd=1", "--start", "nothing",
 ];
 
-/// A stream that is running.
+/// A running stream.
 struct Stream {
     child: Child,
     input: Option<ChildStdin>,
@@ -85,7 +85,7 @@ impl Stream {
         assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
     }
 
-    /// Waits for the end: how it ended, the lines that were left, what it reported.
+    /// Waits for the end; returns the exit status, the remaining lines, and the messages.
     fn end(mut self) -> (ExitStatus, Vec<String>, String) {
         drop(self.input.take());
         let begun = Instant::now();
@@ -111,7 +111,7 @@ fn wave(k: usize) -> (f64, f64) {
     )
 }
 
-/// Feeds a whole text and collects the answers.
+/// Sends a whole text and collects the answers.
 fn answers(arguments: &[&str], text: &str) -> (Vec<Value>, String) {
     let mut stream = Stream::new(arguments);
     let mut input = stream.input.take().unwrap();
@@ -278,7 +278,7 @@ fn hostile_lines_are_told_and_counted_and_poison_nothing() {
         // The estimate stays.
         assert_eq!(line["parameters"], before["parameters"]);
     }
-    // Blank lines and comments are nothing at all.
+    // Blank lines and comments are ignored.
     stream.write("\n   \n# a comment\n\r\n");
     let after = sound(&mut stream, 300);
     assert_eq!(after["skipped"], skipped);
@@ -328,7 +328,7 @@ fn a_wild_value_and_a_hostile_span_are_told_in_their_lines() {
         "{events:?}"
     );
     assert!((span["from"].as_f64().unwrap() - 30.0).abs() < 0.2, "{span}");
-    // In the pause the estimate stays constant, and is no more than doubtful.
+    // During the pause the estimate is constant, and the verdict is at most doubtful.
     assert!((paused + 1..*restarted).all(|k| answers[k]["level"] != "trustworthy"));
     assert_eq!(answers[paused + 1]["parameters"], answers[restarted - 1]["parameters"]);
     let last = answers.last().unwrap();
@@ -356,7 +356,7 @@ fn an_idle_head_prolongs_the_warm_up() {
         .join("\n")
         + "\n";
     let (answers, said) = answers(&["--orders", "nd=1"], &all);
-    // The delay is that which the run alone has, within a sample: the warm-up ends some samples later.
+    // The delay equals that of the run by itself within a sample: the warm-up ends some samples later.
     let nk = |said: &str| {
         said.split("nk=")
             .nth(1)
@@ -399,7 +399,7 @@ fn late_lines_are_bridged_and_lines_behind_are_dropped() {
     assert!(line["fault"].as_str().unwrap().contains("t is \"x\""), "{line}");
     assert_eq!((&line["skipped"], &line["dropped"]), (&3.into(), &2.into()));
     assert!(stream.ask(&row(54)).get("fault").is_none());
-    // A pause of a minute: ten seconds of it are bridged.
+    // A pause of a minute: ten seconds of it are filled.
     let line = stream.ask(&row(6054));
     assert!(line["fault"].as_str().unwrap().contains("10 s are bridged"), "{line}");
     assert_eq!(line["skipped"], 1003);
@@ -429,7 +429,7 @@ fn a_warm_up_that_fails_goes_on_until_there_is_something_to_fit() {
     let directory = TempDir::new().unwrap();
     let text = simulated(directory.path(), "1");
     let mut input = String::new();
-    // Silence, then the run: the silence is left out, and the warm-up waits for as much of the run.
+    // Silence, then the run: the silence is excluded, and the warm-up extends over the run.
     for _ in 0..600 {
         input.push_str("0,0\n");
     }
@@ -453,11 +453,11 @@ fn a_warm_up_that_fails_goes_on_until_there_is_something_to_fit() {
     let last = lines.last().unwrap();
     assert_eq!(last["operator"]["convertible"], true, "{last}");
     assert!(said.contains("started after"), "{said}");
-    // A stream that ends before reports it.
+    // A stream that ends earlier reports it.
     let (lines, said) = answers(&arguments, "0.1,0.2\n0.2,0.1\n");
     assert_eq!(lines.len(), 2);
     assert!(said.contains("The warm-up did not end: 2 of 600"), "{said}");
-    // Faults within the warm-up: a short one is bridged, a long one starts it again.
+    // Faults within the warm-up: a short one is filled, a long one restarts it.
     let mut input: String = (0..50).map(|k| format!("{},{}\n", wave(k).0, wave(k).1)).collect();
     input.push_str("nan,0\n0.1,0.2\n");
     let (lines, _) = answers(&arguments, &input);
@@ -494,11 +494,11 @@ fn a_reader_that_leaves_ends_the_stream_quietly() {
         .unwrap();
     drop(child.stdout.take());
     let mut input = child.stdin.take().unwrap();
-    // The program may be gone before the second line.
+    // The program may have ended before the second line.
     let _ = input.write_all(b"0.1,0.2\n0.1,0.2\n");
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(0));
-    // The settings alone.
+    // Only the settings.
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(
         said.starts_with("started at once") && said.lines().count() == 1,
@@ -531,7 +531,7 @@ fn an_interrupt_ends_with_zero_and_whole_lines() {
     let (status, rest, said) = stream.end();
     assert_eq!(status.code(), Some(0));
     assert!(rest.is_empty() && said.contains("1 samples"), "{said}");
-    // In the middle of its work.
+    // During its computation.
     let mut stream = Stream::new(&AT_ONCE);
     let mut input = stream.input.take().unwrap();
     let writer = thread::spawn(move || {

@@ -1,9 +1,9 @@
-//! `hoid stream --udp` on loopback. That its digits are those of `hoid track` is tested with all other places, in
+//! `hoid stream --udp` on loopback. Agreement with the digits of `hoid track` is tested with all other interfaces, in
 //! `python/tests/test_places.py`.
 #![allow(clippy::unwrap_used)]
 
 mod common;
-// The command of the study uses the rest of it.
+// The command of the study uses the rest of this module.
 #[cfg(unix)]
 #[allow(dead_code)]
 #[path = "common/live/mod.rs"]
@@ -24,7 +24,7 @@ use live::{
     udp::{PATIENCE, Stream, as_struct},
 };
 
-/// Long for an answer that does not come.
+/// Timeout for an answer that does not come.
 #[cfg(unix)]
 const SHORT: Duration = Duration::from_millis(100);
 
@@ -38,7 +38,7 @@ fn told(stream: &Stream) -> Value {
     serde_json::from_slice(&stream.answer()).unwrap()
 }
 
-/// Lost, doubled and late samples are reported by their sequence, as by a column t.
+/// Lost, duplicated and late samples are detected by their sequence numbers, as by a column t.
 #[cfg(unix)]
 #[test]
 fn lost_samples_are_bridged_and_counted() {
@@ -63,7 +63,7 @@ fn lost_samples_are_bridged_and_counted() {
     );
 }
 
-/// Objects of JSON, of one line or of several, are samples by the names of the channels, and answered by lines.
+/// JSON objects, of one line or of several, are samples by the names of the channels, and answered by lines.
 #[cfg(unix)]
 #[test]
 fn objects_of_json_are_samples() {
@@ -81,7 +81,7 @@ fn objects_of_json_are_samples() {
     assert!(udp.end().contains("5 samples: 2 skipped"));
 }
 
-/// Nothing that comes from outside ends the stream or is taken for a sample.
+/// No external data end the stream or are mistaken for a sample.
 #[cfg(unix)]
 #[test]
 fn hostile_datagrams_are_counted() {
@@ -108,7 +108,7 @@ fn hostile_datagrams_are_counted() {
     for bytes in hostile {
         udp.send(bytes);
     }
-    // Nothing at all, and what carries no information, is not even counted.
+    // Empty and meaningless datagrams are not counted.
     udp.send(b"");
     udp.send(b"# a comment\n\n");
     udp.socket.set_read_timeout(Some(SHORT)).unwrap();
@@ -127,7 +127,7 @@ fn hostile_datagrams_are_counted() {
     assert!(udp.end().contains("4 samples"), "the others are none");
 }
 
-/// So few that the system keeps them all, whatever else it does.
+/// So few that the system keeps all of them under any load.
 #[cfg(unix)]
 #[test]
 fn every_sample_at_a_rate_is_answered() {

@@ -1,4 +1,4 @@
-//! Studies and the reproduction as a user runs them.
+//! Studies and the reproduction from the command line.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -51,7 +51,7 @@ fn a_study_that_was_killed_goes_on_to_the_same_bytes() {
     let at = directory.path();
     good(at, &["study", "run", "plan.toml", "--out", "whole"]);
     let mut killed = 0;
-    // Kills at several instants, whatever the program is writing then.
+    // Kills at several instants, whatever is being written.
     for wait_ms in [0, 35, 71, 13] {
         let mut child = Command::new(env!("CARGO_BIN_EXE_hoid"))
             .args([
@@ -75,7 +75,7 @@ fn a_study_that_was_killed_goes_on_to_the_same_bytes() {
             std::thread::sleep(Duration::from_millis(1));
         }
         std::thread::sleep(Duration::from_millis(wait_ms));
-        // SIGKILL: the program cannot tidy up.
+        // SIGKILL: the program cannot clean up.
         if child.kill().is_ok() && !child.wait().unwrap().success() {
             killed += 1;
         }
@@ -192,13 +192,13 @@ fn a_run_of_a_study_can_be_repeated_by_hand() {
         .iter()
         .find(|l| l[column("cell")] == "1" && l[column("replication")] == "1" && l[column("nd")] == "2.0")
         .unwrap();
-    // A study fits its runs side by side, which differs from a fit alone by rounding: less than
-    // 1e-7 of a standard error, here of about 0.01.
+    // A study fits its runs together, which differs from a separate fit by rounding: less than 1e-7
+    // of a standard error, here of about 0.01.
     let of_study = row[column("f1")].parse::<f64>().unwrap();
     assert!((of_study - value).abs() < 1e-9, "{of_study} {value}");
 }
 
-/// A study has what `hoid identify` has of the same run in a file, digit for digit, verdict included.
+/// A study gives the same result as `hoid identify` for the same run in a file, digit for digit, including the verdict.
 #[test]
 fn a_study_and_identify_give_the_same_answer() {
     let directory = TempDir::new().unwrap();

@@ -1,4 +1,4 @@
-//! `identify` of systems that are not a person, by polynomials: exact data, a test by a step.
+//! `identify` of systems other than operators, by polynomial models: exact data, a step test.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -27,7 +27,7 @@ fn noise(t: usize) -> f64 {
     ((x >> 11) as f64 / (1_u64 << 53) as f64 - 0.5) * 12_f64.sqrt()
 }
 
-/// A level and a transient at the head, and nothing else next to the model: its coefficients come back.
+/// A level and an initial transient in addition to the model: its coefficients are recovered.
 #[test]
 fn exact_data_give_exact_coefficients() {
     let directory = TempDir::new().unwrap();

@@ -1,4 +1,4 @@
-//! `hoid track` as a user runs it.
+//! `hoid track` from the command line.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -46,7 +46,7 @@ fn column(trace: &(Vec<String>, Vec<Vec<f64>>), name: &str) -> Vec<f64> {
     trace.1.iter().map(|row| row[place]).collect()
 }
 
-/// The answer comes first: a file of its rows is written where one is named.
+/// The result comes first: a file of its rows is written only if one is named.
 #[test]
 fn no_trace_is_needed_for_an_answer() {
     let directory = simulated("C1");
@@ -73,7 +73,7 @@ fn a_start_fit_finds_the_operator_and_its_change() {
         found["orders"],
         serde_json::json!({"na": 0, "nb": 2, "nc": 0, "nd": 1, "nf": 2, "nk": 29})
     );
-    // The start is a fit as identify gives it, with the table of the search: nk 6..61, nd 1..4.
+    // The start fit equals that of identify, with the table of the search: nk 6..61, nd 1..4.
     assert_eq!(found["start"]["candidates"].as_array().unwrap().len(), 224);
     assert_eq!(found["start"]["records"][0]["samples"], 2731);
     assert_eq!(found["start"]["operator"]["convertible"], true);
@@ -91,7 +91,7 @@ fn a_start_fit_finds_the_operator_and_its_change() {
          omega_nm,omega_nm_se,zeta_nm,zeta_nm_se,convertible,innovation,held,steps_shortened"
     );
     assert_eq!(trace.1.len(), 8192);
-    // Until the end of the start span the estimate stays.
+    // Until the end of the start span the estimate is constant.
     let gain = column(&trace, "K_e");
     assert!((0..2730).all(|k| gain[k] == gain[0]) && gain[2800] != gain[0]);
     // Before and long after the change of C4, within five standard errors.
@@ -144,7 +144,7 @@ fn one_wild_sample_is_held_back_and_told() {
         let moved = (last(&found, name, "value") - last(&clean, name, "value")).abs();
         assert!(moved < 0.1 * last(&clean, name, "standard_error"), "{name}: {moved}");
     }
-    // Without the guard the estimate is somewhere else.
+    // Without the guard the estimate differs.
     arguments.extend(["--guard", "no"]);
     let bare = tracked(d, &arguments);
     assert_eq!((&bare["held"], &bare["faults"]), (&0.into(), &serde_json::json!([])));
@@ -203,7 +203,7 @@ fn the_page_reads_well() {
         assert!(page.contains(part), "{part:?} is not in:\n{page}");
     }
     assert_eq!(page.lines().filter(|l| l.contains('±')).count(), 8);
-    // A record without the truth.
+    // A record without true values.
     let text = fs::read_to_string(d.join("c.csv")).unwrap();
     let renamed = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"]
         .iter()
@@ -343,8 +343,7 @@ fn the_default_needs_nothing_and_tells_the_loop() {
     assert!(page.contains("Open loop at 81.91 s: crossover"), "{page}");
 }
 
-/// The same numbers by the earlier name of a method; that it is one is reported on standard error
-/// alone.
+/// An earlier name of a method gives the same numbers; a note on standard error reports it.
 #[test]
 fn an_earlier_name_of_a_method_is_read_and_said_to_be_one() {
     let directory = simulated("C1");
@@ -392,7 +391,7 @@ fn a_person_is_followed_from_an_earlier_fit_of_them() {
     let known = trace(d);
     json(d, &["track", "c.csv", "--out", "trace.csv", "--json", "--at", "2.5"]);
     let default = trace(d);
-    // There from the first sample on, and for the first seconds known better than without.
+    // Available from the first sample on, and in the first seconds with smaller errors than without.
     let (of_known, of_usual) = (column(&known, "gain_db@2.5_se"), column(&default, "gain_db@2.5_se"));
     assert!(of_known[0].is_finite() && of_usual[0].is_nan());
     assert!(
@@ -401,12 +400,12 @@ fn a_person_is_followed_from_an_earlier_fit_of_them() {
         of_known[150],
         of_usual[150]
     );
-    // K_e_dot is .036 s; the fit of the other run is near, and stays so.
+    // K_e_dot is .036 s; the fit of the other run is close to it, and remains so.
     let (gain, error) = (column(&known, "K_e_dot"), column(&known, "K_e_dot_se"));
     let off = |k: usize| (gain[k] - 0.036).abs();
     assert!((0..gain.len()).all(|k| off(k) < 2.0 * error[k] && off(k) < 0.02));
     assert!(off(8191) < 0.003, "{}", gain[8191]);
-    // What does not fit together is reported before the work.
+    // Inconsistent options are reported before the work.
     good(
         d,
         &[
@@ -458,7 +457,7 @@ fn memories_are_the_same_in_every_unit() {
     assert_eq!(rows(&["--memory-of", "b=256,d1=256,f=2.56s"]), samples);
     assert_ne!(rows(&[]), samples);
     assert_ne!(rows(&["--memory", "inf"]), samples);
-    // Another start from the same numbers: theta moves from the first sample on.
+    // Another start from the same numbers: theta is updated from the first sample on.
     let given = rows(&[
         "--start",
         "b0=.044,b1=-.043,d1=-.85,f1=-1.91,f2=.92",
@@ -669,7 +668,7 @@ fn a_second_run_chooses_the_start_covariance() {
     );
     let (status, says) = bad(d, &with(&["--covariance", "0.1"]));
     assert!(status == 2 && says.contains("--covariance"), "{says}");
-    // In course instead, whatever P is at the start.
+    // Independent of P at the start.
     let updated = json(d, &with(&["--json", "--update-covariance", "--covariance", "0.1"]));
     assert!(updated["covariance_choice"].is_null());
     assert!(setting(&updated, "covariance updated").contains("second.csv"));

@@ -1,4 +1,4 @@
-//! Reliability of results, as a user reads it.
+//! Verdicts on results as shown to the user.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -23,7 +23,7 @@ fn simulated(condition: &str) -> TempDir {
     directory
 }
 
-/// The same errors, with an output that has nothing to do with them.
+/// The same errors, with an independent output.
 fn without_response(directory: &Path) {
     let mut state = 11_u64;
     let mut draw = || {

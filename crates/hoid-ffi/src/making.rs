@@ -1,4 +1,4 @@
-//! Making, saving and freeing trackers.
+//! Creating, saving and freeing trackers.
 
 use std::ffi::{CStr, c_char};
 

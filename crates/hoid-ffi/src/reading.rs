@@ -1,7 +1,7 @@
-//! Report of a tracker.
+//! Reading the estimates of a tracker.
 //!
-//! A list is requested with its room and the place for its count; with NULL and no room only the
-//! count is reported.
+//! A list is requested with its space and the place for its count; with NULL and no space only the
+//! count is returned.
 
 use std::ffi::c_char;
 

@@ -1,5 +1,5 @@
-//! The examples in C and C++, compiled by the compiler that is here and run without Rust: the digits
-//! of the tracker in Rust.
+//! The examples in C and C++, compiled by the available compiler and run without Rust: they give
+//! the same digits as the tracker in Rust.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
@@ -34,7 +34,7 @@ fn numbers(estimates: &[Option<Estimate>]) -> Vec<f64> {
     estimates.iter().flat_map(pair).collect()
 }
 
-/// What the example prints, from the tracker itself.
+/// The expected output of the example, from the tracker itself.
 fn expected(record: &Record, options: &TrackOptions) -> Vec<Vec<f64>> {
     let mut tracker = Tracker::new(options, None, record.sample_time()).unwrap();
     let pairs = record.input().iter().zip(record.output());
@@ -100,7 +100,7 @@ fn the_example_in_c_gives_the_digits_of_rust() {
     assert!(said.contains("after 8192 samples, 0 skipped"), "{said}");
 }
 
-/// Compiled with a stand-in of Simulink's header: Simulink itself is not here.
+/// Compiled with a substitute for Simulink's header: Simulink itself is not available.
 #[test]
 fn the_s_function_gives_the_digits_of_rust() {
     let stubs = format!("-I{}/tests/stubs", env!("CARGO_MANIFEST_DIR"));
@@ -116,7 +116,7 @@ fn the_s_function_gives_the_digits_of_rust() {
     assert!(!refused.status.success() && said.contains("adaptive"), "{said}");
 }
 
-/// Compiled with a stand-in of DUECA's headers, likewise.
+/// Compiled with a substitute for DUECA's headers, likewise.
 #[test]
 fn the_dueca_module_gives_the_digits_of_rust() {
     let stubs = format!("-I{}/tests/stubs/dueca", env!("CARGO_MANIFEST_DIR"));
@@ -158,7 +158,7 @@ fn the_example_in_cpp_gives_the_digits_of_rust() {
     };
     let rows = expected(&record, &options);
     let found = good(&run(&program, &["adaptive", "0.01"], &lines(&record)));
-    // Rows without an operator have the innovation alone.
+    // Rows without an operator contain only the innovation.
     let lines: Vec<&str> = found.lines().collect();
     assert_eq!(lines.len(), rows.len());
     let columns: Vec<usize> = (0..12).chain([16]).collect();
@@ -189,7 +189,7 @@ fn the_example_in_c_is_clean_under_the_sanitizers() {
         &["rpem", "0.01", "{\"nk\": 29, \"nd\": 1}", "1000"],
         &input,
     ));
-    // What fails leaves nothing behind but what a program that ends does.
+    // A failed example leaves no other files than a successful one.
     let refused = run(&program, &["kalman", "0.01"], "");
     let said = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert_eq!(refused.status.code(), Some(1));

@@ -1,5 +1,5 @@
-//! Every function that takes a pointer, called as C calls it, with few samples: what Miri can work through
-//! (`cargo xtask miri`), which sees each read and write of memory.
+//! Calls every function that takes a pointer as C does, with few samples, so that Miri can interpret it
+//! (`cargo xtask miri`), which checks each read and write of memory.
 #![cfg_attr(miri, allow(stable_features))]
 #![cfg_attr(miri, feature(c_variadic))]
 #![allow(clippy::unwrap_used)]
@@ -17,7 +17,7 @@ use hoid_ffi::{
 };
 use hoid_io::fmu::{FmuKind, FmuStart, FmuVariable};
 
-/// Methods of which one is made in no time, at work from the first sample on.
+/// Methods that are created at once and start with the first sample.
 const AT_ONCE: &str = r#"{"nk": 3, "nd": 1, "start": {"b0": 0.04, "b1": -0.04, "d1": -0.8, "f1": -1.9, "f2": 0.92},
     "controlled_element": "90/(s(s+6))"}"#;
 const SAMPLES: usize = 2;
@@ -27,14 +27,14 @@ fn sample(k: usize) -> [f64; 2] {
 }
 
 fn read(text: *const c_char) -> String {
-    // SAFETY: a text of the library, which stays until the next call.
+    // SAFETY: a text of the library, which stays valid until the next call.
     let text = unsafe { CStr::from_ptr(text) };
     text.to_str().unwrap().to_owned()
 }
 
 type Lists<T> = unsafe extern "C" fn(*const HoidTracker, *mut T, usize, *mut usize) -> HoidStatus;
 
-/// A list: first its length, then into memory that was never written to, just long enough.
+/// Reads a list: first its length, then into uninitialised memory of exactly this length.
 fn listed<T: Copy>(tracker: *const HoidTracker, of: Lists<T>) -> Vec<T> {
     let mut count = 0;
     // SAFETY: a tracker; only the count is requested.
@@ -42,11 +42,11 @@ fn listed<T: Copy>(tracker: *const HoidTracker, of: Lists<T>) -> Vec<T> {
     let mut list = Vec::<T>::with_capacity(count);
     if count > 0 {
         let mut small = Vec::<T>::with_capacity(count - 1);
-        // SAFETY: a tracker, and room as reported, which is too little.
+        // SAFETY: a tracker, and space as stated, which is too small.
         let status = unsafe { of(tracker, small.as_mut_ptr(), count - 1, &mut count) };
         assert_eq!(status, HOID_TOO_SMALL);
     }
-    // SAFETY: a tracker, and room as told.
+    // SAFETY: a tracker, and space as stated.
     assert_eq!(unsafe { of(tracker, list.as_mut_ptr(), count, &mut count) }, HOID_OK);
     // SAFETY: this many were written.
     unsafe { list.set_len(count) };
@@ -56,7 +56,7 @@ fn listed<T: Copy>(tracker: *const HoidTracker, of: Lists<T>) -> Vec<T> {
 /// A value, into memory that was never written to.
 fn told<T>(tracker: *const HoidTracker, of: unsafe extern "C" fn(*const HoidTracker, *mut T) -> HoidStatus) -> T {
     let mut place = MaybeUninit::uninit();
-    // SAFETY: a tracker, and room for one.
+    // SAFETY: a tracker, and space for one.
     assert_eq!(unsafe { of(tracker, place.as_mut_ptr()) }, HOID_OK);
     // SAFETY: it was written.
     unsafe { place.assume_init() }
@@ -96,13 +96,13 @@ fn a_tracker_by_every_function_of_the_header() {
     assert_eq!(listed(tracker, hoid_tracker_covariance).len(), 25);
     let mut list = [MaybeUninit::<HoidEstimate>::uninit(); 6];
     let (mut count, place) = (0, list.as_mut_ptr().cast());
-    // SAFETY: a tracker, and room as told.
+    // SAFETY: a tracker, and space as stated.
     let status = unsafe { hoid_tracker_operator(tracker, place, 6, &mut count) };
     assert!([HOID_OK, HOID_NOTHING].contains(&status));
-    // SAFETY: a tracker, and room as told.
+    // SAFETY: a tracker, and space as stated.
     let status = unsafe { hoid_tracker_open_loop(tracker, place, 6, &mut count) };
     assert!([HOID_OK, HOID_NOTHING].contains(&status));
-    // SAFETY: a tracker, and room as told.
+    // SAFETY: a tracker, and space as stated.
     let status = unsafe { hoid_tracker_response(tracker, 2.5, place, 6, &mut count) };
     assert_eq!((status, count), (HOID_OK, 2));
     // SAFETY: two were written.
@@ -113,7 +113,7 @@ fn a_tracker_by_every_function_of_the_header() {
     let mut change = MaybeUninit::uninit();
     // SAFETY: a tracker, a place on the stack.
     assert_eq!(
-        // SAFETY: as above, room for a change.
+        // SAFETY: as above, space for a change.
         unsafe { hoid_tracker_change(tracker, change.as_mut_ptr()) },
         HOID_NOTHING
     );
@@ -128,7 +128,7 @@ fn a_tracker_by_every_function_of_the_header() {
     let status = unsafe { hoid_tracker_save(tracker, ptr::null_mut(), 0, &mut length) };
     assert_eq!(status, HOID_OK);
     let mut bytes = Vec::<u8>::with_capacity(length);
-    // SAFETY: room for this many.
+    // SAFETY: space for this many.
     let status = unsafe { hoid_tracker_save(tracker, bytes.as_mut_ptr(), length, &mut length) };
     assert_eq!(status, HOID_OK);
     // SAFETY: this many were written.
@@ -150,7 +150,7 @@ fn a_tracker_by_every_function_of_the_header() {
     }
 }
 
-/// The text after a status is that of its thread, and two threads have a tracker each.
+/// The message of a status belongs to its thread, and two threads have one tracker each.
 #[test]
 fn threads_with_a_tracker_each() {
     let tracked = |names: &'static str| {
@@ -183,7 +183,7 @@ fn a_fit_that_is_none_is_refused() {
     assert_eq!((status, tracker.is_null()), (HOID_BAD_OPTION, true));
 }
 
-/// A unit by one of the interfaces: what its functions are called with differs, what they do does not.
+/// A unit by one of the interfaces: the arguments of its functions differ, their effect does not.
 struct Unit {
     variables: Vec<FmuVariable>,
 }
@@ -209,14 +209,14 @@ fn unit() -> Unit {
 
 macro_rules! with_a_count {
     ($function:ident, $component:expr, $references:expr, $n:expr, $values:expr) => {
-        // SAFETY: a component, and lists of so many.
+        // SAFETY: a component, and lists of the stated length.
         unsafe { $function($component, $references.as_ptr(), $n, $values) }
     };
 }
 
 macro_rules! with_two_counts {
     ($function:ident, $component:expr, $references:expr, $n:expr, $values:expr) => {
-        // SAFETY: a component, and lists of so many.
+        // SAFETY: a component, and lists of the stated length.
         unsafe { $function($component, $references.as_ptr(), $n, $values, $n) }
     };
 }
@@ -273,7 +273,7 @@ macro_rules! life_of_a_unit {
         let mut counts = [-1; 2];
         assert_eq!(counted!($get_count, references, 2, counts.as_mut_ptr()), 0);
         assert_eq!(counts, [SAMPLES as c_int, 0]);
-        // An output is not set, nothing is read by a list that is null, no elements are not a list.
+        // An output cannot be set, a null list is not read, and a list without elements is empty.
         assert_eq!(counted!($set_count, references, 2, counts.as_ptr()), 3);
         assert_eq!(counted!($get_count, references, 2, ptr::null_mut()), 3);
         assert_eq!(counted!($get_count, references, 0, ptr::null_mut()), 0);
@@ -287,7 +287,7 @@ macro_rules! life_of_a_unit {
         );
         assert_eq!(read(texts[0]), "rpem");
 
-        // Back to a state, into one that is there, and by bytes: with the same digits.
+        // Restores a state, into an existing one, and from bytes: with the same digits.
         let [mut state, mut again] = [ptr::null_mut::<State>(); 2];
         for _ in 0..2 {
             // SAFETY: a component, a place with null or a state.
@@ -299,9 +299,9 @@ macro_rules! life_of_a_unit {
         // SAFETY: a component, a state, a place on the stack.
         assert_eq!(unsafe { $size(component, state, &mut size) }, 0);
         let mut bytes = vec![0_u8; size];
-        // SAFETY: a component, a state, and less room than it needs.
+        // SAFETY: a component, a state, and less space than it needs.
         assert_eq!(unsafe { $serialise(component, state, bytes.as_mut_ptr(), size - 1) }, 3);
-        // SAFETY: a component, a state, and room for it.
+        // SAFETY: a component, a state, and space for it.
         assert_eq!(unsafe { $serialise(component, state, bytes.as_mut_ptr(), size) }, 0);
         // SAFETY: a component, bytes, a place with null.
         assert_eq!(unsafe { $deserialise(component, bytes.as_ptr(), size, &mut again) }, 0);
@@ -340,7 +340,7 @@ macro_rules! life_of_a_unit {
     }};
 }
 
-/// `fmi2CallbackFunctions`, as a program in C has it.
+/// `fmi2CallbackFunctions`, as in a C program.
 #[repr(C)]
 struct Callbacks {
     logger: *const c_void,
@@ -372,7 +372,7 @@ unsafe extern "C" fn logger_3(environment: *mut c_void, status: c_int, _category
 }
 
 fn note(environment: *mut c_void, status: c_int, text: *const c_char) {
-    // SAFETY: the list of the test, which looks at it when nothing runs.
+    // SAFETY: the list of the test, which is read when no call is in progress.
     let notes = unsafe { &mut *environment.cast::<Vec<(c_int, String)>>() };
     notes.push((status, read(text)));
 }
@@ -399,7 +399,7 @@ fn a_unit_by_every_function_of_fmi_2() {
     let made = |kind: c_int, token: &str| {
         let token = CString::new(token).unwrap();
         let callbacks = ptr::from_ref(&callbacks).cast();
-        // SAFETY: texts that end with a zero, callbacks that stay for the life of the component.
+        // SAFETY: texts that end with a zero, callbacks that stay valid for the life of the component.
         unsafe { fmi2Instantiate(c"one".as_ptr(), kind, token.as_ptr(), ptr::null(), callbacks, 0, 0) }
     };
     assert!(made(0, &FmuKind::Tracker.token()).is_null() && made(1, "another").is_null());
@@ -422,7 +422,7 @@ fn a_unit_by_every_function_of_fmi_2() {
         fmi2GetFMUstate fmi2SetFMUstate fmi2FreeFMUstate fmi2SerializedFMUstateSize fmi2SerializeFMUstate
         fmi2DeSerializeFMUstate
     );
-    // SAFETY: made above, and nothing runs any more.
+    // SAFETY: made above, and no call is in progress.
     let told = unsafe { &*environment };
     assert_eq!(told.len() > 5, cfg!(miri));
 }
@@ -434,7 +434,7 @@ fn a_unit_by_every_function_of_fmi_3() {
     let environment: *mut Vec<_> = &mut *notes;
     let made = |token: &str, logger| {
         let token = CString::new(token).unwrap();
-        // SAFETY: texts that end with a zero, a logger whose list stays for the life of the component.
+        // SAFETY: texts that end with a zero, a logger whose list stays valid for the life of the component.
         unsafe {
             fmi3InstantiateCoSimulation(
                 c"one".as_ptr(),
@@ -474,12 +474,12 @@ fn a_unit_by_every_function_of_fmi_3() {
         fmi3GetFMUState fmi3SetFMUState fmi3FreeFMUState fmi3SerializedFMUStateSize fmi3SerializeFMUState
         fmi3DeserializeFMUState
     );
-    // SAFETY: made above, and nothing runs any more.
+    // SAFETY: made above, and no call is in progress.
     let told = unsafe { &*environment };
     assert!(told.iter().all(|(status, text)| *status == 3 && !text.is_empty()) && told.len() > 4);
 }
 
-/// What the library hands out is above, except for what answers with an error whatever it is given.
+/// All exported functions are called above, except for those that always return an error.
 #[test]
 #[cfg_attr(miri, ignore = "it reads sources, not memory of a caller")]
 fn no_function_is_left_out() {

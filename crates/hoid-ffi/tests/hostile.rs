@@ -1,4 +1,4 @@
-//! Whatever a caller hands over, the answer is a status: no panic, no value that is invalid.
+//! Any data from a caller give a status: no panic, no invalid value.
 #![allow(clippy::unwrap_used)]
 
 use std::{
@@ -43,7 +43,7 @@ fn saved(tracker: &Owned) -> Vec<u8> {
     let status = unsafe { hoid_tracker_save(tracker.0, ptr::null_mut(), 0, &mut length) };
     assert_eq!(status, HOID_OK);
     let mut bytes = vec![0; length];
-    // SAFETY: room for this many.
+    // SAFETY: space for this many.
     let status = unsafe { hoid_tracker_save(tracker.0, bytes.as_mut_ptr(), length, &mut length) };
     assert_eq!(status, HOID_OK);
     bytes
@@ -64,7 +64,7 @@ const ANY: HoidEstimate = HoidEstimate {
     determined: 0,
 };
 
-/// Everything that a tracker reports, each with an answer that is not a fault.
+/// All results of a tracker, each call with a status that is not an error.
 fn asked(tracker: &Owned) -> Vec<HoidStatus> {
     let t = tracker.0;
     let mut list = [ANY; 64];
@@ -88,15 +88,15 @@ fn asked(tracker: &Owned) -> Vec<HoidStatus> {
     vec![
         // SAFETY: a tracker.
         unsafe { hoid_tracker_ready(t) },
-        // SAFETY: a tracker, and room as told.
+        // SAFETY: a tracker, and space as stated.
         unsafe { hoid_tracker_operator(t, list, room, &mut count) },
-        // SAFETY: a tracker, and room as told.
+        // SAFETY: a tracker, and space as stated.
         unsafe { hoid_tracker_parameters(t, list, room, &mut count) },
-        // SAFETY: a tracker, and room as told.
+        // SAFETY: a tracker, and space as stated.
         unsafe { hoid_tracker_open_loop(t, list, room, &mut count) },
-        // SAFETY: a tracker, and room as told.
+        // SAFETY: a tracker, and space as stated.
         unsafe { hoid_tracker_response(t, 2.5, list, room, &mut count) },
-        // SAFETY: a tracker, and room as told.
+        // SAFETY: a tracker, and space as stated.
         unsafe { hoid_tracker_covariance(t, numbers.as_mut_ptr(), numbers.len(), &mut count) },
         // SAFETY: a tracker, and a place.
         unsafe { hoid_tracker_change(t, &mut change) },
@@ -118,7 +118,7 @@ fn null_pointers_are_refused_everywhere() {
     // SAFETY: null is allowed.
     let status = unsafe { hoid_tracker_step(ptr::null_mut(), 0.0, 0.0, ptr::null_mut()) };
     assert_eq!(status, HOID_BAD_POINTER);
-    // The default method, or under Miri the one that is made in no time.
+    // The default method, or under Miri the one that is created at once.
     let (method, options) = if cfg!(miri) {
         (c"rpem".as_ptr(), c"{\"nk\": 9}".as_ptr())
     } else {
@@ -171,7 +171,7 @@ fn a_fit_is_what_a_tracker_begins_with() {
     let first = |tracker: &Owned| {
         let mut list = [ANY; 6];
         let mut count = 0;
-        // SAFETY: a tracker, and room as told.
+        // SAFETY: a tracker, and space as stated.
         let status = unsafe { hoid_tracker_operator(tracker.0, list.as_mut_ptr(), 6, &mut count) };
         assert_eq!((status, count), (HOID_OK, 6));
         list.map(|e| (e.value.to_bits(), e.standard_error.to_bits()))
@@ -179,7 +179,7 @@ fn a_fit_is_what_a_tracker_begins_with() {
     assert_eq!(first(&tracker), first(&same));
     let value = f64::from_bits(first(&tracker)[0].0);
     assert!((value - 2.0).abs() < 0.2, "the gain of the fit: {value}");
-    // It continues from its bytes, which have the fit in them.
+    // It continues from its bytes, which contain the fit.
     assert_eq!(first(&restored(&saved(&tracker)).ok().unwrap()), first(&tracker));
     // The sample time is that of the fit.
     let (status, said) = of(0.02, fit).err().unwrap();
@@ -241,7 +241,7 @@ const NAMES: [&str; 24] = [
 proptest! {
     #![proptest_config(ProptestConfig { cases: if cfg!(miri) { 4 } else { 200 }, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Samples of any kind move no tracker out of its senses.
+    /// Arbitrary samples leave the tracker in a valid state.
     #[test]
     #[cfg_attr(miri, ignore = "the filters of the method adaptive take minutes there; tests/every_function.rs has few samples")]
     fn any_samples_are_taken(
@@ -251,7 +251,7 @@ proptest! {
         let options = if method == "adaptive" { "" } else {
             r#"{"nk": 9, "nd": 1, "start": "nothing"}"#
         };
-        // What needs the fit of a warm-up has one.
+        // Methods that need the fit of a warm-up have one.
         let tracker = made(method, 0.01, options).or_else(|_| made(method, 0.01, r#"{"nk": 9, "nd": 1, "warm_up": 0.2}"#));
         let tracker = tracker.map_err(|(_, said)| TestCaseError::fail(said))?;
         let mut outcome = HoidOutcome { innovation: 0.0, ready: 0, skipped: 0, held: 0, shortened: 0, changed: 0 };
@@ -267,7 +267,7 @@ proptest! {
         prop_assert_eq!(saved(&again), saved(&tracker));
     }
 
-    /// Options of any kind make a tracker or give the reason why not.
+    /// Arbitrary options create a tracker or give the reason why not.
     #[test]
     #[cfg_attr(miri, ignore = "the filters of the method adaptive take minutes there; tests/every_function.rs has few samples")]
     fn any_options_have_an_answer(
@@ -290,7 +290,7 @@ proptest! {
         }
     }
 
-    /// Bytes of any kind are not a tracker.
+    /// Arbitrary bytes are refused.
     #[test]
     fn any_bytes_are_refused(bytes in prop::collection::vec(any::<u8>(), 0..200), magic in any::<bool>()) {
         let bytes = if magic { [b"hoid\x01\0\0\0".as_slice(), &bytes].concat() } else { bytes };

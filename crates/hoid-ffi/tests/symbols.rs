@@ -1,7 +1,8 @@
-//! What the shared library hands out is what is listed in `abi/symbols-N.txt`, N the version of the interface.
+//! The functions exported by the shared library are those listed in `abi/symbols-N.txt`, N the version of the
+//! interface.
 //!
-//! A program that was linked once finds its functions in every later library of the same version: none may
-//! vanish. What is listed is what is kept, so that nothing is handed out by accident either.
+//! A program linked once finds its functions in every later library of the same version: none may be removed. The list
+//! also prevents accidental exports.
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
@@ -45,7 +46,7 @@ fn the_library_hands_out_what_is_listed() {
     );
 }
 
-/// What the header declares is listed too, on every platform alike.
+/// All declarations of the header are listed, on every platform.
 #[test]
 fn the_header_declares_what_is_listed() {
     let header = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/include/hoid.h")).unwrap();

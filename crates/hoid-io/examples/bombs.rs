@@ -1,5 +1,5 @@
-//! 100 bombs of each format: each is read or refused in at most 300 MB and 2 s, and without a panic. The numbers of the
-//! page `research/notes/mutations.md`.
+//! 100 decompression bombs of each format: each is read or refused within 300 MB and 2 s, without a panic. The numbers
+//! are those of the page `research/notes/mutations.md`.
 //!
 //! `cargo xtask slow bombs [COUNT] [FIRST] [DIRECTORY]`; those that fail are left in the directory.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]

@@ -1,12 +1,12 @@
-//! A million damaged files, given to all readers in process: no panic, none that takes more than a
-//! second, at most 300 MB. The numbers of `research/notes/mutations.md`.
+//! A million damaged files, given to all readers in process: no panic, no reader takes more than a
+//! second, at most 300 MB. The numbers are those of `research/notes/mutations.md`.
 //!
 //! `cargo xtask slow mutations [--inputs N] [--first N] [--jobs N] [--seed N] [--memory MB] [--keep DIRECTORY]`.
 //!
-//! The cases are shared among processes, each with a limit of its address space (`ulimit -v`; where there is no such
-//! limit, nothing is reported about memory). A case that ends its process, or keeps it for [`PATIENCE`], is reported
-//! and the process continues after it. `--keep` writes the files of the cases that failed. It is built with overflow
-//! checks on, as the tests are.
+//! The cases are shared among processes, each with a limit on its address space (`ulimit -v`; where there is no such
+//! limit, memory is not reported). A case that ends its process, or takes longer than [`PATIENCE`], is reported, and a
+//! new process continues after it. `--keep` writes the files of the failed cases. Built with overflow checks on, as the
+//! tests are.
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
 #[path = "../tests/common/mutations/mod.rs"]
@@ -25,14 +25,14 @@ use std::{
 
 use mutations::{Case, case, originals::originals, readers, spent::Spent};
 
-/// The value for the page; the tests have another.
+/// Seed of the page; the tests use another.
 const SEED: u64 = 2026;
 /// Time limit of one case.
 const LIMIT: Duration = Duration::from_secs(1);
-/// A process that does not continue for so long hangs.
+/// A process without progress for this time hangs.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// The request.
+/// The task of one run.
 #[derive(Debug, Clone)]
 struct Task {
     inputs: u64,
@@ -41,8 +41,7 @@ struct Task {
     seed: u64,
     memory_mb: u64,
     keep: Option<PathBuf>,
-    /// The value for the process itself, where it is one of several: its place for files, and its
-    /// number.
+    /// For a child process: its directory for files and its number.
     part: Option<(PathBuf, u64)>,
 }
 
@@ -111,12 +110,12 @@ fn main() -> ExitCode {
     }
 }
 
-/// Report of all processes.
+/// Results of all processes.
 #[derive(Debug, Default)]
 struct Sum {
     read: u64,
     refused: u64,
-    /// Milliseconds, and the case.
+    /// Longest time, ms, and its case.
     slowest: (u64, u64),
     memory_mb: u64,
     failures: Vec<String>,
@@ -162,7 +161,7 @@ fn watch(task: &Task, place: &Path, number: u64, sum: &Mutex<Sum>) {
     }
 }
 
-/// A process for the cases of one part from a case on.
+/// Starts a process for the cases of one part, from case `first` on.
 fn start(task: &Task, place: &Path, first: u64, end: u64) -> Child {
     let program = std::env::current_exe().unwrap();
     let mut command = if cfg!(unix) {
@@ -183,7 +182,7 @@ fn start(task: &Task, place: &Path, first: u64, end: u64) -> Child {
     command.stdout(Stdio::piped()).spawn().unwrap()
 }
 
-/// Waits for the end; true if it does not come and the process is ended.
+/// Waits for the process to end; true if it hangs and has been killed.
 fn wait(child: &mut Child, progress: &Path) -> bool {
     let mut last = (u64::MAX, Instant::now());
     while child.try_wait().unwrap().is_none() {
@@ -211,7 +210,7 @@ fn keep(task: &Task, number: u64) {
     fs::write(directory.join(format!("{number}.{}", case.extension)), &case.bytes).unwrap();
 }
 
-/// The cases of this process.
+/// Runs the cases of this process.
 fn part(task: &Task, place: &Path, first: u64) {
     let said = Arc::new(Mutex::new(String::new()));
     let heard = Arc::clone(&said);
@@ -229,8 +228,8 @@ fn part(task: &Task, place: &Path, first: u64) {
         let path = place.join("damaged").with_extension(case.extension);
         fs::write(&path, &case.bytes).unwrap();
         let mut took = Duration::MAX;
-        // Where the system does not report what this process had, another may have had the processor: the least of
-        // three counts.
+        // Where the system does not report the CPU time of this process, another process may have used the processor:
+        // the least of three measurements.
         for _ in 0..3 {
             let begun = Spent::now();
             let outcome = panic::catch_unwind(AssertUnwindSafe(|| readers::all(&path, case.bytes.len(), case.choice)));
@@ -259,7 +258,7 @@ fn failed(task: &Task, number: u64, case: &Case, what: &str) {
     keep(task, number);
 }
 
-/// Most of the address space that this process had, where the system reports it.
+/// Largest address space of this process, where the system reports it.
 fn largest_mb() -> u64 {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmPeak:"));

@@ -1,17 +1,17 @@
-//! Everything that can be wrong with a file, in the words of the person who has to repair it.
+//! All errors of files, in terms of the user who has to correct the file.
 
 use hoid_model::ModelError;
 use thiserror::Error;
 
 use crate::wording::list;
 
-/// Why a file could not be read or written. Each message names the file, the place in it, what was
-/// found, the expected value and the remedy. A `place` is "line 12" where the format has lines,
-/// else "row 12".
+/// Reason why a file could not be read or written. Each message names the file, the place in it,
+/// the content found, the expected content and the remedy. A `place` is "line 12" if the format has
+/// lines, otherwise "row 12".
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum IoError {
-    /// A file that the system does not give.
+    /// A file that the system cannot read.
     #[error("{file} cannot be read: {source}; check the name and the permissions")]
     Unreadable {
         /// The file.
@@ -19,7 +19,7 @@ pub enum IoError {
         /// Error reported by the operating system.
         source: std::io::Error,
     },
-    /// A file that the system does not take.
+    /// A file that the system cannot write.
     #[error("{file} cannot be written: {source}; {}", remedy_of_writing(source))]
     Unwritable {
         /// The file.
@@ -27,7 +27,7 @@ pub enum IoError {
         /// Error reported by the operating system.
         source: std::io::Error,
     },
-    /// A result in the place of what it is made of.
+    /// A result that would overwrite its own input.
     #[error(
         "{file} is {input}, which is read by the same command and would be lost; name another place for the result"
     )]
@@ -52,7 +52,7 @@ pub enum IoError {
     NoFit {
         /// The file.
         file: String,
-        /// The problem.
+        /// Reason.
         reason: String,
     },
     /// A file that is not a shared library of a platform that units are made for.
@@ -73,13 +73,13 @@ pub enum IoError {
         /// The function that it lacks.
         missing: &'static str,
     },
-    /// A second process on one directory.
+    /// A directory in use by another process.
     #[error("another process works on {directory}: wait for its end, or take another directory")]
     InUse {
         /// The directory.
         directory: String,
     },
-    /// A directory in the place of a file.
+    /// A directory where a file is expected.
     #[error("{file} is a directory, expected a file; name the file in it")]
     Directory {
         /// The directory.
@@ -97,51 +97,51 @@ pub enum IoError {
         /// "; unpack it", empty if the format is unknown.
         remedy: String,
     },
-    /// Bytes that are not text.
+    /// Content that is not text.
     #[error("{file}, {place}: {found}, expected text in UTF-8; save the table as CSV in UTF-8")]
     NotText {
         /// The file.
         file: String,
-        /// Where.
+        /// Place.
         place: String,
         /// The first bad byte.
         found: String,
     },
-    /// A file with nothing in it but blank lines and comments.
+    /// A file with only blank lines and comments.
     #[error("{file} is empty, expected a header with the names of the columns and one line a sample")]
     Empty {
         /// The file.
         file: String,
     },
-    /// A header and nothing below it.
+    /// A header without rows.
     #[error("{file} holds a header and no samples; check that the recording was saved to its end")]
     NoRows {
         /// The file.
         file: String,
     },
-    /// Numbers where the names should be.
+    /// Numbers where the column names should be.
     #[error(
         "{file}, {place}: the first line holds numbers ({found}), expected the names of the columns; put a header such as t,e,u above it, without # in front"
     )]
     NoHeader {
         /// The file.
         file: String,
-        /// Where.
+        /// Place.
         place: String,
         /// The first cells.
         found: String,
     },
-    /// Cells between blanks.
+    /// Cells separated by blanks.
     #[error(
         "{file}: {found} numbers between blanks are in a line, expected commas, semicolons or tabs between them; save the table so, with a header such as t,e,u"
     )]
     Blanks {
         /// The file.
         file: String,
-        /// The numbers in its first line.
+        /// Number of numbers in the first line.
         found: usize,
     },
-    /// A table without end to the side.
+    /// A table with too many columns.
     #[error(
         "{file} has {found} columns, expected at most {most}; save the columns that are needed alone, or look for lost line ends"
     )]
@@ -153,16 +153,16 @@ pub enum IoError {
         /// The limit.
         most: usize,
     },
-    /// One name for two columns.
+    /// Two columns with the same name.
     #[error("{file}: columns {first} and {second} are both named \"{name}\"; give each column a name of its own")]
     DuplicateColumn {
         /// The file.
         file: String,
         /// The name.
         name: String,
-        /// Number of the one column, from 1.
+        /// Number of the first column, from 1.
         first: usize,
-        /// Number of the other column, from 1.
+        /// Number of the second column, from 1.
         second: usize,
     },
     /// A row that is shorter or longer than the header.
@@ -172,21 +172,21 @@ pub enum IoError {
     RowLength {
         /// The file.
         file: String,
-        /// Where.
+        /// Place.
         place: String,
         /// Values in the row.
         found: usize,
         /// Names in the header.
         expected: usize,
     },
-    /// A last line that lacks values and its end.
+    /// A truncated last line.
     #[error(
         "{file} is cut in {place}, its last: {found} of {expected} values; copy or record it again, or remove that line and use what is above it"
     )]
     CutRow {
         /// The file.
         file: String,
-        /// Where.
+        /// Place.
         place: String,
         /// Values in the row.
         found: usize,
@@ -209,15 +209,15 @@ pub enum IoError {
         /// The names that exist.
         available: String,
     },
-    /// Text that is not a choice of a column.
+    /// Text that does not select a column.
     #[error("the column \"{found}\": {expected}")]
     Expression {
         /// The text as given.
         found: String,
-        /// The problem, and the remedy.
+        /// The problem and the remedy.
         expected: String,
     },
-    /// One column as input and as output.
+    /// The same column as input and output.
     #[error("{file}: input and output are both {asked}; choose two columns with --input and --output")]
     SameColumn {
         /// The file.
@@ -225,16 +225,16 @@ pub enum IoError {
         /// The expression.
         asked: String,
     },
-    /// Text in the place of a number.
+    /// Text where a number is expected.
     #[error("{file}, {place}, column {column}: found \"{found}\", expected a number; {remedy}")]
     NotANumber {
         /// The file.
         file: String,
-        /// Where.
+        /// Place.
         place: String,
         /// The column.
         column: String,
-        /// The text found, cut to a readable length.
+        /// The text found, shortened to a readable length.
         found: String,
         /// Remedy.
         remedy: &'static str,
@@ -246,7 +246,7 @@ pub enum IoError {
     Infinite {
         /// The file.
         file: String,
-        /// Where.
+        /// Place.
         place: String,
         /// The column.
         column: String,
@@ -266,12 +266,12 @@ pub enum IoError {
         column: String,
         /// The cell.
         found: String,
-        /// How many values are missing.
+        /// Number of missing values.
         count: usize,
-        /// How many rows were examined.
+        /// Number of rows examined.
         rows: usize,
     },
-    /// Missing values with nothing on one side of them.
+    /// Missing values at the start or end.
     #[error(
         "{file}, {place}, column {column}: the values are missing up to the {end} of the record, so that --fill has nothing to bridge to; leave them out with --from and --to"
     )]
@@ -285,7 +285,7 @@ pub enum IoError {
         /// "start" or "end".
         end: &'static str,
     },
-    /// Neither a time column nor a sampling frequency.
+    /// Neither a time column nor a given sampling frequency.
     #[error(
         "{file} has no column t (time in s), and no sampling frequency was given; name the column of the time by --time COLUMN, or give --fs HZ; it has {available}"
     )]
@@ -295,30 +295,30 @@ pub enum IoError {
         /// The names that exist.
         available: String,
     },
-    /// A sampling frequency without meaning.
+    /// An invalid sampling frequency.
     #[error("the sampling frequency is {found} Hz, expected a positive finite number of samples in a second")]
     SamplingFrequency {
         /// The value given.
         found: f64,
     },
-    /// Too few samples to see the sampling.
+    /// Too few samples to determine the sampling.
     #[error(
         "{file}: {found} sample, expected at least 2 to find the sampling from t; check the file and the span, or give --fs HZ"
     )]
     TooFewSamples {
         /// The file.
         file: String,
-        /// How many there are.
+        /// Number of samples.
         found: usize,
     },
-    /// Several trials where one is read.
+    /// Several trials where one is expected.
     #[error("{file} holds {} trials by {by}: {}; read one of them with --trial {by}={}", .trials.len(), listed(.trials), .trials.first().map_or("", |name| name.as_str()))]
     SeveralTrials {
         /// The file.
         file: String,
         /// The column that counts them, or t.
         by: String,
-        /// Their names, two at least.
+        /// Names of the trials, at least two.
         trials: Vec<String>,
     },
     /// A trial that does not exist.
@@ -326,12 +326,12 @@ pub enum IoError {
     NoSuchTrial {
         /// The file.
         file: String,
-        /// The request.
+        /// The requested trial.
         asked: String,
         /// The names that exist.
         available: String,
     },
-    /// Time that stays constant or runs back.
+    /// Time that is constant or runs backwards.
     #[error(
         "{file}, {place}: t = {found} s after {previous} s, expected increasing time; drop rows that were written twice with --drop-repeated, read trials whose time starts again with --trial t, write t with more decimals, or give --fs HZ to count samples instead"
     )]
@@ -342,7 +342,7 @@ pub enum IoError {
         place: String,
         /// Its time, s.
         found: f64,
-        /// The time before, s.
+        /// Previous time, s.
         previous: f64,
     },
     /// Missing samples.
@@ -365,25 +365,25 @@ pub enum IoError {
         /// Sample time, s.
         sample_time_s: f64,
     },
-    /// Samples off the even grid.
+    /// Samples that deviate from the even grid.
     #[error(
         "{file}: t is uneven: at {place}, t = {found} s, it is {deviation_s:.3e} s off the even grid with sample time {sample_time_s:.6} s, more than the allowed {tolerance_s:.3e} s; interpolate onto the grid with --resample, or give --fs HZ if the samples were taken evenly and only t is wrong"
     )]
     Jitter {
         /// The file.
         file: String,
-        /// The row farthest from the grid.
+        /// The row with the largest deviation.
         place: String,
         /// Its time, s.
         found: f64,
-        /// How far it is, s.
+        /// Deviation, s.
         deviation_s: f64,
-        /// How far it may be, s.
+        /// Tolerance, s.
         tolerance_s: f64,
         /// Sample time, s.
         sample_time_s: f64,
     },
-    /// A resampled record that would be mostly invented.
+    /// A resampled record that would consist mostly of interpolated samples.
     #[error(
         "{file}: resampling from t = {start_s} s to {end_s} s would make {samples:.0} samples out of {rows}, expected at most {factor} times as many; look for a wrong time in t, or use a part with --from and --to"
     )]
@@ -394,9 +394,9 @@ pub enum IoError {
         start_s: f64,
         /// Last time, s.
         end_s: f64,
-        /// Samples that would be made.
+        /// Number of samples after resampling.
         samples: f64,
-        /// Samples that there are.
+        /// Number of recorded samples.
         rows: usize,
         /// The largest ratio allowed.
         factor: usize,
@@ -413,19 +413,19 @@ pub enum IoError {
         /// Last time of the record, s.
         end_s: f64,
     },
-    /// A step of the preparation that cannot be taken.
+    /// A preparation step that cannot be applied.
     #[error("{record}: {step}: {found}, expected {expected}")]
     Preparation {
         /// Label of the record.
         record: String,
-        /// The step, as the option is called.
+        /// The step, named as its option.
         step: &'static str,
-        /// The findings.
+        /// The problem.
         found: String,
         /// The expected value, or the remedy.
         expected: String,
     },
-    /// Text that is not a scale.
+    /// Text that is not a valid scale.
     #[error("the scale \"{found}\": expected {expected}")]
     Scaling {
         /// The text, or the factor.
@@ -433,20 +433,20 @@ pub enum IoError {
         /// Admissible values of a scale.
         expected: String,
     },
-    /// Text that is not an offset.
+    /// Text that is not a valid offset.
     #[error("the offset \"{found}\": expected a number of samples (1, -0.5) or of seconds (0.0167s)")]
     Offset {
         /// The text.
         found: String,
     },
-    /// A channel that cannot be the column of a file.
+    /// A channel name that cannot be a column of a file.
     #[error("{file}: the column \"{name}\" cannot be written: {reason}; rename it")]
     ChannelName {
         /// The file.
         file: String,
         /// Name of the channel.
         name: String,
-        /// Why.
+        /// Reason.
         reason: &'static str,
     },
     /// Columns of different lengths.
@@ -456,9 +456,9 @@ pub enum IoError {
         file: String,
         /// Name of the column.
         column: String,
-        /// Its values.
+        /// Number of its values.
         found: usize,
-        /// The entries of the first column.
+        /// Number of values of the first column.
         expected: usize,
     },
     /// Arrays of different lengths in one record.
@@ -468,13 +468,13 @@ pub enum IoError {
     UnequalColumns {
         /// The file.
         file: String,
-        /// Path of the one array.
+        /// Path of the first array.
         column: String,
-        /// Its values.
+        /// Number of its values.
         found: usize,
-        /// Path of the other array.
+        /// Path of the second array.
         other: String,
-        /// Its values.
+        /// Number of its values.
         expected: usize,
     },
     /// Streams without a common time.
@@ -485,14 +485,14 @@ pub enum IoError {
         /// The file.
         file: String,
     },
-    /// A name that represents several arrays.
+    /// A name that matches several arrays.
     #[error("{file}: \"{asked}\" may be any of {found}; give the whole path with --input and --output")]
     AmbiguousColumn {
         /// The file.
         file: String,
         /// The name.
         asked: String,
-        /// The paths that end in it.
+        /// The paths that end in the name.
         found: String,
     },
     /// A table without columns.
@@ -501,27 +501,27 @@ pub enum IoError {
         /// The file.
         file: String,
     },
-    /// Rows for another table.
+    /// Rows that do not match the columns of the file.
     #[error("{file}: rows of {found} cannot follow {expected}; append tables of the same columns in the same order")]
     ColumnsDiffer {
         /// The file.
         file: String,
-        /// The columns of the rows.
+        /// Columns of the rows.
         found: String,
-        /// The columns of the file.
+        /// Columns of the file.
         expected: String,
     },
-    /// Bytes that are not a Parquet.
+    /// Content that is not Parquet.
     #[error(
         "{file} is not a Parquet file: {found}, expected PAR1 at both ends; copy or write it again if it was cut short, or name it .csv if it is text"
     )]
     NotParquet {
         /// The file.
         file: String,
-        /// The replacement.
+        /// The content found.
         found: String,
     },
-    /// Bytes of another format than the extension states.
+    /// Content in a format other than that of the extension.
     #[error(
         "{file} is not in the format {format}: {found}, expected {expected}; copy or write it again if it was cut short, or give it the extension of what it is"
     )]
@@ -530,35 +530,35 @@ pub enum IoError {
         file: String,
         /// The format of the extension.
         format: &'static str,
-        /// The replacement.
+        /// The content found.
         found: String,
         /// First bytes of such a file.
         expected: &'static str,
     },
-    /// Bytes that contradict the format of the file.
+    /// Content that violates the file format.
     #[error("{file} is damaged: {found}; copy or write it again")]
     Damaged {
         /// The file.
         file: String,
-        /// The violation of the format, and its place.
+        /// The violation and its place.
         found: String,
     },
-    /// Content that the format allows and hoid does not support.
+    /// Valid content that hoid does not support.
     #[error("{file}: {found}, which hoid does not read; {remedy}")]
     Unsupported {
         /// The file.
         file: String,
-        /// The findings, and where.
+        /// The content found and its place.
         found: String,
         /// Remedy.
         remedy: &'static str,
     },
-    /// The data do not form a record.
+    /// Data that do not form a record.
     #[error("{file}: {source}")]
     Model {
         /// The file.
         file: String,
-        /// Why.
+        /// Reason.
         source: ModelError,
     },
 }
@@ -566,7 +566,7 @@ pub enum IoError {
 /// Remedy for a file that cannot be written.
 fn remedy_of_writing(source: &std::io::Error) -> &'static str {
     use std::io::ErrorKind;
-    // What the writer of CSV wraps.
+    // An I/O error wrapped by the CSV writer.
     let wrapped = source.get_ref().and_then(|inner| inner.downcast_ref::<csv::Error>());
     let kind = match wrapped.map(csv::Error::kind) {
         Some(csv::ErrorKind::Io(inner)) => inner.kind(),

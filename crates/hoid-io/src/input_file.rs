@@ -1,4 +1,5 @@
-//! Files that are not recordings, read whole: texts, settings of a bounded length, bytes; and the names in a directory.
+//! Files other than recordings, read completely: texts, settings of limited length, bytes; and the file names in a
+//! directory.
 
 use std::fs;
 use std::io::{self, Read as _};
@@ -7,7 +8,7 @@ use std::path::Path;
 use crate::IoError;
 use crate::formats::Settings;
 
-/// The text of a file.
+/// Reads the text of a file.
 ///
 /// # Errors
 /// [`IoError::Unreadable`] for errors that the operating system reports.
@@ -18,10 +19,10 @@ pub fn read_text(path: &Path) -> Result<String, IoError> {
     })
 }
 
-/// The text of a file of settings, of a length that can be read in bounded memory.
+/// Reads the text of a file of settings, whose length is limited so that memory is bounded.
 ///
 /// # Errors
-/// [`IoError::Unreadable`] for errors that the operating system reports, and for one that is too
+/// [`IoError::Unreadable`] for errors that the operating system reports, and for a file that is too
 /// long.
 pub fn read_settings(path: &Path) -> Result<String, IoError> {
     settings_text(path).map_err(|source| IoError::Unreadable {
@@ -30,7 +31,7 @@ pub fn read_settings(path: &Path) -> Result<String, IoError> {
     })
 }
 
-/// As [`read_settings`], with what the system would report.
+/// As [`read_settings`], with the error of the operating system.
 pub(crate) fn settings_text(path: &Path) -> io::Result<String> {
     let is_json = path
         .extension()
@@ -50,7 +51,7 @@ pub(crate) fn settings_text(path: &Path) -> io::Result<String> {
     )))
 }
 
-/// The bytes of a file.
+/// Reads the bytes of a file.
 ///
 /// # Errors
 /// [`IoError::Unreadable`] for errors that the operating system reports.
@@ -61,7 +62,7 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>, IoError> {
     })
 }
 
-/// Names of the files in a directory, in no order.
+/// Names of the files in a directory, in arbitrary order.
 ///
 /// # Errors
 /// [`IoError::Unreadable`] for errors that the operating system reports.

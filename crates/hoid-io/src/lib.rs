@@ -1,9 +1,9 @@
-//! The file formats of hoid: the only crate that knows them.
+//! The file formats of hoid; no other crate handles them.
 //!
-//! Recordings come as CSV, Parquet, NPZ, MATLAB or XDF, with columns of any name, clocks that jitter and rows that are
-//! missing. Reading takes the columns that are requested, finds the sampling, checks every value in use, and gives an
-//! evenly sampled [`Record`](hoid_model::Record) or an error that names the place in the file. Nothing is repaired
-//! unasked; problems of the data are reported next to the record.
+//! Recordings are in CSV, Parquet, NPZ, MATLAB or XDF, with columns of any name, clocks that jitter and missing rows.
+//! Reading selects the requested columns, determines the sampling, checks every value in use, and returns an evenly
+//! sampled [`Record`](hoid_model::Record) or an error that names the place in the file. Data are repaired only on
+//! request; problems of the data are reported with the record.
 //!
 //! ```
 //! use hoid_io::{ReadOptions, read_record};

@@ -1,13 +1,13 @@
-//! Numbers, names and cells in the words of a message.
+//! Numbers, names and cells as text in messages.
 
 use std::borrow::Cow;
 
 use crate::table::{control_among, error_among};
 
-/// A cell in a message is cut to this many characters.
+/// Maximum length of a cell in a message, characters.
 const SHOWN: usize = 40;
 
-/// A cell or a name for a message: short, and without anything that a terminal obeys.
+/// A cell or a name for a message: short, and without terminal control characters.
 pub(crate) fn shown(text: &str) -> String {
     let text = text.trim();
     let cut = match text.char_indices().nth(SHOWN) {
@@ -17,10 +17,10 @@ pub(crate) fn shown(text: &str) -> String {
     cut.escape_debug().to_string()
 }
 
-/// The longest name of a column in a message, characters.
+/// Maximum length of a column name in a message, characters.
 const NAMED: usize = 80;
 
-/// The name of a column for a message: unchanged, except for its length and what a terminal obeys.
+/// A column name for a message: unchanged, except for its length and terminal control characters.
 pub(crate) fn named(name: &str) -> String {
     let mut text = String::with_capacity(name.len().min(4 * NAMED));
     for (at, character) in name.chars().enumerate() {
@@ -37,8 +37,8 @@ pub(crate) fn named(name: &str) -> String {
     text
 }
 
-/// A message that may repeat parts of a file, without anything that a terminal obeys: other control
-/// characters than line ends are written as `\u{1b}`.
+/// A message that may repeat parts of a file, without terminal control characters: those other than
+/// line ends are written as `\u{1b}`.
 #[must_use]
 pub fn printable(message: &str) -> String {
     let mut text = String::with_capacity(message.len());
@@ -52,23 +52,23 @@ pub fn printable(message: &str) -> String {
     text
 }
 
-/// Report of a crate, short, and without anything that a terminal obeys.
+/// Error message of a crate, short, and without terminal control characters.
 pub(crate) fn told(what: &str) -> String {
     let line = what.lines().next().unwrap_or_default();
     line.chars().take(200).collect::<String>().escape_debug().to_string()
 }
 
-/// How near a name has to be to be offered: as near as the command line wants a flag.
+/// Smallest similarity of a suggested name: the same as for flags of the command line.
 const NEAR: f64 = 0.7;
 
-/// "; did you mean "u"?" for names that do not exist: of each the one that differs in capitals alone, else the nearest
-/// by Jaro's measure (M. A. Jaro, J. Am. Stat. Assoc. 84 (1989) 414-420). Of e and u it may be the column that has the
-/// common name of what they are. Empty where none is near.
+/// "; did you mean "u"?" for names that do not exist: for each the one that differs only in case, otherwise the nearest
+/// by Jaro's measure (M. A. Jaro, J. Am. Stat. Assoc. 84 (1989) 414-420). For e and u it may be the column with the
+/// common name of the signal. Empty if none is near.
 pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
     let of = |asked: &&str| {
         let asked = asked.trim().to_lowercase();
         let score = |name: &str| (strsim::jaro(&asked, &name.trim().to_lowercase()), name.to_owned());
-        // A letter or two are within every longer name: what starts with them is meant.
+        // One or two letters occur in every longer name: a name that starts with them is meant.
         let is_near = |name: &&&str| asked.chars().count() > 2 || name.trim().to_lowercase().starts_with(&asked);
         let known = names
             .iter()
@@ -87,8 +87,8 @@ pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
     }
 }
 
-/// The column that is the request by another name: the error for `e` or `error`, the control for
-/// `u` or `stick`.
+/// The requested column under another name: the error for `e` or `error`, the control for `u` or
+/// `stick`.
 fn by_what_it_is(asked: &str, names: &[&str]) -> Option<String> {
     let default = match (error_among(&[asked]), control_among(&[asked])) {
         (Some(_), _) => error_among(names),
@@ -98,7 +98,7 @@ fn by_what_it_is(asked: &str, names: &[&str]) -> Option<String> {
     default.map(str::to_owned)
 }
 
-/// Names for a message: all of them, unless there are very many.
+/// Names for a message: all of them, unless there are too many.
 pub(crate) fn list(names: &[&str]) -> String {
     const SHOWN: usize = 40;
     let known: Vec<&str> = names.iter().copied().filter(|name| !name.is_empty()).collect();
@@ -112,7 +112,7 @@ pub(crate) fn list(names: &[&str]) -> String {
     text
 }
 
-/// A number for a message: up to nine significant digits, without zeros at the end.
+/// A number for a message: up to nine significant digits, without trailing zeros.
 pub(crate) fn decimal(value: f64) -> String {
     let rounded = format!("{value:.8e}").parse::<f64>().unwrap_or(value);
     format!("{rounded}")

@@ -1,5 +1,5 @@
-//! Files of named arrays: those of other programs, as the `make.py` of their folder in `fixtures`
-//! writes them, and our own.
+//! Files of named arrays: those of other programs, as written by the `make.py` of their folder in
+//! `fixtures`, and our own.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail at any line, its helpers as well")]
 
@@ -38,7 +38,7 @@ fn u() -> Vec<f64> {
     (0..N).map(|k| (0.3 * k as f64).cos() * 1e-3).collect()
 }
 
-/// The sines of two libraries differ in the last bit.
+/// The sine functions of two libraries differ in the last bit.
 fn close(found: &[f64], expected: &[f64]) {
     assert_eq!(found.len(), expected.len());
     assert!(
@@ -93,7 +93,7 @@ fn arrays_of_numpy() {
         channel(&read("npz/savez_compressed.npz", "e", "f[0,:]"), "f[0,:]"),
         &u(),
     );
-    // What is alongside, and what is not a column.
+    // Further arrays, and entries that are not columns.
     let found = read("npz/savez_compressed.npz", "e", "u");
     assert_eq!(found.record.channels().count(), 6);
     let found = read("npz/others.npz", "e", "u");
@@ -148,7 +148,7 @@ fn variables_of_matlab() {
         if name != "mat/h5py_v73.mat" {
             close(channel(&read(&name, "e", "u"), "wide(2,:)"), &times(3.0, &u()));
         }
-        // Elements of structures, in full and by their end, at the time that is nearest.
+        // Elements of structures, by their full path and by its end, with the nearest time.
         for run in 1..=3_i32 {
             let factor = f64::from(run);
             for path in ["run", "data.run"] {
@@ -196,7 +196,7 @@ fn hdf5_of_another_program() {
     let name = "mat/h5py.h5";
     whole(&read(name, "e", "u"));
     whole(&read(name, "session.run1.e", "session.run1.u"));
-    // Lines of a matrix are counted as numpy does.
+    // Lines of a matrix are counted as in numpy.
     close(channel(&read(name, "e", "u"), "u"), &u());
     let counted = ReadOptions {
         sampling_hz: Some(80.0),
@@ -218,7 +218,7 @@ fn objects_of_matlab_come_with_the_line_that_saves_their_numbers() {
         message.contains("timeseries") && message.contains("x.Time"),
         "{message}"
     );
-    // A name that does not exist is in the object.
+    // A missing name may be in the object.
     let message = refused("mat/h5py_objects_v73.mat", "e", "u");
     assert!(
         message.contains("runs holds an object of the class timetable"),
@@ -237,7 +237,7 @@ fn names_in_the_only_structure() {
         read("mat/octave_struct.mat", "deep.e", "deep.u").record.input(),
         &times(5.0, &e()),
     );
-    // A structure in a structure, deeper than anyone means it.
+    // Deeply nested structures.
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("deep.mat");
     let mut inner = element(
@@ -285,8 +285,8 @@ fn streams_of_the_lab_streaming_layer() {
         found.notes
     );
     for (k, (e, u)) in record.input().iter().zip(record.output()).enumerate() {
-        // Jitter of 2 ms over 300 samples leaves 0.3 ms, the quantum is 1e-4, and a chord of the
-        // sine at 40 Hz adds 8e-5.
+        // Jitter of 2 ms over 300 samples leaves 0.3 ms, the quantum is 1e-4, and linear
+        // interpolation of the sine at 40 Hz adds 8e-5.
         let t = u.acos();
         let expected = if record.time_s(k) < std::f64::consts::PI {
             1e4 * t.sin()
@@ -412,7 +412,7 @@ fn records_come_back_bit_for_bit() {
     }
 }
 
-/// Files with some bytes changed, or cut: an error that names the file, or values, but never a
+/// Files with modified bytes, or truncated: an error that names the file, or values, but never a
 /// panic.
 #[test]
 fn damaged_files_never_panic() {
@@ -450,7 +450,7 @@ fn damaged_files_never_panic() {
             bytes.truncate(draw.below(bytes.len()));
         }
         for _ in 0..=draw.below(4) {
-            // The heads of files state most, and the end of an archive.
+            // Headers and the end of an archive contain most of the structure.
             let length = bytes.len().max(1);
             let at = match draw.below(3) {
                 0 => draw.below(length),

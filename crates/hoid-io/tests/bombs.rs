@@ -1,10 +1,10 @@
-//! Small files that are made to unpack to any size: refused as text, in bounded memory. The bombs of
-//! `cargo xtask slow bombs` are sampled.
+//! Small files that unpack to any size: refused with a message, in bounded memory. A sample of the
+//! bombs of `cargo xtask slow bombs`.
 //!
-//! One test, so that the peak of the process is that of the readers.
+//! A single test, so that the peak memory of the process is that of the readers.
 #![allow(clippy::unwrap_used)]
 
-// The commands use the rest of both.
+// The commands use the rest of both modules.
 #[allow(dead_code)]
 #[path = "common/bombs/mod.rs"]
 mod bombs;
@@ -23,9 +23,9 @@ use bombs::{
 use hoid_io::{read_any_scenario, read_fit, read_table, survey};
 use parquet::basic::{Compression, GzipLevel};
 
-/// Most memory of the process, kB, on systems that report it.
+/// Largest memory of the process, kB, on systems that report it.
 const MOST_KB: u64 = 300_000;
-/// For each format.
+/// Number of bombs of each format.
 const SAMPLE: u64 = 5;
 
 #[test]

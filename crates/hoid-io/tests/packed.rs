@@ -25,7 +25,7 @@ fn packed_tables_and_sidecars() {
         (read.record.input(), read.record.output()),
         (&[1.0, 3.0][..], &[2.0, 4.0][..])
     );
-    // BIDS: rows alone, and what they are next to them.
+    // BIDS: rows only, and the file that describes them.
     let json = r#"{"SamplingFrequency": 50.0, "StartTime": -2.0, "Columns": ["error", "stick"]}"#;
     let options = ReadOptions {
         input: Some("error".parse().unwrap()),
@@ -56,7 +56,7 @@ fn packed_tables_and_sidecars() {
         let message = read_record(&desk.path(name), &options).unwrap_err().to_string();
         assert!(message.contains("the first line holds numbers"), "{message}");
     }
-    // Cut, and another format inside.
+    // Truncated, and another format inside.
     let packed = gzip(b"t,e,u\n0,1,2\n0.02,3,4\n");
     std::fs::write(desk.path("cut.csv.gz"), &packed[..packed.len() - 6]).unwrap();
     let message = |name: &str| {

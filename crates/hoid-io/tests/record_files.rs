@@ -1,4 +1,4 @@
-//! Whole files in and out: what comes back is what went in, and what is damaged is reported.
+//! Complete files written and read: the data are reproduced, and damage is reported.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail at any line, its helpers as well")]
 
@@ -58,7 +58,7 @@ fn what_is_written_is_read_bit_for_bit() {
         (9000, 0.01, -8.0),
         (333, 1.0 / 60.0, 0.1),
         (400, 0.007_3, -1.0 / 3.0),
-        // Two grids that look like a whole number of Hz and are not.
+        // Two grids close to a whole number of Hz that are not rounded to it.
         (700, 0.010_000_03, 12.5),
         (4001, 1.0 / 99.995, 0.0),
         (2, 0.3, 0.0),
@@ -175,7 +175,7 @@ fn expressions_choose_and_combine() {
     );
 }
 
-/// What a spreadsheet saves where decimals have commas: semicolons or tabs, a byte order mark, CRLF.
+/// Spreadsheet files with decimal commas: semicolons or tabs, a byte order mark, CRLF.
 #[test]
 fn decimal_commas_give_the_same_record() {
     let desk = Desk::new();
@@ -281,7 +281,7 @@ fn other_columns_that_are_no_numbers_are_left_out_with_a_note() {
     assert!(read.notes[2].contains("column d is left out") && read.notes[2].contains("missing (empty)"));
 }
 
-/// Whatever is in a file, the answer is a record of finite numbers or an error that names the file.
+/// For any content of a file, the result is a record of finite numbers or an error that names the file.
 #[test]
 fn damaged_files_never_panic() {
     let desk = Desk::new();
@@ -355,11 +355,11 @@ fn damaged_files_never_panic() {
             }
         }
     }
-    // Both ways are walked often.
+    // Both outcomes are frequent.
     assert!(read > 250 && refused > 250, "{read} read, {refused} refused");
 }
 
-/// Recordings of people at work, which are not part of the project: skipped where they are absent.
+/// Recordings of people, which are not part of the project: skipped if they are absent.
 #[test]
 fn recordings_of_people_are_read() {
     let Some(dir) = std::env::var_os("HOID_HUMAN_DATA") else {

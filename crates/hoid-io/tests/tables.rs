@@ -1,4 +1,4 @@
-//! Tables of results out and back, and Parquet files of other programs and of damage.
+//! Tables of results written and read, and Parquet files of other programs and damaged ones.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail at any line, its helpers as well")]
 
@@ -20,7 +20,7 @@ fn column(name: &str, values: ColumnValues) -> OutputColumn {
     }
 }
 
-/// Rows with everything that has to come back.
+/// Rows with all features that must be preserved.
 fn table(rows: usize) -> OutputTable {
     let awkward = [
         0.0,
@@ -210,7 +210,7 @@ fn what_cannot_be_written_says_so() {
             "{differ}"
         );
         assert!(matches!(writer.append(&uneven), Err(IoError::ColumnLength { .. })));
-        // What was refused left nothing.
+        // Refused rows leave no trace.
         writer.append(&table(2)).unwrap();
         writer.finish().unwrap();
         assert_same(&read_table(&path).unwrap(), &table(2));
@@ -305,7 +305,7 @@ fn files_of_another_program_are_read() {
             let channel = record.channels().find(|c| c.name == number).unwrap();
             let check = |k: usize, value: f64| {
                 let found = channel.values[k];
-                // Sines of two libraries; missing values were bridged.
+                // Sine functions of two libraries; missing values were interpolated.
                 assert!(
                     (found - value).abs() <= 2e-16 || value.is_nan(),
                     "{name}, {number}, row {k}: {found} {value}"
@@ -331,7 +331,7 @@ fn files_of_another_program_are_read() {
     }
 }
 
-/// `read_table` takes the same path to the values; kinds and empty texts are its own.
+/// `read_table` reads the values in the same way; kinds and empty texts are specific to it.
 #[test]
 fn kinds_of_another_program() {
     let table = read_table(&fixture("kinds")).unwrap();
@@ -429,7 +429,7 @@ fn records_come_back_from_parquet() {
         let other = back.record.channels().find(|c| c.name == channel.name).unwrap();
         assert_eq!((&other.unit, &other.values), (&channel.unit, &channel.values));
     }
-    // A table and a record are one file to both readers.
+    // Both readers accept the same file as a table and as a record.
     let table = read_table(&path).unwrap();
     let names: Vec<&str> = table.columns.iter().map(|c| c.name.as_str()).collect();
     assert_eq!(names, ["t", "f_t", "e", "u"]);
@@ -439,7 +439,7 @@ fn records_come_back_from_parquet() {
 
 #[test]
 fn a_time_in_single_precision_is_even() {
-    // At 2000 s a float holds 1.2e-4 s, which is rounding and no jitter.
+    // At 2000 s single precision resolves 1.2e-4 s, which is rounding and not jitter.
     let read = read_record(&fixture("single"), &ReadOptions::default()).unwrap();
     assert_eq!(read.record.sample_time().s(), 0.01);
     assert_eq!(read.record.len(), 300);
@@ -475,14 +475,14 @@ fn what_is_no_parquet_says_so() {
         zstd.contains("column t, row group 1 is compressed by Zstandard") && zstd.contains("Snappy"),
         "{zstd}"
     );
-    // Cut anywhere, it is refused.
+    // Truncated anywhere, it is refused.
     for cut in (0..whole.len()).step_by(97) {
         message(&whole[..cut]);
     }
 }
 
-/// Bytes changed anywhere, and footers above all: a table, a record or an error, and neither a
-/// panic nor all memory.
+/// Modified bytes anywhere, especially in footers: a table, a record or an error, without a panic
+/// or excessive memory.
 #[test]
 fn damaged_parquet_never_panics() {
     let dir = tempfile::tempdir().unwrap();

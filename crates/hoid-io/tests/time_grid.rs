@@ -1,4 +1,4 @@
-//! The time of a file: its name, its grid, what is done about gaps and jitter, and spans of it.
+//! The time of a file: its name, its grid, handling of gaps and jitter, and spans.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail at any line, its helpers as well")]
 
@@ -26,7 +26,7 @@ fn the_time_may_have_the_name_that_a_recorder_gives_it() {
         std::fs::write(&path, format!("{header}\n{rows}")).unwrap();
         read_record(&path, &ReadOptions::default())
     };
-    // Printed to a microsecond, to a millisecond: the grid is found all the same.
+    // Printed to a microsecond or a millisecond: the grid is found in both cases.
     let found = read("Time [ms];e;u", 1000.0).unwrap();
     assert!((found.record.sample_time().s() - 1.0 / 60.0).abs() < 1e-6);
     assert!(
@@ -38,7 +38,7 @@ fn the_time_may_have_the_name_that_a_recorder_gives_it() {
         found.notes
     );
     assert!((read("time;e;u", 1.0).unwrap().record.time_s(39) - 0.65).abs() < 1e-3);
-    // Two times: no one knows which.
+    // Two times: the choice is ambiguous.
     let path = directory.path().join("two.csv");
     std::fs::write(&path, "time,time_ms,e,u\n0,0,1,2\n0.01,10,1,2\n").unwrap();
     let message = read_record(&path, &ReadOptions::default()).unwrap_err().to_string();
@@ -48,10 +48,10 @@ fn the_time_may_have_the_name_that_a_recorder_gives_it() {
     );
 }
 
-/// A header, how its times are written, and what is requested.
+/// A header, the format of its times, and the requested time.
 type Written<'a> = (&'a str, &'a dyn Fn(i64) -> String, Option<&'a str>);
 
-/// The record under a header, of 40 rows at 50 Hz whose times are written by `time`.
+/// The record of a header, with 40 rows at 50 Hz whose times are formatted by `time`.
 fn record_with(header: &str, time: impl Fn(i64) -> String, choice: Option<&str>) -> Result<ReadRecord, IoError> {
     let rows: String = (0..40).map(|k| format!("{},{k},{}\n", time(k), 2 * k)).collect();
     let options = ReadOptions {
@@ -110,7 +110,7 @@ fn times_in_any_unit_and_form_are_the_same_record() {
         assert!(read.record.time_s(0).abs() < 1e-9, "{header} {choice:?}");
         assert_eq!(read.record.len(), 40);
     }
-    // A row number is no time, and a unit that is requested wins over the one that is found.
+    // A row number is not a time, and a requested unit takes precedence over the detected one.
     assert!(record_with("", |k| k.to_string(), None).is_err());
     assert_eq!(
         record_with("t", ms, Some("t:s")).unwrap().record.sample_time().s(),
@@ -191,7 +191,7 @@ fn fill_bridges_and_says_so() {
         open.contains("line 2, column e: the values are missing up to the start"),
         "{open}"
     );
-    // Text and infinite values are mistakes and not gaps.
+    // Text and infinite values are errors and not gaps.
     assert!(
         desk.error("t,e,u\n0,1,2\n1,x,2\n2,1,2\n", &fill(FILL))
             .contains("found \"x\"")
@@ -202,7 +202,7 @@ fn fill_bridges_and_says_so() {
     );
 }
 
-/// An outer join of two topics: each row lacks one of the two, and neither starts nor ends with both.
+/// An outer join of two topics: each row lacks one of the two, and neither the first nor the last row has both.
 #[test]
 fn two_topics_in_one_table_are_read_where_both_have_values() {
     let desk = Desk::new();
@@ -211,7 +211,7 @@ fn two_topics_in_one_table_are_read_where_both_have_values() {
         resample: true,
     };
     let ask = |repair| ReadOptions { repair, ..defaults() };
-    // On one clock, e in every second row.
+    // On a common clock, e in every second row.
     let mut text = String::from("t,e,u\n");
     for k in 0..=21 {
         let t = 0.01 * f64::from(k);
@@ -233,7 +233,7 @@ fn two_topics_in_one_table_are_read_where_both_have_values() {
         read.notes,
         ["1 rows at the start and 0 at the end are left out: e and u have not all a value there to bridge to"]
     );
-    // On clocks of their own, 50 and 40 Hz, without a stamp in common: the grid is that of the faster.
+    // On separate clocks, 50 and 40 Hz, without a common time stamp: the grid is that of the faster one.
     let mut rows: Vec<(f64, bool)> = (0..50).map(|k| (0.02 * f64::from(k), true)).collect();
     rows.extend((0..40).map(|k| (0.013 + 0.025 * f64::from(k), false)));
     rows.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -254,7 +254,7 @@ fn two_topics_in_one_table_are_read_where_both_have_values() {
             (read.record.input()[k] - 10.0 * t).abs() < 1e-12 && (read.record.output()[k] - (1.0 - t)).abs() < 1e-12
         );
     }
-    // Nothing in common at all: the error reports it.
+    // No overlap at all: the error reports it.
     assert!(
         desk.error("t,e,u\n0,1,\n1,2,\n2,,1\n3,,2\n", &ask(FILL))
             .contains("missing up to")
@@ -269,8 +269,8 @@ fn resample_goes_over_gaps_and_jitter() {
         sampling_hz,
         ..defaults()
     };
-    // e = 10 t and u = 1 - t on an uneven t with two samples missing: straight lines come back
-    // exactly up to rounding.
+    // e = 10 t and u = 1 - t on an uneven t with two missing samples: straight lines are reproduced
+    // up to rounding.
     let times = [0.0, 0.101, 0.199, 0.3, 0.6, 0.7, 0.803, 0.9, 1.0];
     let mut text = String::from("t,e,u\n");
     times
@@ -302,7 +302,7 @@ fn resample_goes_over_gaps_and_jitter() {
     assert!((coarse.record.input()[1] - 2.5).abs() < 1e-14);
     let slow = desk.read(&text, &ask(RESAMPLE, Some(2.0))).unwrap();
     assert!(slow.notes[0].contains("no low-pass filter"), "{:?}", slow.notes);
-    // An even record is left alone, and one with a time that jumps away is not a record.
+    // An even record is unchanged, and one with a jump in time is not a record.
     let even = "t,e,u\n0.0,1,2\n0.1,2,3\n0.2,4,5\n";
     assert_eq!(
         desk.read(even, &ask(RESAMPLE, None)).unwrap(),
@@ -314,7 +314,7 @@ fn resample_goes_over_gaps_and_jitter() {
     assert!(back.contains("expected increasing time"), "{back}");
 }
 
-/// What a cut file, or a short span of one, leaves.
+/// The remainder of a truncated file, or a short span of one.
 #[test]
 fn one_sample_is_not_resampled() {
     let desk = Desk::new();

@@ -1,4 +1,4 @@
-//! Trials in one file are records of their own, whatever distinguishes them.
+//! Trials in one file are separate records, however they are separated.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail at any line, its helpers as well")]
 
@@ -21,7 +21,7 @@ fn by(choice: Option<&str>) -> ReadOptions {
     }
 }
 
-/// Three trials of 10, 12 and 14 rows; e counts rows in all.
+/// Three trials of 10, 12 and 14 rows; e counts all rows.
 fn text(header: &str, label: impl Fn(usize) -> String, restarts: bool) -> String {
     let mut row = 0;
     let mut text = format!("{header}\n");
@@ -78,7 +78,7 @@ fn a_time_that_starts_again_or_a_column_divides_the_rows() {
             read[0].notes
         );
     }
-    // One of them; and one that does not exist.
+    // One of them, and a missing one.
     assert_eq!(first_and_len(&trials(&counted, Some("trial=2")).unwrap()), [(10.0, 12)]);
     let message = |choice| trials(&counted, Some(choice)).unwrap_err().to_string();
     assert!(message("trial=4").contains("there is no trial trial=4; it has 1, 2, 3"));
@@ -93,7 +93,7 @@ fn one_record_of_several_trials_is_refused_by_name() {
         message.contains("holds 3 trials by trial: 0, 1, 2; read one of them with --trial trial=0"),
         "{message}"
     );
-    // A clock that is set back by a row is not a trial.
+    // A clock that is set back by a row does not start a trial.
     let set: String = (0..40)
         .map(|k| format!("{:.2},{k},{k}\n", 0.02 * f64::from(k - 2 * i32::from(k > 20))))
         .collect();

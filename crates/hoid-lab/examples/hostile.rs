@@ -1,4 +1,4 @@
-//! A million messages to the lab, files of sessions and numbers of saved trackers, each changed: no panic, caught or not.
+//! A million modified messages to the lab, files of sessions and numbers of saved trackers: no panic, caught or not.
 //! The numbers of `research/notes/mutations.md`.
 //!
 //! `cargo xtask slow hostile [CASES] [FIRST] [SEED]`; built with overflow checks on, as the tests are.
@@ -24,7 +24,7 @@ use hostile::Hostile;
 
 /// Time limit of one case.
 const LIMIT: Duration = Duration::from_secs(2);
-/// Panics, those that are caught among them.
+/// Number of panics, including those that are caught.
 static PANICS: AtomicUsize = AtomicUsize::new(0);
 
 fn main() -> ExitCode {

@@ -1,11 +1,11 @@
-//! `cargo xtask slow lab [RUNS] [SEEDS]`: the page's plant against Rust over 10 000 runs, and
-//! simulated operators who track through the page's engine in injected time and are identified.
+//! `cargo xtask slow lab [RUNS] [SEEDS]`: compares the plant of the page with Rust over 10 000
+//! runs, and identifies simulated operators who track through the page's engine in injected time.
 //!
-//! Three operators: those of C1 and C2, and a gain with a lag before 4/s, each with a remnant of first order whose
-//! variance is a tenth of that of u. The operator sees e at each tick; the record has every tenth, which estimators
-//! take for held: their delay is half a sample shorter. Reported: bias of each parameter in percent with its standard
-//! error, and the part of the intervals of 95 % that hold the truth. Also in how many runs the live estimate determines
-//! a lag, its form unknown, and how far from the truth.
+//! Three operators: those of C1 and C2, and a gain with a lag with 4/s, each with a first-order remnant whose variance
+//! is a tenth of that of u. The operator sees e at each tick; the record has every tenth tick, and estimators assume a
+//! hold: their delay is half a sample shorter. Reported: bias of each parameter in percent with its standard error, and
+//! the coverage of the 95 % intervals; also the number of runs in which the live estimate determines a lag of unknown
+//! form, and its error.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../tests/common/page.rs"]
@@ -28,7 +28,7 @@ use hoid_model::{
 use hoid_sim::RunSeed;
 use serde_json::{Value, json};
 
-/// Wide enough that no one reaches an end.
+/// Wide enough that no operator reaches an end.
 const MAP: InputMap = InputMap {
     centre: 0.0,
     span: 1000.0,
@@ -65,8 +65,8 @@ fn people() -> Vec<Person> {
             name: "4/s, lag",
             form: Form::Lag,
             neuromuscular: false,
-            // K = .4 and T_I = 1 s: crossover 1.1 rad/s, margin 32 deg. A bandwidth at which no neuromuscular
-            // system shows, and so one without.
+            // K = .4 and T_I = 1 s: crossover 1.1 rad/s, margin 32 deg. At this bandwidth the neuromuscular system is
+            // not observable, and so there is none.
             coordinates: vec![0.4, 1.0, 0.18],
             element: "4/s".to_owned(),
         },
@@ -90,7 +90,7 @@ fn variance(values: &[f64]) -> f64 {
     values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64
 }
 
-/// u and e at each tick, with a remnant of a standard deviation.
+/// u and e at each tick, with a remnant of the given standard deviation.
 fn tracked(engine: &mut page::Engine, person: &Person, seed: u64, remnant: f64) -> (Task, Vec<f64>, Vec<f64>) {
     let condition = Condition {
         controlled_element: person.element.clone(),
@@ -122,7 +122,7 @@ fn tracked(engine: &mut page::Engine, person: &Person, seed: u64, remnant: f64) 
             n
         })
         .collect();
-    // An event is taken by the tick after it: one of the delay.
+    // An event takes effect at the next tick: one tick of the delay.
     let delay = (operator.tau_e_s() / TICK_S).round() as usize - 1;
     let answer = engine.ask(
         &json!({"phases": task.phases, "ticks": task.ticks, "map": MAP, "target": bytes(&task.target),
@@ -187,7 +187,7 @@ fn main() -> ExitCode {
                 .iter()
                 .filter(|(value, error)| (value - truth).abs() <= 1.96 * error)
                 .count();
-            // For a logarithm the difference is the relative one.
+            // For a logarithm the difference is the relative error.
             let log = matches!(kind, Coordinate::LogOmega | Coordinate::LogZeta);
             let share = if log { 100.0 } else { 100.0 / truth.abs() };
             println!(

@@ -1,7 +1,7 @@
-//! `cargo xtask lab-page`: an experiment as the tables of its runs, in JSON, for the page that needs no program after
-//! it. Usage: `tables [lab.toml]`.
+//! `cargo xtask lab-page`: an experiment as the tables of its runs, in JSON, for a page without a server. Usage:
+//! `tables [lab.toml]`.
 //!
-//! Runs are in the order of the first person. Tables are doubles, little end first, in base 64.
+//! Runs are in the order of the first person. Tables are little-endian doubles in base 64.
 #![allow(clippy::print_stdout)]
 
 use std::{env, error::Error, path::Path};
@@ -10,7 +10,7 @@ use data_encoding::BASE64;
 use hoid_lab::{Config, order::plan, task::Task};
 use serde_json::json;
 
-/// Default consent text of the page: nothing is stored by it.
+/// Default consent text of the page, which stores no data.
 const CONSENT: &str = "You will follow a moving target by hand for a minute and a half. Stop at any time by the key \
 Escape or by closing the window. Do not take part if moving patterns make you unwell.";
 

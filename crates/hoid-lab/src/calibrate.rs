@@ -1,10 +1,10 @@
-//! Contribution of the loop of page and events to a delay.
+//! Contribution of page and events to an identified delay.
 //!
-//! A simulated operator takes the place of the person: in the page, in real time, seeing what is drawn and answering by
-//! events of a pointer. Its gain, neuromuscular system and delay tau are known; what `hoid identify` finds on the run
-//! beyond tau is the latency of page, frames and events, as it is in every delay that is identified on this machine. It
-//! holds neither the screen (from the buffer to the light) nor the device (from the hand to the event): these need a
-//! sensor.
+//! A simulated operator replaces the person: in the page, in real time, with the displayed error as input and pointer
+//! events as output. Its gain, neuromuscular system and delay tau are known; the excess of the delay identified by
+//! `hoid identify` over tau is the latency of page, frames and events, as in every delay that is identified on this
+//! machine. It includes neither the screen (from the buffer to the light) nor the device (from the hand to the event):
+//! these need a sensor.
 
 use std::path::Path;
 
@@ -29,29 +29,29 @@ const GAIN: f64 = 0.75;
 const OMEGA_RAD_S: f64 = 14.0;
 const ZETA: f64 = 0.5;
 const DELAY: usize = 150;
-/// Standard deviation of the remnant, and the time constant that makes it smooth, s.
+/// Standard deviation of the remnant, and the time constant of its filter, s.
 const REMNANT: f64 = 0.05;
 const REMNANT_S: f64 = 0.1;
-/// How well the neuromuscular system is known: to rounding of its hold.
+/// Tolerance of the neuromuscular system: rounding of its hold.
 const KNOWN: f64 = 0.01;
 
 /// Result of a calibration; kept in `calibration.toml` of the experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
-    /// When, in UTC.
+    /// Time in UTC.
     pub utc: String,
     /// Latency of page, frames and events, s.
     pub latency_s: f64,
-    /// Its standard error, s.
+    /// Standard error of the latency, s.
     pub latency_se_s: f64,
-    /// Standard deviation of the time from an event to the tick that takes it, ms.
+    /// Standard deviation of the time from an event to the tick at which it takes effect, ms.
     pub input_jitter_ms: f64,
-    /// Standard deviation of the time from frame to frame, ms.
+    /// Standard deviation of the time between frames, ms.
     pub frame_jitter_ms: f64,
 }
 
 impl Calibration {
-    /// In words for the page.
+    /// Returns the result as text for the page.
     pub fn rows(&self) -> Vec<(String, String)> {
         let ms = 1e3;
         vec![
@@ -77,7 +77,7 @@ struct Kept {
     calibration: Vec<Calibration>,
 }
 
-/// The experiment of a calibration: one run of 40 s.
+/// Returns the experiment of a calibration: one run of 40 s.
 pub fn config() -> Config {
     Config {
         name: "Calibration".to_owned(),
@@ -96,7 +96,7 @@ mouse alone."
     }
 }
 
-/// The operator, and the noise of a run at each tick.
+/// Returns the operator, and the remnant of a run at each tick.
 ///
 /// # Errors
 /// [`LabError::Model`].
@@ -126,10 +126,10 @@ pub fn operator(task: &Task, seed: u64) -> Result<(SimulatedOperator, Vec<f64>),
     Ok((SimulatedOperator { plant, delay: DELAY }, noise.collect()))
 }
 
-/// Report of the run of a calibration; kept in the experiment.
+/// Evaluates the run of a calibration and stores the result in the experiment.
 ///
 /// # Errors
-/// [`LabError::Ident`] for a run that cannot be identified, those of files.
+/// [`LabError::Ident`] for a run that cannot be identified; errors of files.
 pub fn judge(out: &Path, record: &Record, logged: &Logged) -> Result<Calibration, LabError> {
     let measured = record.span(0.0, record.time_s(record.len()))?;
     let estimator = FamilyEstimator {

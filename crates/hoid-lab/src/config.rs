@@ -29,69 +29,69 @@ use crate::{LabError, plant::MOST_STATES};
 pub struct Config {
     /// Its name.
     pub name: String,
-    /// Consent of the person before any measurement.
+    /// Consent text, to be confirmed before any measurement.
     pub consent: String,
     /// The order of the conditions.
     pub order: Order,
-    /// When the person sees the live estimate; the experimenter's window always shows it.
+    /// When the live estimate is shown to the person; the experimenter's window always shows it.
     pub live: LiveFor,
-    /// The recursive method of the live estimate, as `hoid track --method` has it.
+    /// Recursive method of the live estimate, as in `hoid track --method`.
     pub method: String,
-    /// Limits beyond which a run is unverified.
+    /// Limits above which a run is unverified.
     pub limits: Limits,
-    /// The tracked signal, and how often.
+    /// Conditions of the experiment.
     pub condition: Vec<Condition>,
 }
 
-/// The order of the conditions of a session.
+/// Order of the conditions of a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Order {
-    /// The value for the person's row of a balanced Latin square.
+    /// Row of a balanced Latin square for each person.
     #[default]
     Latin,
-    /// The value in the file.
+    /// Order in the file.
     Given,
 }
 
-/// When the person sees the live estimate.
+/// When the live estimate is shown to the person.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LiveFor {
     /// After each run.
     #[default]
     After,
-    /// During the run too.
+    /// Also during the run.
     During,
     /// Never.
     Never,
 }
 
-/// How the task is shown.
+/// Display of the task.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Display {
-    /// The error alone.
+    /// Error only.
     #[default]
     Compensatory,
     /// Target and output.
     Pursuit,
-    /// Output, target, and the target to come.
+    /// Output, target, and future target.
     Preview,
 }
 
-/// Limits beyond which a run is unverified.
+/// Limits above which a run is unverified.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Limits {
     /// Longest time between two frames, ms.
     pub frame_ms: f64,
-    /// Longest time from an input event to the tick that takes it, ms.
+    /// Longest time from an input event to the tick at which it takes effect, ms.
     pub input_ms: f64,
 }
 
 impl Default for Limits {
-    /// 100 ms: six frames of 60 Hz, half of the delay of a person.
+    /// 100 ms: six frames at 60 Hz, half of the delay of a typical operator.
     fn default() -> Self {
         Self {
             frame_ms: 100.0,
@@ -100,24 +100,24 @@ impl Default for Limits {
     }
 }
 
-/// One task.
+/// A condition.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Condition {
-    /// Letters and digits: it is part of file names.
+    /// Letters and digits, since it is part of file names.
     pub name: String,
-    /// Instructions to the person before a run.
+    /// Instructions shown to the person before a run.
     pub text: String,
-    /// A condition C1 to C6, or a scenario file; it is in place of the keys from
-    /// `controlled_element` to `disturbance`.
+    /// A condition C1 to C6, or a scenario file; it replaces the keys from `controlled_element` to
+    /// `disturbance`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scenario: Option<String>,
-    /// The text of that file, kept with the session.
+    /// The text of that file, stored with the session.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scenario_text: Option<String>,
     /// The controlled element, in s.
     pub controlled_element: String,
-    /// Its new form.
+    /// The controlled element after the change.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub last_element: Option<String>,
     /// Time of the change, s from the start of the measurement.
@@ -125,7 +125,7 @@ pub struct Condition {
     pub change_s: Option<f64>,
     /// Rate of the change, 1/s.
     pub rate_per_s: f64,
-    /// From one change to the next, back and forth, s.
+    /// Interval between changes back and forth, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interval_s: Option<f64>,
     /// Measurement, s.
@@ -135,34 +135,34 @@ pub struct Condition {
     /// The signal that the person tracks.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<Signal>,
-    /// Disturbance of the controlled element at its input.
+    /// Disturbance at the input of the controlled element.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub disturbance: Option<Signal>,
-    /// Seed of the phases; each run draws its own from it.
+    /// Seed of the phases; each run draws its own phases.
     pub seed: u64,
-    /// Half of the width of the display, in the unit of e.
+    /// Half width of the display, in the unit of e.
     pub half_width: f64,
-    /// How it is shown.
+    /// Display of the task.
     pub display: Display,
-    /// How far ahead a preview shows the target, s.
+    /// Preview time of the target, s.
     pub preview_s: f64,
     /// u at full deflection of the device.
     pub full_deflection: f64,
-    /// Training runs before the runs that count.
+    /// Number of training runs before the runs that count.
     pub training: usize,
-    /// Runs that count.
+    /// Number of runs that count.
     pub runs: usize,
     /// Rest after each run, s.
     pub break_s: f64,
 }
 
-/// A sum of sines at prime multiples of one frequency, phases drawn by the seed.
+/// A sum of sines at prime multiples of one frequency, with phases drawn from the seed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Signal {
-    /// Period, s: all sines fit it a whole number of times.
+    /// Period, s: all sines are harmonics of it.
     pub period_s: f64,
-    /// The largest multiple of one over the period.
+    /// The largest harmonic.
     pub largest: u32,
     /// Root mean square.
     pub rms: f64,
@@ -181,7 +181,7 @@ impl Default for Signal {
 }
 
 impl Default for Condition {
-    /// A rate control of 4/s, compensatory, 80 s after 10 s of run-in.
+    /// A rate control of 4/s, compensatory, 80 s after a run-in of 10 s.
     fn default() -> Self {
         Self {
             name: "rate".to_owned(),
@@ -210,8 +210,8 @@ impl Default for Condition {
     }
 }
 
-/// The recursive method of the live estimate: it needs no start fit, so that there is something to see
-/// from the first seconds on.
+/// Recursive method of the live estimate: it needs no start fit, so that estimates are available
+/// from the first seconds.
 const DEFAULT_METHOD: &str = "adaptive";
 
 /// Default consent text.
@@ -221,7 +221,7 @@ and no sound. You may stop at any time by the key Escape or by closing the windo
 its folder. Do not take part if moving patterns make you unwell.";
 
 impl Default for Config {
-    /// A try of two minutes: one run.
+    /// A trial of two minutes: one run.
     fn default() -> Self {
         Self {
             name: "First try".to_owned(),
@@ -239,10 +239,10 @@ impl Default for Config {
 }
 
 impl Config {
-    /// Reads and checks a configuration; scenario files are named from its directory.
+    /// Reads and checks a configuration; scenario files are relative to its directory.
     ///
     /// # Errors
-    /// [`LabError::Config`] with the place, what was found and expected.
+    /// [`LabError::Config`] with the place, the value found and the expected value.
     pub fn read(path: &Path) -> Result<Self, LabError> {
         let text = hoid_io::read_settings(path)?;
         let place = path.display().to_string();
@@ -263,7 +263,7 @@ impl Config {
         Ok(config)
     }
 
-    /// Checks everything that can be known before there is a person.
+    /// Checks everything that is known before an experiment.
     ///
     /// # Errors
     /// [`LabError::Config`].
@@ -309,7 +309,7 @@ impl Config {
     /// As TOML.
     ///
     /// # Errors
-    /// [`LabError::Config`], which no configuration that was read gives.
+    /// [`LabError::Config`], which cannot occur for a configuration that was read.
     pub fn text(&self) -> Result<String, LabError> {
         toml::to_string(self).map_err(|error| LabError::Config {
             place: "the configuration".to_owned(),
@@ -322,7 +322,7 @@ impl Config {
 const LONGEST_S: f64 = 1800.0;
 
 impl Condition {
-    /// Takes in the text of its scenario file.
+    /// Loads the text of its scenario file.
     fn load(&mut self, directory: &Path) -> Result<(), LabError> {
         let Some(name) = &self.scenario else { return Ok(()) };
         if self.scenario_text.is_some() {
@@ -335,7 +335,7 @@ impl Condition {
         Ok(())
     }
 
-    /// Checks that it can be run, and what its numbers may be.
+    /// Checks that the condition can be run, and that its numbers are valid.
     pub(crate) fn check(&self) -> Result<(), LabError> {
         let wrong = |reason: String| Err(LabError::Message(reason));
         let name = &self.name;

@@ -1,4 +1,4 @@
-//! The task of a condition: the controlled element at each time, and what excites the loop.
+//! The task of a condition: the controlled element at each time, and the excitation of the loop.
 
 use hoid_model::{
     ContinuousTransferFunction, FamilyOperator, FamilyScenario, FamilyState, Form, ModelError, SampleTime,
@@ -12,12 +12,12 @@ use crate::{
     config::{Condition, Signal},
 };
 
-/// The task of a condition: what of a scenario is not the person.
+/// The task of a condition: a scenario without its operator.
 #[derive(Debug, Clone)]
 pub enum Course {
-    /// For one of the conditions C1 to C6, or near one.
+    /// One of the conditions C1 to C6, or a similar one.
     Reference(Box<hoid_model::scenario::ResolvedScenario>),
-    /// For any controlled element.
+    /// A task with any controlled element.
     Family(Box<hoid_model::family_scenario::ResolvedFamilyScenario>),
 }
 
@@ -34,7 +34,7 @@ impl Signal {
 }
 
 impl Condition {
-    /// Its task.
+    /// Returns its task.
     ///
     /// # Errors
     /// [`LabError::Scenario`], [`LabError::Model`].
@@ -49,7 +49,7 @@ impl Condition {
         let element: ContinuousTransferFunction = self.controlled_element.parse()?;
         let state = |controlled_element| -> Result<FamilyState, ModelError> {
             Ok(FamilyState {
-                // The person sits before the screen; the scenario asks for someone.
+                // The person is at the screen; the scenario requires an operator.
                 operator: FamilyOperator::new(Form::Gain, false, &[1.0, 0.2])?,
                 controlled_element,
             })
@@ -94,7 +94,7 @@ impl Course {
         }
     }
 
-    /// The controlled element all the time; nothing if that changes.
+    /// The controlled element, if it is constant.
     ///
     /// # Errors
     /// As [`Course::element_at`].

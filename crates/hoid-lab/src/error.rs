@@ -1,4 +1,4 @@
-//! Why an experiment cannot continue.
+//! Errors of an experiment.
 
 use std::path::Path;
 
@@ -8,25 +8,25 @@ use hoid_model::ModelError;
 use hoid_study::StudyError;
 use thiserror::Error;
 
-/// Why an experiment cannot be set up, run, checked or shown.
+/// Reason why an experiment cannot be set up, run, checked or shown.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum LabError {
     /// A configuration that contradicts itself or cannot be read.
     #[error("{place}: {reason}")]
     Config {
-        /// The file and what of it.
+        /// The file and the place in it.
         place: String,
-        /// The findings, the expected value and the remedy.
+        /// The problem, the expected value and the remedy.
         reason: String,
     },
-    /// A message of a page that is not one.
+    /// An invalid message of a page.
     #[error("a message of the page was refused: {0}")]
     Message(String),
     /// A step at the wrong time.
     #[error("{0}")]
     Order(String),
-    /// A file of a session that the system does not give or take.
+    /// A file of a session that the system cannot read or write.
     #[error("{file}: {source}; check the place and the permissions")]
     File {
         /// The file.
@@ -34,7 +34,7 @@ pub enum LabError {
         /// Error reported by the operating system.
         source: std::io::Error,
     },
-    /// A file of a session that is not as it was written.
+    /// A damaged file of a session.
     #[error("{file}: {reason}")]
     Damaged {
         /// The file.
@@ -54,10 +54,10 @@ pub enum LabError {
     /// A scenario file.
     #[error(transparent)]
     Scenario(Box<ScenarioFileError>),
-    /// A number that has no meaning.
+    /// An invalid number.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// An estimate that cannot be made.
+    /// An estimate that cannot be computed.
     #[error(transparent)]
     Ident(Box<IdentError>),
     /// A manifest of a group.
@@ -92,5 +92,5 @@ macro_rules! boxed {
     };
 }
 
-// Large ones are kept apart, so that a result without an error stays small.
+// Large ones are boxed, so that a result without an error stays small.
 boxed! { ScenarioFileError => Scenario, IdentError => Ident, StudyError => Study }

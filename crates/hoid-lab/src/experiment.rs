@@ -1,5 +1,5 @@
-//! Files next to the sessions of an experiment: what it is, who took part, and the manifest of
-//! `hoid group`.
+//! Files of an experiment besides its sessions: its description, the participants, and the manifest
+//! of `hoid group`.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -39,7 +39,7 @@ Names follow BIDS where it has names; it has none for tracking experiments, so t
 BIDS need not accept the folder.
 ";
 
-/// Writes the texts, where there are none yet.
+/// Writes the texts that do not exist yet.
 ///
 /// # Errors
 /// [`LabError::Io`].
@@ -64,7 +64,7 @@ fn write(path: &Path, text: &str) -> Result<(), LabError> {
     Ok(())
 }
 
-/// Writes who took part.
+/// Writes the list of participants.
 ///
 /// # Errors
 /// The errors of files.
@@ -84,8 +84,8 @@ pub fn list(out: &Path) -> Result<(), LabError> {
     write(&out.join("participants.tsv"), &text)
 }
 
-/// Writes the manifest of all runs that were finished; those that are unverified or training do not
-/// count. Nothing while none counts.
+/// Writes the manifest of all finished runs; unverified and training runs do not count. Writes
+/// nothing if no run counts.
 ///
 /// # Errors
 /// The errors of files.

@@ -1,4 +1,4 @@
-//! A session as one archive, with what is next to it in the experiment.
+//! A session as one archive, with the common files of its experiment.
 
 use std::{
     io::{Cursor, Write as _},
@@ -9,7 +9,7 @@ use zip::{CompressionMethod, DateTime, ZipWriter, write::SimpleFileOptions};
 
 use crate::LabError;
 
-/// The files of the experiment that go along.
+/// The files of the experiment that are included.
 const BESIDE: [&str; 3] = ["README", "dataset_description.json", "participants.tsv"];
 
 /// The archive of a session, its paths as in the experiment. The same files give the same bytes.

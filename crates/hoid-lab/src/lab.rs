@@ -1,8 +1,8 @@
-//! The experiment as its pages see it: one session at a time, one page that tracks, any number that
-//! look on.
+//! The experiment as seen by its pages: one session at a time, one page that tracks, any number of
+//! observers.
 //!
-//! Messages from pages arrive on the threads of their sockets, one at a time under one lock; messages to pages go into
-//! the queue of each. The estimate has a thread of its own, the pages of results too.
+//! Messages from pages arrive on the threads of their sockets and are processed one at a time under one lock; messages
+//! to pages are queued for each. The estimate has a thread of its own, and so do the pages of results.
 //!
 //! | file | contents |
 //! |---|---|
@@ -46,14 +46,14 @@ pub enum Outgoing {
     Binary(Vec<u8>),
 }
 
-/// The action taken.
+/// Mode of the lab.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Mode {
     /// Sessions of people.
     Sessions,
-    /// A session is shown again.
+    /// A session is replayed.
     Replay(PathBuf),
-    /// A simulated operator takes the place of the person.
+    /// A simulated operator replaces the person.
     Calibrate,
 }
 
@@ -71,7 +71,7 @@ struct Shared {
     program: Option<PathBuf>,
     state: Mutex<Current>,
     pages: Mutex<BTreeMap<u64, Page>>,
-    /// No second server on one experiment.
+    /// Prevents a second server on the same experiment.
     _lock: Option<DirectoryLock>,
 }
 
@@ -86,10 +86,10 @@ struct Current {
     session: Option<Session>,
     /// The page that tracks.
     person: Option<u64>,
-    /// A run that was sent and has not started.
+    /// A run that was sent and has not been started.
     ready: Option<Ready>,
     run: Option<Running>,
-    /// The run that ended last: its page may not have heard of it yet, and continue for a moment.
+    /// The last run that ended: its page may not know yet, and send for a moment.
     over: Option<usize>,
     reporting: bool,
     pages: Pages,
@@ -111,7 +111,7 @@ struct Running {
 }
 
 impl Current {
-    /// The run that continues, by its number.
+    /// The current run, by its number.
     fn running(&self, number: usize) -> Result<&Running, LabError> {
         let run = self.run.as_ref().filter(|run| run.begun.number == number);
         run.ok_or_else(|| LabError::Order(format!("run {number} is not going on")))
@@ -119,10 +119,10 @@ impl Current {
 }
 
 impl Lab {
-    /// Opens an experiment, a session of which can be shown again or a calibration made.
+    /// Opens an experiment for sessions, a replay or a calibration.
     ///
     /// # Errors
-    /// [`LabError`] for a folder that cannot be used, or holds no session to show.
+    /// [`LabError`] for a folder that cannot be used, or contains no session to replay.
     pub fn open(out: &Path, config: Config, mode: Mode, program: Option<PathBuf>) -> Result<Self, LabError> {
         let mut current = Current::default();
         let config = match &mode {
@@ -136,7 +136,7 @@ impl Lab {
             Mode::Calibrate => calibrate::config(),
             Mode::Sessions => config,
         };
-        // Runs that no person made are separate.
+        // Runs without a person are separate.
         let out = if mode == Mode::Calibrate {
             out.join("calibration")
         } else {
@@ -164,7 +164,7 @@ impl Lab {
         })
     }
 
-    /// A page is there; its number.
+    /// Registers a page and returns its number.
     pub fn join(&self, sender: Sender<Outgoing>) -> u64 {
         let id = self.next_page.fetch_add(1, Ordering::Relaxed);
         self.shared.pages().insert(
@@ -178,15 +178,15 @@ impl Lab {
         id
     }
 
-    /// A page is gone; a run of it is broken off, and the session continues in the newest window that is left: a page
-    /// that is loaded again may have come before the old one is known to be gone.
+    /// Removes a page; its current run is aborted, and the session continues in the newest remaining window: a reloaded
+    /// page may arrive before the old one is known to be closed.
     pub fn leave(&self, id: u64) {
         self.shared.pages().remove(&id);
         let mut state = self.shared.state();
         if state.person == Some(id) {
             state.person = None;
             state.ready = None;
-            // Its files cannot be closed: the session reports it when it is opened next.
+            // Its files cannot be closed: the session reports this when it is next opened.
             let _ = self.shared.end_run(&mut state, How::Interrupted, BTreeMap::new());
             let left = self.shared.newest_person();
             if let Some(newest) = left {
@@ -200,11 +200,10 @@ impl Lab {
         }
     }
 
-    /// Hears a page.
+    /// Processes a message of a page.
     ///
     /// # Errors
-    /// [`LabError::Message`] for what no page of this program reports, [`LabError::Order`] for what comes at the wrong
-    /// time, those of files.
+    /// [`LabError::Message`] for invalid messages, [`LabError::Order`] for messages at the wrong time; errors of files.
     pub fn hear(&self, id: u64, message: FromPage) -> Result<(), LabError> {
         let shared = &self.shared;
         if let FromPage::Hello { role, browser } = message {
@@ -231,7 +230,7 @@ impl Lab {
         obeyed
     }
 
-    /// The session as one archive; nothing if there is none.
+    /// Returns the session as one archive; nothing if there is none.
     ///
     /// # Errors
     /// The errors of files.
@@ -242,7 +241,7 @@ impl Lab {
         Ok(Some((export::archive(&self.shared.out, &folder)?, "application/zip")))
     }
 
-    /// The signals of a run, `3.json`; nothing if there is no such run.
+    /// Returns the signals of a run, `3.json`; nothing if there is no such run.
     ///
     /// # Errors
     /// The errors of files.
@@ -256,7 +255,7 @@ impl Lab {
         Ok(Some((replay::data(&stem)?, "application/json")))
     }
 
-    /// A file of the pages of results, by the names that [`State::reports`](crate::wire::State::reports) has.
+    /// Returns a file of the pages of results, by the names in [`State::reports`](crate::wire::State::reports).
     ///
     /// # Errors
     /// The errors of files.
@@ -273,7 +272,7 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The folder of the session that continues or is shown.
+    /// The folder of the current or replayed session.
     fn session_folder(&self) -> Option<PathBuf> {
         self.state().session.as_ref().map(|session| session.folder.clone())
     }
@@ -295,7 +294,7 @@ impl Shared {
         }
         let mut state = self.state();
         if role == Role::Person && state.run.is_none() {
-            // The newest window has the session; an older one is informed that it has not.
+            // The newest window has the session; an older one is notified.
             let before = state.person.filter(|before| *before != id);
             self.give(&mut state, id)?;
             if let Some(before) = before {
@@ -311,7 +310,7 @@ impl Shared {
         Ok(())
     }
 
-    /// The window of the person that came last.
+    /// The newest window of the person.
     fn newest_person(&self) -> Option<u64> {
         let pages = self.pages();
         pages
@@ -339,7 +338,7 @@ impl Shared {
         }
     }
 
-    /// Does what the page of the person reports.
+    /// Executes a message of the page of the person.
     fn obey(self: &Arc<Self>, state: &mut Current, id: u64, message: FromPage) -> Result<(), LabError> {
         match message {
             FromPage::Hello { .. } => Ok(()),

@@ -1,14 +1,14 @@
-//! The lag of the person while the run continues.
+//! The lag of the operator during a run.
 //!
-//! The tracker acts in a basis whose lag stays where it started: nothing of it reports what T_I is. So the samples of
-//! the measurement since the last declared change are fitted as `hoid identify` does, each 10 s, on a thread of its
-//! own: all forms of the operator, the one that held-out data choose, and its T_I where the data determine it
-//! ([`hoid_analysis::identify`]). For a form without a lag, or one whose interval reaches a pure integration, T_I is
+//! The basis of the tracker has a fixed lag: it gives no information about T_I. Therefore the samples of the
+//! measurement since the last declared change are fitted as by `hoid identify`, every 10 s, on a thread of its own: all
+//! forms of the operator, the one selected by held-out data, and its T_I if the data determine it
+//! ([`hoid_analysis::identify`]). For a form without a lag, or one whose interval includes a pure integration, T_I is
 //! not determined, and no number is reported.
 //!
-//! A form with a lag is chosen at intervals for callers that has none, a short lag next to a longer lead: for 13 of 60
-//! runs of C1 and 2 of 20 of C2, 30 and 80 s long, with T_I up to 6.3 standard errors from zero. A lag of 1 s that is
-//! there is 25 of them from zero and more. So a lag counts from ten on.
+//! A form with a lag is sometimes selected for operators without one, a short lag combined with a longer lead: for 13
+//! of 60 runs of C1 and 2 of 20 of C2, 30 and 80 s long, with T_I up to 6.3 standard errors from zero. A true lag of 1
+//! s is at least 25 standard errors from zero. So a lag is reported from ten standard errors on.
 
 use std::{
     sync::mpsc::{Receiver, Sender, channel},
@@ -18,16 +18,16 @@ use std::{
 use hoid_model::{Channel, Record, SampleTime, uncertainty::Estimate};
 use hoid_track::Sample;
 
-/// Shortest span of a fit, and the time between two, s.
+/// Shortest span of a fit, and the time between fits, s.
 const SHORTEST_S: f64 = 40.0;
 const EVERY_S: f64 = 10.0;
-/// A lag is reported that is so many standard errors from none.
+/// Smallest reported lag, in standard errors.
 const CLEAR: f64 = 10.0;
 
-/// The lag as far as it is known.
+/// State of the estimate of the lag.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Lag {
-    /// There was no fit yet.
+    /// No fit has been made yet.
     #[default]
     Waiting,
     /// The data do not determine it.
@@ -37,7 +37,7 @@ pub enum Lag {
 }
 
 impl Lag {
-    /// For a record of one person who does not change.
+    /// Estimates the lag from a record of an operator that does not change.
     pub fn of(record: Record) -> Self {
         let found = hoid_analysis::identify(&[record]);
         let parameter = found.ok().and_then(|found| {
@@ -54,7 +54,7 @@ impl Lag {
     }
 }
 
-/// Samples that are to be fitted, and the time of the first, s.
+/// Samples to be fitted, and the time of the first, s.
 struct Span {
     from_s: f64,
     record: Record,
@@ -69,15 +69,15 @@ pub struct LagFits {
     ts: SampleTime,
     /// Time of the first sample, s.
     from_s: f64,
-    /// Samples at the last fit.
+    /// Number of samples at the last fit.
     fitted: usize,
-    /// A fit continues.
+    /// A fit is in progress.
     busy: bool,
     last: Lag,
 }
 
 impl LagFits {
-    /// Starts their thread, which ends with them.
+    /// Starts the thread, which ends when this is dropped.
     pub fn new(ts: SampleTime) -> Self {
         let (spans, waiting) = channel::<Span>();
         let (tell, found) = channel();
@@ -107,7 +107,7 @@ impl LagFits {
         self.u.push(sample.u);
     }
 
-    /// Forgets the data before a change of the person, s.
+    /// Discards the data before a change of the operator, s.
     pub fn changed(&mut self, at_s: f64) {
         let past = ((at_s - self.from_s) / self.ts.s())
             .ceil()
@@ -118,11 +118,11 @@ impl LagFits {
         (self.fitted, self.last) = (0, Lag::Waiting);
     }
 
-    /// The lag by the last fit that is done; starts the next one where it is due.
+    /// The lag by the last completed fit; starts the next fit if it is due.
     pub fn lag(&mut self) -> Lag {
         while let Ok((from_s, lag)) = self.found.try_recv() {
             self.busy = false;
-            // One that started before a change is of no one.
+            // A fit that started before a change is discarded.
             if from_s == self.from_s {
                 self.last = lag;
             }
@@ -165,7 +165,7 @@ mod tests {
         seed.white_noise(samples)
     }
 
-    /// e and u of a gain of .4 with a lag before 4/s, with a remnant of first order.
+    /// e and u of a gain of .4 with a lag and 4/s, with a first-order remnant.
     fn with_lag(seconds: f64, seed: u64) -> Vec<Sample> {
         let n = (seconds / TS.s()) as usize;
         let operator = FamilyOperator::new(Form::Lag, false, &[0.4 / LAG_S, 1.0 / LAG_S, 0.18]).unwrap();
@@ -210,7 +210,7 @@ mod tests {
 
     #[test]
     fn who_has_no_lag_is_given_none() {
-        // Without the limit of `CLEAR` the last three are given one.
+        // Without the limit of `CLEAR` a lag is reported for the last three.
         for (seed, n) in [(1, 3000), (21, 3000), (31, 3000), (2, 8000)] {
             assert_eq!(
                 Lag::of(record(&samples_of_c1(seed)[..n])),
@@ -231,7 +231,7 @@ mod tests {
         rest.iter().for_each(|sample| fits.take(*sample));
         assert_eq!(fits.lag(), Lag::Waiting);
         assert!(fits.busy);
-        // What is being fitted is of a person else now.
+        // The fit in progress now belongs to a previous operator.
         fits.changed(50.0);
         assert_eq!((fits.e.len(), fits.from_s), (1000, 50.0));
         let answer = fits.found.recv().unwrap();

@@ -1,8 +1,8 @@
-//! A tracking experiment in the browser, identified while it runs, that proves itself.
+//! A tracking experiment in the browser, identified online and verified afterwards.
 //!
 //! The page computes the controlled element at 1 ms from tables that are made here, logs every input event, tick and
-//! frame, and sends them in batches. Here they are appended to the folder of the session, followed by the tracker, and
-//! after the run recomputed to the last bit.
+//! frame, and sends them in batches. Here they are appended to the folder of the session, passed to the tracker, and
+//! recomputed to the last bit after the run.
 //!
 //! | module | contents |
 //! |---|---|

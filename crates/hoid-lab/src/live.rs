@@ -1,9 +1,9 @@
-//! The estimate while the run continues.
+//! The estimate during a run.
 //!
 //! A recursion of `hoid track` takes e and u of every tenth tick on a thread of its own, fed by the
-//! batches of the page; nothing of it is in the loop. With the controlled element P known, the open
+//! batches of the page; it is not part of the loop. With the controlled element P known, the open
 //! loop is `L = Y P`, the crossover frequency the lowest with `|L| = 1` and the phase margin there
-//! `180 deg + arg L`. With `d ln Y = g + j p` of covariance matrix S, the first order is
+//! `180 deg + arg L`. With `d ln Y = g + j p` of covariance matrix S, to first order
 //!
 //! `d omega_c = -g / s_g`,  `d phi_m = p - (s_p/s_g) g`,
 //!
@@ -32,14 +32,14 @@ use crate::{
 
 /// Warm-up of methods that need one, s.
 const WARM_UP_S: f64 = 20.0;
-/// Delay that a method starts at, samples of 10 ms.
+/// Initial delay of a method, samples of 10 ms.
 const DEFAULT_NK: usize = 21;
-/// Where the crossover is searched for, rad/s, and in how many steps of one factor.
+/// Frequency range of the search for the crossover, rad/s, and its number of geometric steps.
 const CROSSOVERS: (f64, f64, usize) = (0.3, 15.0, 40);
 /// Relative step of the slopes.
 const SLOPE: f64 = 1e-3;
 
-/// A number with its standard error; none if it is not known.
+/// A number with its standard error; none if unknown.
 type ReportedValue = (Option<f64>, Option<f64>);
 
 /// The estimate at an instant.
@@ -51,9 +51,9 @@ pub struct LiveLine {
     pub gain: ReportedValue,
     /// Lead T_L, s.
     pub lead_s: ReportedValue,
-    /// Lag T_I, s, where the data determine it.
+    /// Lag T_I, s, if the data determine it.
     pub lag_s: ReportedValue,
-    /// Why no lag is reported.
+    /// Reason why no lag is reported.
     pub lag_waiting: Option<&'static str>,
     /// Natural frequency of the neuromuscular system, rad/s.
     pub omega_nm_rad_s: ReportedValue,
@@ -63,13 +63,13 @@ pub struct LiveLine {
     pub crossover_rad_s: ReportedValue,
     /// Phase margin, deg.
     pub phase_margin_deg: ReportedValue,
-    /// When the person changed, s, where a change was declared at this instant.
+    /// Time of the change, s, if one was declared at this instant.
     pub changed_s: Option<f64>,
-    /// Why there is no estimate yet.
+    /// Reason why there is no estimate yet.
     pub waiting: Option<String>,
 }
 
-/// Samples on their way to the estimate.
+/// Samples in the queue of the estimate.
 pub type Samples = Vec<Sample>;
 
 /// The recursion of one run.
@@ -83,7 +83,7 @@ pub struct LiveRun {
 }
 
 impl LiveRun {
-    /// A live estimate with the named method, for a task.
+    /// Creates a live estimate with the named method, for a task.
     ///
     /// # Errors
     /// [`LabError::Ident`] for a method that cannot run live.
@@ -103,7 +103,7 @@ impl LiveRun {
         })
     }
 
-    /// Takes samples, and reports how it is after the last of them.
+    /// Processes samples, and returns the estimate after the last of them.
     pub fn take(&mut self, samples: &[Sample]) -> LiveLine {
         let mut changed_s = None;
         for sample in samples {
@@ -116,7 +116,7 @@ impl LiveRun {
                 changed_s = Some(at_s);
                 self.lags.changed(at_s);
             }
-            // The run-in is not the person: the target is faded in.
+            // The run-in is excluded: the target is faded in.
             if self.t_s > -self.ts.s() / 2.0 {
                 self.lags.take(*sample);
             }
@@ -221,23 +221,23 @@ fn crossover(
     ))
 }
 
-/// Starts the thread of a run: it takes samples until its sender is dropped, reports each line and
-/// appends it to `live.csv`.
+/// Starts the thread of a run: it processes samples until its sender is dropped, reports each line
+/// and appends it to `live.csv`.
 pub fn start(mut run: LiveRun, stem: &Stem, tell: impl Fn(&LiveLine) + Send + 'static) -> Sender<Samples> {
     let (sender, receiver): (Sender<Samples>, Receiver<Samples>) = channel();
     let path: PathBuf = stem.file("live.csv");
     thread::spawn(move || {
         let mut file = OpenOptions::new().append(true).create(true).open(&path).ok();
         let mut write = |text: &str| {
-            // The estimate is made again from the record at any time: a disk that is full is the
-            // business of the log.
+            // The estimate can be recomputed from the record at any time: a full disk is handled by
+            // the log.
             if let Some(file) = &mut file {
                 let _ = file.write_all(text.as_bytes());
             }
         };
         write(HEADER);
         while let Ok(mut samples) = receiver.recv() {
-            // What waits besides is taken at once.
+            // Further waiting samples are processed at once.
             while let Ok(more) = receiver.try_recv() {
                 samples.extend(more);
             }
@@ -280,7 +280,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::config::Condition;
 
-    /// e and u of the person of C1, of a seed.
+    /// e and u of the operator of C1, for a seed.
     pub(crate) fn samples_of_c1(seed: u64) -> Vec<Sample> {
         let simulator = Simulator::new(&Scenario::condition(Reference::C1)).unwrap();
         let seed = RunSeed {

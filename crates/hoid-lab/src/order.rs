@@ -2,21 +2,21 @@
 //!
 //! Row r of a balanced Latin square of n conditions is, by E. J. Williams (*Australian Journal of
 //! Scientific Research* A 2 (1949) 149-168), `r, r+1, r-1, r+2, r-2, ...` modulo n: each condition
-//! is once in each place and follows each other one equally often. For an odd n a second square, the
-//! first in reverse, is needed for that: 2n rows.
+//! occurs once in each position and follows each other one equally often. For an odd n this
+//! requires a second square, the first in reverse: 2n rows.
 
 use serde::{Deserialize, Serialize};
 
 use crate::config::{Config, Order};
 
-/// One run that is to be.
+/// A planned run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Planned {
-    /// Place of its condition in the configuration.
+    /// Index of its condition in the configuration.
     pub condition: usize,
-    /// Whether it is a training run, which does not count.
+    /// True for a training run, which does not count.
     pub training: bool,
-    /// Which of its condition, from 1.
+    /// Number of the run within its condition, from 1.
     pub run: usize,
 }
 
@@ -37,7 +37,7 @@ pub fn latin_row(n: usize, row: usize) -> Vec<usize> {
     order
 }
 
-/// All runs of a session: condition after condition, its training runs first.
+/// All runs of a session: condition by condition, its training runs first.
 pub fn plan(config: &Config, row: usize) -> Vec<Planned> {
     let n = config.condition.len();
     let order = match config.order {

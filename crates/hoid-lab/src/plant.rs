@@ -1,4 +1,4 @@
-//! The controlled element at one tick, and what the hand does to it. The page has the same
+//! The controlled element over one tick, and the effect of the hand on it. The page has the same
 //! arithmetic (`page/src/plant.ts`), operation by operation, so that both give the same bits.
 //!
 //! At tick k, with the held input u of the hand, disturbance d and target f,
@@ -6,8 +6,8 @@
 //! `v = u + d`, `y = C x + D v`, `e = f - y`, then `x <- A x + B v`.
 //!
 //! Sums run from the first term to the last, each product rounded before it is added: IEEE 754 in
-//! double precision leaves no freedom, neither in Rust nor in ECMAScript. There is no other operation
-//! and no transcendental function: matrices and signals are tables.
+//! double precision determines the result uniquely, in Rust and in ECMAScript. There is no other
+//! operation and no transcendental function: matrices and signals are tables.
 
 use serde::{Deserialize, Serialize};
 
@@ -30,13 +30,13 @@ impl Plant {
         self.b.len()
     }
 
-    /// True if the matrices fit each other and there is room for the state.
+    /// True if the dimensions of the matrices match and the state is not too large.
     pub fn is_sound(&self) -> bool {
         let n = self.order();
         n <= MOST_STATES && self.a.len() == n * n && self.c.len() == n
     }
 
-    /// y, of the state and v.
+    /// Computes y from the state and v.
     pub fn output(&self, x: &[f64], v: f64) -> f64 {
         let mut y = 0.0;
         for i in 0..self.order() {
@@ -45,7 +45,7 @@ impl Plant {
         y + self.d * v
     }
 
-    /// The state one tick on.
+    /// Advances the state by one tick.
     pub fn step(&self, x: &mut [f64], v: f64) {
         let n = self.order();
         let mut next = [0.0; MOST_STATES];
@@ -63,25 +63,26 @@ impl Plant {
 /// Largest number of states of a controlled element.
 pub const MOST_STATES: usize = 16;
 
-/// From the output of a device to u.
+/// Map from the output of a device to u.
 ///
-/// `w = (raw - centre)/span`, within -1 to 1; `|w| <= dead` gives 0, what is beyond is stretched so
-/// that the ends stay; `u = gain w`. The gain holds sensitivity, direction and the full deflection.
+/// `w = (raw - centre)/span`, within -1 to 1; `|w| <= dead` gives 0, larger values are scaled so
+/// that the ends are unchanged; `u = gain w`. The gain includes sensitivity, direction and the full
+/// deflection.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InputMap {
     /// Value of the device at rest: pixels from the left edge, or 0 of a gamepad.
     pub centre: f64,
-    /// From there to the full deflection.
+    /// Distance from there to the full deflection.
     pub span: f64,
-    /// Part of the way that does nothing, 0 to below 1.
+    /// Dead zone, as a fraction of the span, 0 to below 1.
     pub dead: f64,
-    /// u at full deflection; below zero for the other direction.
+    /// u at full deflection; negative for the other direction.
     pub gain: f64,
 }
 
 impl InputMap {
-    /// u of what the device reports.
+    /// u for a value of the device.
     pub fn u(&self, raw: f64) -> f64 {
         let w = ((raw - self.centre) / self.span).clamp(-1.0, 1.0);
         let size = if w < 0.0 { -w } else { w };
@@ -96,7 +97,7 @@ impl InputMap {
         }
     }
 
-    /// Problems with it.
+    /// Returns the problem of the map, if any.
     pub fn fault(&self) -> Option<String> {
         let finite = [self.centre, self.span, self.dead, self.gain]
             .iter()

@@ -1,5 +1,5 @@
-//! A run as a record that all commands of hoid read: every tenth tick, e and u of that instant, target, disturbance and
-//! output in addition, and e as it was on the screen. t = 0 is the start of the measurement.
+//! A run as a record that all commands of hoid read: every tenth tick, e and u at that instant, also target,
+//! disturbance and output, and e as displayed. t = 0 is the start of the measurement.
 
 use hoid_model::{Channel, Record, SampleTime};
 
@@ -14,7 +14,7 @@ use crate::{
 /// # Errors
 /// [`LabError::Model`] for a run without a sample.
 pub fn record(begun: &RunStart, task: &Task, logged: &Logged) -> Result<Record, LabError> {
-    // A log that is longer than its run holds ticks that never were.
+    // A log longer than its run contains invalid ticks.
     let n = logged.signals.e.len().min(logged.signals.u.len()).min(task.ticks);
     let every = |values: &[f64]| {
         values[..n]

@@ -1,5 +1,4 @@
-//! A run as the page draws it again: its signals at 100 Hz, its live estimate, and its reliability
-//! now.
+//! A run for replay in the page: its signals at 100 Hz, its live estimate, and its present verdict.
 
 use serde_json::{Value, json};
 
@@ -10,7 +9,7 @@ use crate::{
     verify::check,
 };
 
-/// The run as JSON.
+/// Returns the run as JSON.
 ///
 /// # Errors
 /// The errors of files.
@@ -39,12 +38,12 @@ pub fn data(stem: &Stem) -> Result<Vec<u8>, LabError> {
     serde_json::to_vec(&data).map_err(|error| LabError::damaged(&stem.file("beh.parquet"), error.to_string()))
 }
 
-/// A picture needs no more than six digits.
+/// Rounds to six digits, which suffice for a picture.
 fn rounded(values: &[f64]) -> Vec<f64> {
     values.iter().map(|v| (v * 1e6).round() / 1e6).collect()
 }
 
-/// The rows of the live estimate, numbers or null, without its header; none if there was none.
+/// The rows of the live estimate, numbers or null, without the header; none if there was none.
 fn live(stem: &Stem) -> Vec<Vec<Value>> {
     let text = hoid_io::read_text(&stem.file("live.csv")).unwrap_or_default();
     let cell = |cell: &str| cell.parse::<f64>().map_or(Value::Null, Value::from);

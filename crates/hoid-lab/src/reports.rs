@@ -1,6 +1,6 @@
-//! Pages about a session, made by the program `hoid` itself: what `identify`, `track` and `describe`
-//! report about each run, and what `group` states of all people so far. It runs as a process of its
-//! own, on one core, so that nothing of it can end or hold up an experiment.
+//! Pages about a session, created by the program `hoid` itself: the results of `identify`, `track`
+//! and `describe` for each run, and those of `group` for all people so far. They run in a separate
+//! process, on one core, so that they cannot abort or delay an experiment.
 
 use std::{
     path::{Path, PathBuf},
@@ -18,7 +18,7 @@ use crate::{
 /// Folder of the results of `hoid group` in the experiment.
 const GROUP: &str = "group";
 
-/// Pages that were made.
+/// Existing pages.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Pages(Vec<(String, String)>);
 
@@ -32,8 +32,8 @@ impl Pages {
 /// The commands of a run, each with the name of its folder.
 const COMMANDS: [&str; 3] = ["identify", "track", "describe"];
 
-/// Makes the pages of all finished runs that have none, then those of the group; `each` hears of
-/// every page.
+/// Creates the pages of all finished runs without pages, then those of the group; `each` is called
+/// after every page.
 pub fn make(program: &Path, out: &Path, folder: &Path, each: &dyn Fn(&Pages)) -> Pages {
     let Ok(session) = Session::read(folder) else {
         return Pages::default();
@@ -67,14 +67,14 @@ fn hoid(program: &Path) -> Command {
     command
 }
 
-/// One page of a run.
+/// Creates one page of a run.
 fn one(program: &Path, config: &Config, stem: &Stem, name: &str) {
     let place = stem.reports().join(name);
     let mut command = hoid(program);
     command.arg(name).arg(stem.file("beh.parquet")).args(["--from", "0"]);
     let begun = crate::session::RunStart::read(stem).ok();
     let course = begun.as_ref().and_then(|begun| begun.condition.course().ok());
-    // Margins belong to one element.
+    // Margins refer to a constant element.
     let element = course
         .filter(|course| course.change_s().is_none())
         .and_then(|course| course.element_at(0.0).ok());
@@ -100,7 +100,7 @@ fn one(program: &Path, config: &Config, stem: &Stem, name: &str) {
     said(&mut command, &place, name);
 }
 
-/// Runs a command; where it makes no page of its own, what it reports becomes one.
+/// Runs a command; if it creates no page, its output becomes one.
 fn said(command: &mut Command, place: &Path, name: &str) {
     let made = hoid_io::make_directory(place).map_err(LabError::from).and_then(|()| {
         command
@@ -131,7 +131,7 @@ fn said(command: &mut Command, place: &Path, name: &str) {
         escaped(&out),
         escaped(&wrong)
     );
-    // Without the page its link is missing, which reports it.
+    // Without the page its link is missing, which shows the failure.
     let _ = hoid_io::write_atomically(&page, |file| file.write_all(html.as_bytes()));
 }
 
@@ -162,7 +162,7 @@ pub fn found(folder: &Path) -> Pages {
     Pages(pages)
 }
 
-/// A file of these pages with its kind; nothing for a name that is none of them. Names are letters,
+/// A file of these pages with its media type; nothing for any other name. Names are letters,
 /// digits, `-`, `_` and dots that do not lead, so that no name leads out of its folder.
 ///
 /// # Errors

@@ -1,8 +1,8 @@
 //! The server of the page: HTTP on 127.0.0.1, and the sockets of its pages.
 //!
-//! It serves one page, its data and the pages of results, and nothing to anyone else: the address holds a random token,
-//! and a request is refused unless its `Host` is the address of the server, its `Origin`, where it has one, is that
-//! too, and it is a GET of bounded length. A socket must have an origin. Nothing that a page states names a file.
+//! It serves one page, its data and the pages of results, to authorised clients only: the address contains a random
+//! token, and a request is refused unless its `Host` is the address of the server, its `Origin`, if present, is as
+//! well, and it is a GET of bounded length. A socket must have an origin. No message of a page names a file.
 //!
 //! | refused | status |
 //! |---|---|
@@ -12,8 +12,8 @@
 //! | a head of more than 16 KiB | 431 |
 //! | more than 64 connections with the token at once | 503 |
 //!
-//! **Strangers** are those who have not shown the token (`reception`): a head has 5 s in all to come, the
-//! oldest of 256 gives way to the next, and none of them has a thread.
+//! **Strangers** are clients that have not presented the token (`reception`): a head must arrive within 5 s, the oldest
+//! of 256 is closed for the next, and none of them has a thread.
 
 mod http;
 mod reception;
@@ -35,12 +35,12 @@ use sha2::{Digest, Sha256};
 use crate::{LabError, lab::Lab};
 use http::{Reply, Request};
 
-/// Most connections at once that have shown the token.
+/// Maximum number of simultaneous connections with the token.
 const KNOWN: usize = 64;
-/// Longest time that one of them may take for an answer.
+/// Timeout of an answer to one of them.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// The page, built of `page/` by `npm run build`.
+/// The page, built from `page/` by `npm run build`.
 const PAGE: &str = include_str!("../page/dist/lab.html");
 
 /// A server that listens.
@@ -48,18 +48,18 @@ pub struct Server {
     listener: TcpListener,
     address: SocketAddr,
     token: String,
-    /// The token of [`Server::address_once`], until it is shown.
+    /// The token of [`Server::address_once`], until it is used.
     once: Mutex<Option<String>>,
     policy: String,
     lab: Arc<Lab>,
     known: AtomicUsize,
 }
 
-/// A connection that has shown the token, counted for as long as it is answered.
+/// A connection with the token, counted while it is served.
 struct AuthorisedConnection(Arc<Server>);
 
 impl AuthorisedConnection {
-    /// One more, while there is room.
+    /// Admits one more, if the limit allows it.
     fn enter(server: &Arc<Server>) -> Option<Self> {
         let before = server.known.fetch_add(1, Ordering::Relaxed);
         let known = Self(Arc::clone(server));
@@ -74,7 +74,7 @@ impl Drop for AuthorisedConnection {
 }
 
 impl Server {
-    /// Listens on a port of 127.0.0.1, a free one where none is given.
+    /// Listens on a port of 127.0.0.1, or on a free one if none is given.
     ///
     /// # Errors
     /// [`LabError::Server`].
@@ -99,16 +99,16 @@ impl Server {
         })
     }
 
-    /// The address to open, token included.
+    /// The address to open, including the token.
     pub fn address(&self) -> String {
         format!("http://{}/{}/", self.address, self.token)
     }
 
-    /// An address for a browser that is started with it, which others may read in the list of processes:
-    /// it leads to [`Server::address`] once, and then nowhere.
+    /// An address for starting a browser, which other users may read in the list of processes: it
+    /// leads to [`Server::address`] once only.
     ///
     /// # Errors
-    /// [`LabError::Server`] where the system gives no random numbers.
+    /// [`LabError::Server`] if the system provides no random numbers.
     pub fn address_once(&self) -> Result<String, LabError> {
         let token = random_token()?;
         let address = format!("http://{}/{token}/", self.address);
@@ -116,13 +116,13 @@ impl Server {
         Ok(address)
     }
 
-    /// True the first time that the token of [`Server::address_once`] is shown.
+    /// True for the first use of the token of [`Server::address_once`].
     fn is_once(&self, token: &str) -> bool {
         let mut once = self.once.lock().unwrap_or_else(PoisonError::into_inner);
         once.take_if(|known| same(known, token)).is_some()
     }
 
-    /// Serves for as long as the program runs.
+    /// Serves while the program runs.
     pub fn serve(self) {
         let server = Arc::new(self);
         reception::receive(&server.listener, |request, stream| {
@@ -133,7 +133,7 @@ impl Server {
             let Some(known) = AuthorisedConnection::enter(&server) else {
                 return Err((busy("too many connections"), stream));
             };
-            // A thread that is not made takes its connection along: one to report it on.
+            // If a thread cannot be created, its connection is lost: there is none to report it on.
             let other = stream.try_clone();
             let made = thread::Builder::new().spawn(move || known.0.answer(stream, &request));
             match (made, other) {
@@ -155,11 +155,11 @@ impl Server {
             Ok(Route::Socket(key)) => return socket::run(stream, &key, &self.lab),
             Ok(Route::Reply(reply)) | Err(reply) => reply,
         };
-        // A page that is gone needs no answer.
+        // A closed page needs no answer.
         let _ = reply.write(&mut stream);
     }
 
-    /// Whether a request is one of this page.
+    /// Checks that a request belongs to this page.
     fn admits(&self, request: &Request) -> Result<(), Reply> {
         let own = |authority: &str| {
             let port = self.address.port();
@@ -219,7 +219,7 @@ fn random_token() -> Result<String, LabError> {
     Ok(HEXLOWER.encode(&random))
 }
 
-/// Equal, in a time that does not determine where they differ.
+/// Comparison in constant time.
 fn same(a: &str, b: &str) -> bool {
     a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |differ, (a, b)| differ | (a ^ b)) == 0
 }

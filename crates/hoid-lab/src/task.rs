@@ -1,9 +1,10 @@
-//! A run as tables: what the page computes with, and what Rust recomputes it from.
+//! A run as tables, which the page uses and from which Rust recomputes it.
 //!
-//! The controlled element is held exactly over a tick of 1 ms (zero-order hold,
-//! [`hoid_model::held_system`]). Where it changes, its matrices are those of the continuous model at
-//! the middle of each block of ten ticks. Target and disturbance are sampled at every tick; over the
-//! first seconds of the run-in they are faded in linearly, so that no one starts with a jump.
+//! The controlled element is discretised exactly over a tick of 1 ms (zero-order hold,
+//! [`hoid_model::held_system`]). If it changes, its matrices are those of the continuous model at
+//! the middle of each block of ten ticks. Target and disturbance are sampled at every tick; over
+//! the first seconds of the run-in they are faded in linearly, so that a run does not start with a
+//! jump.
 
 use std::{collections::BTreeMap, f64::consts::TAU};
 
@@ -21,12 +22,12 @@ use crate::{LabError, config::Condition, plant::Plant};
 
 /// Duration of a tick, s.
 pub const TICK_S: f64 = 1e-3;
-/// Ticks of one sample of the record.
+/// Number of ticks per sample of the record.
 pub const TICKS_PER_SAMPLE: usize = 10;
 /// Time in which target and disturbance are faded in, s.
 const FADE_S: f64 = 3.0;
 
-/// A controlled element, and from which tick on.
+/// A controlled element and its first tick.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Phase {
     /// Its first tick.
@@ -39,19 +40,19 @@ pub struct Phase {
 /// A run as tables.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Task {
-    /// Ticks before the measurement.
+    /// Number of ticks before the measurement.
     pub run_in: usize,
-    /// All ticks, run-in included.
+    /// Number of all ticks, including the run-in.
     pub ticks: usize,
     /// The controlled elements, the first from tick 0 on.
     pub phases: Vec<Phase>,
-    /// The target at each tick, and beyond the end as far as a preview shows it.
+    /// The target at each tick, and beyond the end as far as the preview time.
     pub target: Vec<f64>,
     /// The disturbance at each tick.
     pub disturbance: Vec<f64>,
 }
 
-/// Action of the loop.
+/// Signals of the loop.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Signals {
     /// u of the hand at each tick.
@@ -61,12 +62,12 @@ pub struct Signals {
 }
 
 impl Task {
-    /// The tables of a run: `cell` is the place of the condition, `replication` the number of the
-    /// run, which draw the phases with the seed of the condition.
+    /// Creates the tables of a run: `cell` is the index of the condition, `replication` the number
+    /// of the run, which determine the phases with the seed of the condition.
     ///
     /// # Errors
-    /// [`LabError::Message`] for a condition that is invalid, as a file may have it; [`LabError::Model`] for an element
-    /// that cannot be held.
+    /// [`LabError::Message`] for an invalid condition, which a file may contain; [`LabError::Model`] for an element
+    /// that cannot be discretised.
     pub fn new(condition: &Condition, cell: u64, replication: u64) -> Result<Self, LabError> {
         condition.check()?;
         let course = condition.course()?;
@@ -114,7 +115,7 @@ impl Task {
         })
     }
 
-    /// Runs the loop over these u.
+    /// Simulates the loop with the given u.
     pub fn run(&self, u: &[f64]) -> Signals {
         let mut signals = Signals {
             u: u.to_vec(),
@@ -135,7 +136,7 @@ impl Task {
     }
 }
 
-/// The excitation with its phases, drawn where it asks for that.
+/// The excitation with its phases, drawn if requested.
 fn drawn(excitation: &Excitation, turns: &mut impl Iterator<Item = f64>) -> Result<ForcingFunction, LabError> {
     if !excitation.random_phases {
         return Ok(excitation.function.clone());
@@ -148,7 +149,7 @@ fn drawn(excitation: &Excitation, turns: &mut impl Iterator<Item = f64>) -> Resu
     Ok(ForcingFunction::new(drawn.collect())?)
 }
 
-/// A controlled element over one tick; its leading gain is where the realisation states.
+/// Discretises a controlled element over one tick; the position of its leading gain is given by the realisation.
 fn held(num: &[f64], den: &[f64], realisation: Realisation, tick: SampleTime) -> Result<Plant, LabError> {
     let gain = num.first().copied().unwrap_or(0.0);
     let shape: Vec<f64> = num.iter().map(|c| if gain == 0.0 { *c } else { c / gain }).collect();
@@ -166,7 +167,7 @@ fn held(num: &[f64], den: &[f64], realisation: Realisation, tick: SampleTime) ->
     })
 }
 
-/// u at each tick, of the events as `(tick, u)` in their order: the last one that took effect.
+/// u at each tick, from the events `(tick, u)` in their order: the last one that took effect.
 pub fn held_inputs(events: &[(usize, f64)], ticks: usize) -> Vec<f64> {
     let by_tick: BTreeMap<usize, f64> = events.iter().copied().collect();
     let mut u = 0.0;
@@ -219,9 +220,9 @@ mod tests {
 
     #[test]
     fn the_simulator_of_hoid_finds_the_same_loop() {
-        // What the simulator of C4 does at 100 Hz, its u held over ten ticks each, is what the task
-        // does at 1 kHz: both holds are exact, and the element changes in the same blocks except
-        // for the middle of the block that the task takes.
+        // The simulator of C4 at 100 Hz, with u held over ten ticks each, agrees with the task at 1
+        // kHz: both holds are exact, and the element changes in the same blocks except for the
+        // middle of the block that the task uses.
         use hoid_model::scenario::{Condition as Reference, Scenario};
         use hoid_sim::Simulator;
         let own = Condition {
@@ -263,7 +264,7 @@ mod tests {
             phase.plant.b[0] * phase.plant.c[0] / TICK_S
         };
         assert!((gain(0) - 4.0).abs() < 1e-6 && (gain(task.ticks - 1) - 8.0).abs() < 1e-6);
-        // The middle of the change is within a block of it: the slope there is 4 * 2/4 a second.
+        // The middle of the change is within a block of it: the slope there is 4 * 2/4 per second.
         assert!((gain(15_000) - 6.0).abs() < 0.02);
         assert!(task.phases.windows(2).all(|pair| pair[0].from < pair[1].from));
         assert_eq!(Task::new(&condition("4/s"), 0, 1).unwrap().phases.len(), 1);

@@ -1,8 +1,8 @@
-//! Instants as ISO 8601 in UTC, without a library of calendars.
+//! Times as ISO 8601 in UTC, without a calendar library.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// Now, to the second.
+/// The current time, to the second.
 pub fn now() -> String {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     of_seconds(since.as_secs())

@@ -1,6 +1,6 @@
-//! Reliability of a run: every tick recomputed from the logged inputs.
+//! Verification of a run: every tick is recomputed from the logged inputs.
 //!
-//! A run is *verified* when nothing of this is found, else *unverified* with the reasons:
+//! A run is *verified* if none of these problems is found, otherwise *unverified* with the reasons:
 //!
 //! | kind | reason |
 //! |---|---|
@@ -14,10 +14,10 @@
 //! | `lab-frame` | a frame was too late, or did not show the tick that it names |
 //! | `lab-changed` | a file was changed after the end |
 //!
-//! u and e are compared bit for bit, except for the sign of zero, which text does not keep. e is recomputed from the u
-//! of the log, so that a false event and a false tick are distinguished; the tables are those that the page was given,
-//! which are compared with those made again from the seed to rounding (sines may differ between computers in the last
-//! bit).
+//! u and e are compared bit for bit, except for the sign of zero, which text does not preserve. e is recomputed from
+//! the u of the log, so that a wrong event and a wrong tick are distinguished; the tables are those given to the page,
+//! which are compared up to rounding with those recomputed from the seed (sines may differ between computers in the
+//! last bit).
 
 use hoid_model::{Finding, Verdict, VerdictLevel};
 use hoid_numerics::statistics::upper_median;
@@ -29,47 +29,47 @@ use crate::{
     task::{Task, held_inputs},
 };
 
-/// Relative difference that sines of two computers may leave in a table.
+/// Relative difference in a table due to the sine functions of two computers.
 const TABLE: f64 = 1e-9;
-/// A frame is missed when it comes this many times the typical interval after the last.
+/// A frame is missed if the interval exceeds the typical one by this factor.
 const MISSED: f64 = 1.5;
 
-/// Findings about a run.
+/// Result of the verification of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Checked {
-    /// Trustworthy is verified.
+    /// Verdict; trustworthy means verified.
     pub verdict: Verdict,
     /// Additional measurements.
     pub measures: Measures,
 }
 
-/// How the run went, in numbers.
+/// Measures of a run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Measures {
     /// Ticks in the log.
     pub ticks: usize,
     /// Frames.
     pub frames: usize,
-    /// Median time from frame to frame, ms.
+    /// Median interval between frames, ms.
     pub frame_ms: f64,
-    /// Longest time from frame to frame, ms.
+    /// Longest interval between frames, ms.
     pub longest_frame_ms: f64,
-    /// Frames that the screen would have had in addition.
+    /// Number of missed frames.
     pub missed_frames: usize,
-    /// Input events a second.
+    /// Input events per second.
     pub input_hz: f64,
-    /// Median age of an event when the page had it, ms.
+    /// Median age of an event when the page received it, ms.
     pub input_age_ms: f64,
     /// Root mean square of e in the measurement.
     pub rms_e: f64,
-    /// The value for the target or disturbance.
+    /// Root mean square of the target or disturbance.
     pub rms_forcing: f64,
-    /// 100 for no error, 0 for as much as hands at rest would leave.
+    /// 100 for no error, 0 for the error without control.
     pub score: f64,
 }
 
 impl Checked {
-    /// True if nothing speaks against the run.
+    /// True if there is no finding against the run.
     pub fn is_verified(&self) -> bool {
         self.verdict.level == VerdictLevel::Trustworthy
     }
@@ -79,7 +79,7 @@ impl Checked {
         if self.is_verified() { "verified" } else { "unverified" }
     }
 
-    /// Why not, in one line; empty if it is.
+    /// The reasons in one line; empty if it is verified.
     pub fn reasons(&self) -> String {
         self.verdict.reasons().collect::<Vec<_>>().join("; ")
     }
@@ -88,8 +88,7 @@ impl Checked {
 /// Checks a run of a session.
 ///
 /// # Errors
-/// [`LabError`] where nothing is known about the run (`run.json`) or the system refuses a file; what is wrong in the
-/// others is a finding.
+/// [`LabError`] if `run.json` is missing or the system refuses a file; problems of the other files are findings.
 pub fn check(stem: &Stem) -> Result<Checked, LabError> {
     let begun = RunStart::read(stem)?;
     let logged = Logged::read(stem)?;
@@ -214,7 +213,7 @@ fn errors_of(task: &Task, logged: &Logged) -> Option<Finding> {
     })
 }
 
-/// The first place where two signals differ in a bit, and how many there are.
+/// The first index at which two signals differ in a bit, and the number of differences.
 fn differing(made: &[f64], logged: &[f64]) -> Option<(usize, usize)> {
     // Minus zero plus zero is zero.
     let differ = |(a, b): (&f64, &f64)| (a + 0.0).to_bits() != (b + 0.0).to_bits();
@@ -282,7 +281,7 @@ fn files_of(stem: &Stem, ended: &Ended) -> Result<Option<Finding>, LabError> {
     }))
 }
 
-/// Runs that no hand made are reported to be such; they can be as exact as others.
+/// Marks runs not made by hand, which may be as exact as others.
 fn hands_of(begun: &RunStart, ended: &Ended) -> Vec<Finding> {
     let made = ended.counted.get("synthetic_events").copied().unwrap_or(0.0);
     let mut notes = Vec::new();
@@ -321,11 +320,11 @@ fn measures(begun: &RunStart, task: &Task, logged: &Logged) -> Measures {
         .map(|event| event.handled_ms - event.stamp_ms)
         .collect();
     let e = &logged.signals.e;
-    // Ticks beyond the end of the run never were.
+    // Ticks beyond the end of the run are invalid.
     let e = &e[..e.len().min(task.ticks)];
     let measured = begun.run_in.min(e.len())..e.len();
     let rms_e = rms(&e[measured.clone()]);
-    // What hands at rest would leave.
+    // The error without control.
     let rest = task.run(&vec![0.0; e.len()]);
     let rms_forcing = rms(&rest.e[measured]);
     Measures {
@@ -351,7 +350,7 @@ fn rms(values: &[f64]) -> f64 {
     (sum / values.len().max(1) as f64).sqrt()
 }
 
-/// The median of the finite values; zero of none.
+/// The median of the finite values; zero if there are none.
 fn median(values: &[f64]) -> f64 {
     let mut finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     upper_median(&mut finite).unwrap_or(0.0)

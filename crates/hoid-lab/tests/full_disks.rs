@@ -1,7 +1,8 @@
-//! Disks of 64 kB to 4 MB that fill at any instant of a session: what was reported as logged is there, runs that were
-//! verified still are, and the session opens.
+//! Disks of 64 kB to 4 MB that fill at any instant of a session: data reported as logged are there, verified runs
+//! remain verified, and the session opens.
 //!
-//! A disk is a `tmpfs` of that size, which Linux lets an administrator mount; elsewhere the test shows that it skips.
+//! A disk is a `tmpfs` of that size, which Linux lets an administrator mount; elsewhere the test reports that it is
+//! skipped.
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used)]
 
@@ -83,15 +84,15 @@ fn batches(task: &Task) -> Vec<Batch> {
         .collect()
 }
 
-/// What was reported before the disk was full.
+/// Data reported before the disk was full.
 #[derive(Default)]
 struct LoggedBefore {
-    /// Ticks that were logged, of each run.
+    /// Number of logged ticks of each run.
     ticks: Vec<(Stem, usize)>,
     verified: Vec<Stem>,
 }
 
-/// A session whose disk is full from a batch on, for a given number of batches.
+/// A session whose disk is full from batch `full` until batch `until`.
 fn session(out: &Path, full: usize, until: usize, told: &mut LoggedBefore) -> Option<Session> {
     let ballast = out.join("ballast");
     let mut session = Session::begin(out, &config(), "P01", false).ok()?;
@@ -193,7 +194,7 @@ fn a_disk_that_fills_loses_nothing_that_was_told() {
                 broken += 1;
             }
         }
-        // And it continues.
+        // The session continues.
         assert!(again.new_number().is_ok());
         again.save().unwrap();
     }
@@ -203,7 +204,7 @@ fn a_disk_that_fills_loses_nothing_that_was_told() {
     );
 }
 
-/// The disk is full while a person tracks: the page is reported at once, the run does not count, and the session
+/// The disk fills while a person tracks: the page is notified at once, the run does not count, and the session
 /// continues.
 #[test]
 fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
@@ -221,10 +222,10 @@ fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
     let told =
         "run-01_ticks.csv: No space left on device (os error 28). The run was ended and does not count; make room";
     assert!(said.contains(told), "{said}");
-    // What the page has sent meanwhile is of no account, and the pages see that nothing continues.
+    // Messages of the page in the meantime are ignored, and the pages see that no run is in progress.
     person.track(1, 3000..3100).unwrap();
     assert_eq!(person.state()["running"], Value::Null);
-    // As long as it is full none starts.
+    // No run starts while it is full.
     let said = person.next(2).unwrap_err();
     assert!(said.contains("No space left") && said.contains("make room"), "{said}");
     fs::remove_file(&ballast).unwrap();
@@ -232,7 +233,7 @@ fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
     let number = 1 + Stem::all(&folder).unwrap().last().unwrap().0;
     person.next(number).unwrap();
     person.track(number, 0..4000).unwrap();
-    // A run that cannot be closed is not a verified one.
+    // A run that cannot be closed is not verified.
     fill(&ballast);
     let said = person.finish(number).unwrap_err();
     assert!(said.contains("make room on the disk and start it again"), "{said}");

@@ -12,7 +12,7 @@ mod person;
 use hostile::Hostile;
 
 const CASES: u64 = 1500;
-/// Cases of the whole that have failed: a preview of eleven days, more samples held back than are in the ring.
+/// Cases that once failed: a preview of eleven days, more samples held back than are in the ring.
 const FOUND: [u64; 2] = [6025, 66_758];
 
 #[test]

@@ -1,5 +1,5 @@
-//! The page computes what Rust computes, to the last bit. Where there is no node it is reported and
-//! left out; `cargo xtask slow lab` does ten thousand runs.
+//! The page computes the same as Rust, to the last bit. Without node the test reports that it is
+//! skipped; `cargo xtask slow lab` does ten thousand runs.
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
 #[path = "common/page.rs"]

@@ -1,4 +1,4 @@
-//! The server as a stranger meets it, and a session as a page that keeps to the rules has it.
+//! The server with unauthorised clients, and a session with a page that follows the protocol.
 #![allow(clippy::unwrap_used)]
 
 use std::{
@@ -60,11 +60,11 @@ fn served_by(server: Server) -> At {
 }
 
 impl At {
-    /// The reply to a request unchanged.
+    /// Sends a request unchanged and returns the reply.
     fn raw(&self, request: &[u8]) -> String {
         let mut stream = TcpStream::connect(&self.host).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
-        // The server may have refused before all was written.
+        // The server may refuse before all is written.
         let _ = stream.write_all(request);
         let mut reply = Vec::new();
         let _ = stream.read_to_end(&mut reply);
@@ -150,7 +150,7 @@ impl Page {
         self.0.send(Message::text(message.to_string())).unwrap();
     }
 
-    /// The next message of this type; others are passed over.
+    /// The next message of this type; others are skipped.
     fn hear(&mut self, kind: &str) -> Value {
         loop {
             if let Message::Text(text) = self.0.read().unwrap() {
@@ -172,7 +172,7 @@ impl Page {
         while self.hear("state")["phase"] != "runs" {}
     }
 
-    /// Starts the next run; its number.
+    /// Starts the next run and returns its number.
     fn begin(&mut self) -> u64 {
         self.say(&json!({"type": "next"}));
         let number = self.hear("run")["number"].as_u64().unwrap();
@@ -220,7 +220,7 @@ fn a_run_goes_through_and_its_live_estimate_is_told() {
     person.say(&json!({"type": "finish", "number": number, "counted": {}}));
     let verdict = person.hear("verdict");
     assert_eq!(verdict["done"]["verdict"], "verified", "{verdict}");
-    // One second window cannot do what the first does.
+    // A second window cannot control the session.
     other.say(&json!({"type": "next"}));
     assert!(other.hear("refused")["words"].as_str().unwrap().contains("looks on"));
     let zip = at.get(&format!("/{}/export.zip", at.token), "");
@@ -242,7 +242,7 @@ fn a_window_that_is_closed_breaks_its_run_off() {
         .unwrap()
         .target;
     person.say(&batch(number, 0, &target));
-    // A second window does not take a run that continues.
+    // A second window does not take over a current run.
     let mut second = at.page();
     second.say(&json!({"type": "hello", "role": "person"}));
     assert!(
@@ -251,7 +251,7 @@ fn a_window_that_is_closed_breaks_its_run_off() {
             .unwrap()
             .contains("another window")
     );
-    // With the first one gone the session continues in it.
+    // When the first one is closed, the session continues in the second.
     drop(person);
     second.hear("yours");
     loop {
@@ -323,7 +323,7 @@ fn one_experiment_has_one_server() {
     assert!(second.is_err_and(|error| error.to_string().contains("another process works on")));
 }
 
-/// Connections that send a byte at intervals, as many as the system gives: they give way to the page.
+/// Connections that send a byte at intervals, as many as the system allows: they are closed for the page.
 #[test]
 fn slow_strangers_do_not_shut_the_page_out() {
     let dir = tempfile::tempdir().unwrap();
@@ -347,10 +347,9 @@ fn slow_strangers_do_not_shut_the_page_out() {
     assert_eq!(status(&reply), "200");
 }
 
-/// A thousand connections of strangers, each of which starts again as soon as it is closed: silence, half a head, heads
-/// without the token or without an end, sockets, bytes of any kind. The page is answered each time. (Within a second
-/// where the list of connections that the system holds does not overflow, which a test cannot demand of a busy
-/// machine.)
+/// A thousand connections of strangers, each of which reconnects as soon as it is closed: silence, half a head, heads
+/// without the token or without an end, sockets, arbitrary bytes. The page is answered each time. (Within a second if
+/// the system's backlog of connections does not overflow, which a test cannot require of a busy machine.)
 #[test]
 fn a_thousand_hostile_connections_do_not_shut_the_page_out() {
     let dir = tempfile::tempdir().unwrap();
@@ -397,7 +396,7 @@ fn a_thousand_hostile_connections_do_not_shut_the_page_out() {
         })
         .collect();
     thread::sleep(Duration::from_millis(300));
-    // The page answers all the while, until strangers were turned away and have come again.
+    // The page answers throughout, until strangers were refused and have reconnected.
     let start = Instant::now();
     let (mut asked, mut slowest) = (0, Duration::ZERO);
     while asked < 20 || (begun.load(Ordering::Relaxed) <= strangers * each && start.elapsed() < Duration::from_secs(60))
@@ -419,7 +418,7 @@ fn a_thousand_hostile_connections_do_not_shut_the_page_out() {
     assert!(begun > strangers * each, "{begun} strangers");
 }
 
-/// What a browser is started with is read by others in the list of processes: it serves once.
+/// The address for starting a browser is visible in the list of processes: it works once.
 #[test]
 fn the_address_of_the_browser_leads_to_the_page_once() {
     let dir = tempfile::tempdir().unwrap();

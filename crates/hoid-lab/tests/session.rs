@@ -1,5 +1,5 @@
-//! A session without a page: batches as a page sends them, what becomes of them, and the findings
-//! when something of them is changed.
+//! A session without a page: batches as a page sends them, their processing, and the findings after
+//! modifications.
 #![allow(clippy::unwrap_used)]
 
 #[path = "common/run.rs"]
@@ -44,7 +44,7 @@ fn begun(session: &Session, number: usize) -> (RunStart, Task) {
     run::begun(session, number, MAP).unwrap()
 }
 
-/// Batches of a run up to a tick: an event each 8 ms, a frame each 16.7 ms.
+/// Batches of a run up to a tick: an event every 8 ms, a frame every 16.7 ms.
 fn batches(task: &Task, until: usize) -> Vec<Batch> {
     let events: Vec<Event> = (0..until / 8)
         .map(|k| {
@@ -130,7 +130,7 @@ fn corrupt(stem: &Stem, end: &str, line: usize, cell: usize, with: impl Fn(f64) 
     fs::write(&path, lines.join("\n") + "\n").unwrap();
 }
 
-/// What is made of a number.
+/// Modification of a number.
 type Change<'a> = &'a dyn Fn(f64) -> f64;
 
 #[test]
@@ -154,7 +154,7 @@ fn what_is_changed_makes_a_run_unverified_for_its_own_reason() {
         let kinds: Vec<&str> = checked.verdict.findings().iter().map(|finding| finding.kind).collect();
         assert!(kinds.contains(&kind), "{file} {cell}: {kinds:?} lacks {kind}");
         assert!(kinds.contains(&"lab-changed"));
-        // Its own reason, and none of another file's.
+        // Its own reason, and not that of another file.
         let others = ["lab-input", "lab-event", "lab-tick", "lab-ticks", "lab-frame"];
         let own = |other: &&str| *other != kind && kinds.contains(other);
         assert_eq!(others.iter().find(|other| own(other)), None, "{file} {cell}: {kinds:?}");
@@ -188,7 +188,7 @@ fn a_session_goes_on_after_its_server_was_killed() {
     let mut session = Session::begin(dir.path(), &config(), "P01", true).unwrap();
     let (stem, log) = run(&mut session, 1234);
     drop((log, session));
-    // The last line is cut, as by a kill in the middle of it.
+    // The last line is truncated, as by a kill in the middle of it.
     let path = stem.file("ticks.csv");
     let text = fs::read_to_string(&path).unwrap();
     fs::write(&path, &text[..text.len() - 7]).unwrap();
@@ -202,7 +202,7 @@ fn a_session_goes_on_after_its_server_was_killed() {
         "{}",
         lost.reasons
     );
-    // Both runs are made, with numbers of their own.
+    // Both runs are made, with different numbers.
     for _ in 0..2 {
         let (stem, log) = run(&mut session, usize::MAX);
         drop(log);
@@ -254,8 +254,8 @@ fn people_have_their_rows_and_pseudonyms_are_checked() {
     }
 }
 
-/// Files cut at any byte, flipped or deleted, as by power cuts and full disks: the session opens, its damaged runs are
-/// unverified, and it can continue.
+/// Files truncated at any byte, with flipped bits or deleted, as by power cuts and full disks: the session opens, its
+/// damaged runs are unverified, and it can continue.
 #[test]
 fn every_session_opens_whatever_was_cut_or_lost() {
     let dir = tempfile::tempdir().unwrap();
@@ -308,7 +308,7 @@ fn every_session_opens_whatever_was_cut_or_lost() {
     }
 }
 
-/// What was logged twice, matrices that do not fit and a plan of another experiment: findings or words.
+/// Duplicated log entries, matrices of wrong dimensions and a plan of another experiment give findings or errors.
 #[test]
 fn numbers_of_files_are_no_places() {
     let dir = tempfile::tempdir().unwrap();
@@ -330,7 +330,7 @@ fn numbers_of_files_are_no_places() {
     fs::write(&json, value.to_string()).unwrap();
     let said = check(&stem).unwrap().reasons();
     assert!(said.contains("do not fit each other"), "{said}");
-    // A preview of eleven days: nothing of its length is made.
+    // A preview of eleven days: no memory of its length is allocated.
     let mut value: serde_json::Value = serde_json::from_str(&begun).unwrap();
     value["condition"]["preview_s"] = serde_json::json!(1e6);
     fs::write(&json, value.to_string()).unwrap();
@@ -341,7 +341,7 @@ fn numbers_of_files_are_no_places() {
     let other = facts.replacen("condition = 0", "condition = 9", 1);
     assert_ne!(facts, other);
     fs::write(&toml, &other).unwrap();
-    // As long as the copy shows what was to be the session opens.
+    // As long as the copy contains the plan, the session opens.
     assert_eq!(Session::open(&session.folder).unwrap().facts, session.facts);
     fs::write(session.folder.join("lab.copy.toml"), other).unwrap();
     let said = Session::open(&session.folder).unwrap_err().to_string();
@@ -358,7 +358,7 @@ fn reading_a_session_changes_no_file() {
     fs::write(&runs, &cut).unwrap();
     assert_eq!(Session::read(&session.folder).unwrap().done.len(), 1);
     assert_eq!(fs::read_to_string(&runs).unwrap(), cut);
-    // The next line is after the last whole one.
+    // The next line is after the last complete one.
     let mut session = Session::open(&session.folder).unwrap();
     let (stem, log) = run(&mut session, usize::MAX);
     drop(log);

@@ -1,8 +1,8 @@
-//! Arrays and records in and out.
+//! Conversion of arrays and records.
 //!
-//! A Python record holds NumPy arrays. A call makes a record of the library from the channels that
-//! it needs while it holds the interpreter, so that it does not see what another thread writes into
-//! the arrays afterwards. Vectors from the library become arrays without a copy.
+//! A Python record holds NumPy arrays. A call makes a record of the library from the required
+//! channels while it holds the interpreter, so that it does not see later modifications of the
+//! arrays by another thread. Vectors from the library become arrays without a copy.
 
 use hoid_model::{Channel, ModelError, Record, SampleTime};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
@@ -15,19 +15,19 @@ pub fn array<'py>(py: Python<'py>, values: Vec<f64>) -> Bound<'py, PyArray1<f64>
     values.into_pyarray(py)
 }
 
-/// Two-dimensional array from a matrix by rows, without a copy.
+/// Two-dimensional array from a matrix stored by rows, without a copy.
 pub fn matrix<'py>(py: Python<'py>, values: Vec<f64>, columns: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let rows = values.len().checked_div(columns).unwrap_or(0);
     values.into_pyarray(py).reshape([rows, columns])
 }
 
-/// A vector from a contiguous array of float64, which the package has made.
+/// A vector from a contiguous array of float64 created by the package.
 fn vector(values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let array: PyReadonlyArray1<'_, f64> = values.extract()?;
     Ok(array.as_slice()?.to_vec())
 }
 
-/// Channels of a record that a call needs other than input and output.
+/// Channels of a record that a call needs in addition to input and output.
 #[derive(Debug, Clone, Copy)]
 pub enum Wanted<'a> {
     All,
@@ -121,7 +121,7 @@ pub fn check(found: &Bound<'_, PyAny>) -> Outcome<()> {
     Ok(())
 }
 
-/// The records from one, or from a sequence of them.
+/// The records from a single one, or from a sequence of them.
 pub fn records(found: &[Bound<'_, PyAny>], wanted: Wanted<'_>) -> Outcome<Vec<Record>> {
     if found.is_empty() {
         return Err(bad_option("there is no record; give one or more"));

@@ -1,4 +1,4 @@
-//! A controlled element as Python gives it.
+//! Controlled elements as given in Python.
 
 use hoid_model::ContinuousTransferFunction;
 use pyo3::prelude::*;

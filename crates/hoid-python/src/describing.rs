@@ -1,5 +1,5 @@
-//! `pyhoid.describe` and `pyhoid.describing_function`: how a person responds at the lines of the
-//! excitation.
+//! `pyhoid.describe` and `pyhoid.describing_function`: the response of an operator at the lines of
+//! the excitation.
 
 use hoid_analysis::{Described, Describing, Recordings};
 use hoid_ident::frequency::{

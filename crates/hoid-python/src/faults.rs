@@ -1,4 +1,4 @@
-//! Findings in the records of a fit, and the processing of them.
+//! Faults in the records of a fit, and the steps applied to them.
 
 use hoid_analysis::{FoundFault, Recordings};
 use hoid_io::Step;
@@ -6,10 +6,10 @@ use pyo3::{prelude::*, types::PyDict};
 
 use crate::arrays::parts;
 
-/// Which of the given records it belongs to, and its parts.
+/// Index of the given record, and the parts of the fault.
 type Of<'py> = (usize, Bound<'py, PyDict>);
 
-/// Findings in recordings: which of those given, and what.
+/// Faults in recordings, with the index of the given record.
 pub fn faults_of<'py>(py: Python<'py>, data: &Recordings) -> PyResult<Vec<Of<'py>>> {
     let all = data.origins.iter().zip(&data.accounts);
     all.flat_map(|(origin, account)| account.found().into_iter().map(|found| (*origin, found)))
@@ -31,10 +31,10 @@ fn parts_of(py: Python<'_>, found: FoundFault) -> PyResult<Bound<'_, PyDict>> {
     Ok(one)
 }
 
-/// Which of the given records a record is of, its parts, and the processing of it.
+/// Index of the given record from which a record comes, its parts, and the steps applied to it.
 pub type UsedRecord<'py> = (usize, Bound<'py, PyDict>, Vec<String>);
 
-/// The records as they were fitted.
+/// The records of the fit.
 pub fn used_records<'py>(py: Python<'py>, data: &Recordings) -> PyResult<Vec<UsedRecord<'py>>> {
     let all = data.origins.iter().zip(&data.records).zip(&data.accounts);
     all.map(|((origin, record), account)| {

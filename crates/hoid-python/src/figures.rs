@@ -1,4 +1,4 @@
-//! Small figures as Python has them: estimates as pairs, operators as dictionaries.
+//! Conversion of small results: estimates to pairs, operators to dictionaries.
 
 use hoid_ident::{
     MarginEstimates, ResponsePoint, Termination,
@@ -14,7 +14,7 @@ use pyo3::{prelude::*, types::PyDict};
 
 use crate::arrays::array;
 
-/// A span that the guard of a recursion found.
+/// A span detected by the guard of a recursion.
 pub fn track_fault<'py>(py: Python<'py>, fault: &hoid_track::TrackFault) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
     all.set_item("kind", fault.kind.name())?;
@@ -33,7 +33,7 @@ pub fn pair(e: Estimate) -> ValueWithError {
     (e.value, e.standard_error)
 }
 
-/// The standard error for an array: NaN if there is none.
+/// The standard error as an array element: NaN if there is none.
 pub fn error_or_nan(e: Estimate) -> f64 {
     e.standard_error.unwrap_or(f64::NAN)
 }
@@ -46,7 +46,7 @@ pub fn verdict(v: &Verdict) -> VerdictParts {
     (v.level.name(), reasons, v.notes().map(str::to_owned).collect())
 }
 
-/// How a search ended.
+/// Termination of a search.
 pub fn termination<'py>(py: Python<'py>, found: Termination) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
     all.set_item("reason", found.reason.to_string())?;
@@ -126,7 +126,7 @@ pub fn plain_margins<'py>(py: Python<'py>, m: &Margins) -> PyResult<Bound<'py, P
     Ok(all)
 }
 
-/// Settings that were used, by their printed names.
+/// Settings used, by their displayed names.
 pub fn settings(all: &[hoid_analysis::Setting]) -> Vec<(String, String, bool)> {
     let parts = |one: &hoid_analysis::Setting| (one.name.clone(), one.value.clone(), one.given);
     all.iter().map(parts).collect()

@@ -208,7 +208,7 @@ impl PyFit {
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
         let found = match self.grey_box() {
             Some(grey_box) => grey_box.covariance(),
-            // An operator of the family has its own, of its coordinates.
+            // An operator of the family has its own covariance, of its coordinates.
             None if self.fit.is_grey_box() => None,
             None => self.fit.covariance(),
         };

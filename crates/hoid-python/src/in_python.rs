@@ -1,8 +1,8 @@
-//! Messages of the libraries, which name options as they are typed, in the words of Python.
+//! Conversion of messages of the libraries, which name command-line options, to Python keywords.
 //!
 //! `--new-fs 50` is `new_sampling_frequency=50`, `--fill` is `fill=True`, `--trial t=1` is `trial="t=1"`. A word after
-//! an option is its value where it is a placeholder (`HZ`), an assignment, or one of [`VALUES`]; any other continues
-//! with the sentence.
+//! an option is its value if it is a placeholder (`HZ`), an assignment, or one of [`VALUES`]; any other word continues
+//! the sentence.
 
 use pyo3::pyfunction;
 
@@ -72,7 +72,7 @@ pub fn in_python(message: &str) -> String {
     text
 }
 
-/// The value that follows an option, and anything after it.
+/// The value that follows an option, and the remaining text.
 fn value_behind(rest: &str) -> Option<(&str, &str)> {
     let word = rest.strip_prefix(' ')?;
     let end = word.find([' ', ';', ')']).unwrap_or(word.len());

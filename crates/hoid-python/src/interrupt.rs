@@ -1,6 +1,6 @@
-//! Long work that an interrupt can end.
+//! Long computations that an interrupt can end.
 //!
-//! It runs in a thread of its own, while this one asks the interpreter for signals.
+//! The computation runs in a separate thread, while this one checks the interpreter for signals.
 
 use std::{
     sync::{
@@ -19,7 +19,7 @@ use crate::errors::{Failure, Outcome, bad_option};
 /// Time between two checks for signals.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Common parts of the work and the waiting thread.
+/// State shared by the computation and the waiting thread.
 #[derive(Debug, Default)]
 pub struct RunStatus {
     stopped: AtomicBool,
@@ -28,34 +28,34 @@ pub struct RunStatus {
 }
 
 impl RunStatus {
-    /// False once the work has to stop.
+    /// False once the computation has to stop.
     pub fn goes_on(&self) -> bool {
         !self.stopped.load(Ordering::Relaxed)
     }
 
-    /// One more is done.
+    /// Counts one more completed unit.
     pub fn inc(&self) {
         self.done.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Completed share of the work.
+    /// Sets the completed and the total number of units.
     pub fn set(&self, done: u64, total: u64) {
         self.total.store(total, Ordering::Relaxed);
         self.done.store(done, Ordering::Relaxed);
     }
 }
 
-/// Does work that reports how far it is, and informs the waiting thread.
+/// Runs a computation that reports its progress to the waiting thread.
 pub fn told<T>(status: &Arc<RunStatus>, work: impl FnOnce() -> T) -> T {
     let status = Arc::clone(status);
     progress::watched(move |step| status.set(step.done as u64, step.total as u64), work)
 }
 
-/// Runs the work without the interpreter and returns its result.
+/// Runs the computation without the interpreter and returns its result.
 ///
-/// `progress` is called with the work done and the whole work. An interrupt asks the work to stop.
-/// `patient` work listens and is waited for, so that files are complete; other work is left to end
-/// in its thread.
+/// `progress` is called with the completed and the total work. An interrupt asks the computation to
+/// stop. `patient` computations react to it and are awaited, so that files are complete; others are
+/// left to end in their thread.
 pub fn run<T: Send + 'static, E: Send + 'static + Into<Failure>>(
     py: Python<'_>,
     total: u64,
@@ -70,7 +70,7 @@ pub fn run<T: Send + 'static, E: Send + 'static + Into<Failure>>(
     let thread = std::thread::Builder::new().name("hoid".to_owned());
     thread
         .spawn(move || {
-            // After an interrupt no one listens any more.
+            // After an interrupt the receiver is gone.
             let _ = send.send(work(&shared));
         })
         .map_err(|error| bad_option(format!("the system cannot start a thread: {error}")))?;

@@ -1,8 +1,8 @@
 //! The native module of the Python package `pyhoid`: conversion only.
 //!
-//! The libraries compute; what people write and read is in `python/src/pyhoid`, which brings
-//! arguments into plain form (floats, contiguous arrays, dictionaries) and wraps the results. Long
-//! work runs without the interpreter.
+//! The libraries compute; the user interface is in `python/src/pyhoid`, which converts arguments to
+//! plain types (floats, contiguous arrays, dictionaries) and wraps the results. Long computations
+//! run without the interpreter.
 //!
 //! | module | contents |
 //! |---|---|

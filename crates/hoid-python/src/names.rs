@@ -1,4 +1,4 @@
-//! The words of Python, those of the command line, and what they represent in the libraries.
+//! Words of the Python interface, those of the command line, and their meaning in the libraries.
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
@@ -35,7 +35,7 @@ pub fn choice<T: NamedChoice>(option: &str, found: &str) -> Outcome<T> {
     word(option, found, &words)
 }
 
-/// Parts that can be left out of a record.
+/// Kind of places that can be excluded from a record.
 pub fn quality_issue_kind(found: &str) -> Outcome<QualityIssueKind> {
     let kinds = [
         QualityIssueKind::Missing,
@@ -70,7 +70,7 @@ pub fn remnant_discretisation(found: &str) -> Outcome<RemnantDiscretisation> {
     choice("discretisation", found)
 }
 
-/// The keyword of an option: its name, except for a word that Python keeps for itself.
+/// The keyword of an option: its name, except for a word that is reserved in Python.
 pub fn keyword(name: &'static str) -> &'static str {
     match name {
         "lambda" => "forgetting_factor",
@@ -96,7 +96,7 @@ pub fn discretisation(found: &str, prewarp_rad_s: Option<f64>) -> Outcome<discre
     word("method", found, &words)
 }
 
-/// Both ends included.
+/// A range including both ends.
 pub fn range(option: &str, ends: (usize, usize)) -> Outcome<RangeInclusive<usize>> {
     if ends.0 > ends.1 {
         return Err(bad_option(format!(

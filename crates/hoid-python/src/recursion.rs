@@ -1,4 +1,4 @@
-//! The options of `pyhoid.track` and `pyhoid.Tracker`: from plain form to that of the library.
+//! The options of `pyhoid.track` and `pyhoid.Tracker`: conversion to those of the library.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +16,7 @@ use crate::{
     names,
 };
 
-/// A keyword, None for one that was not given.
+/// The value of a keyword; None if it was not given.
 fn get<'py, T>(options: &Bound<'py, PyDict>, name: &str) -> Outcome<Option<T>>
 where
     T: for<'a> FromPyObject<'a, 'py>,
@@ -34,7 +34,7 @@ where
     }
 }
 
-/// A recursion from its keywords.
+/// Creates the request of a recursion from its keywords.
 pub fn request(options: &Bound<'_, PyDict>) -> Outcome<TrackRequest> {
     let text = |name: &str| get::<String>(options, name);
     let delay: Option<(f64, f64)> = get(options, "delay")?;
@@ -61,11 +61,11 @@ pub fn request(options: &Bound<'_, PyDict>) -> Outcome<TrackRequest> {
     })
 }
 
-/// The method with its options, which come as texts by name.
+/// The method with its options, which are texts by name.
 fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
     let mut method = match get::<String>(options, "method")? {
         Some(name) => {
-            // In a pickle there may be an earlier name.
+            // A pickle may contain an earlier name.
             let name = renamed_method(&name).map_or(name, |(now, _)| now.to_owned());
             let words = hoid_survey::methods().into_iter().map(|method| (method.name(), method));
             names::word("method", &name, &words.collect::<Vec<_>>())?
@@ -73,7 +73,7 @@ fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
         None => Method::default(),
     };
     let mut given: BTreeMap<String, String> = get(options, "settings")?.unwrap_or_default();
-    // In the order of the registry: what belongs to a way of forgetting comes after it.
+    // In the order of the registry: options that depend on a kind of forgetting come after it.
     for setting in hoid_survey::registry().into_iter().flat_map(|spec| spec.settings) {
         let Some(text) = given.remove(setting.name) else {
             continue;
@@ -91,7 +91,7 @@ fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
         let wrong = |error: IdentError| bad_option(format!("{keyword}: {error}"));
         method.set(setting.name, &text).map_err(wrong)?;
     }
-    // An earlier fit of the person, and where its text is from.
+    // An earlier fit of the person, and the origin of its text.
     if let Some((text, source)) = get::<(String, String)>(options, "fit")? {
         let fit = parse_fit(&text, &source).and_then(FitFile::operator)?;
         method.start_from(fit)?;

@@ -140,7 +140,7 @@ pub fn margins<'py>(
             row.set_item("remnant_order", order)?;
             row.set_item("noise_level", level)?;
             row.set_item("definition", noise_definition)?;
-            // A level out of reach is a row of the table; any other error concerns all of them.
+            // A level that cannot be reached is a row of the table; any other error concerns all of them.
             match scenario.remnant_gain_for(&state, order, level, definition) {
                 Ok(k_n) => row.set_item("K_n", k_n)?,
                 Err(reason @ ModelError::UnreachableNoiseLevel { .. }) => {

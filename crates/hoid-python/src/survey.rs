@@ -1,4 +1,4 @@
-//! `pyhoid.info`: what is in a file, as `hoid info --json` reports it.
+//! `pyhoid.info`: contents of a file, as reported by `hoid info --json`.
 
 use std::path::PathBuf;
 

@@ -134,7 +134,7 @@ impl PyTimeVaryingFit {
         let gains: Vec<GainsAt> = times.iter().map(|t| self.0.fit.gains_at(*t)).collect();
         let all = PyDict::new(py);
         all.set_item("t", array(py, times))?;
-        // The names are there without times too.
+        // The names exist even without times.
         for (i, of) in self.0.fit.gains_at(0.0).gains.iter().enumerate() {
             all.set_item(
                 of.name,

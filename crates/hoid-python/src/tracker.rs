@@ -1,4 +1,4 @@
-//! `pyhoid.Tracker`: a recursive estimate, live.
+//! `pyhoid.Tracker`: a recursive estimate, online.
 
 use hoid_ident::{Choice, IdentError};
 use hoid_model::{Decimation, Decimator, Orders, Record, SampleTime};
@@ -14,7 +14,7 @@ use crate::{
     recursion,
 };
 
-/// Longest warm-up in samples.
+/// Maximum length of the warm-up, samples.
 const LONGEST_WARM_UP: usize = 10_000_000;
 
 /// The state of a tracker, to restore it: orders, numbers of the tracker, numbers of the warm-up.

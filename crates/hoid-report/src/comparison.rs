@@ -12,7 +12,7 @@ fn name(quantity: &Quantity) -> String {
     }
 }
 
-/// People by condition, with the means and their intervals, a panel for each quantity.
+/// Persons by condition, with the means and their intervals, one panel for each quantity.
 pub fn comparison_figure(comparison: &Comparison) -> String {
     let mut places: Vec<(&str, &str)> = Vec::new();
     let mut people: Vec<&str> = Vec::new();

@@ -1,32 +1,32 @@
-//! Why a report could not be made.
+//! Errors of reports.
 
 use hoid_io::IoError;
 use hoid_study::StudyError;
 use thiserror::Error;
 
-/// Everything that stops a report. A model that does not convert or a record that cannot be
-/// validated is not an error: the page shows the reason in its place.
+/// Errors that prevent a report. A model that cannot be converted or a record that cannot be
+/// validated is not an error: the page shows the reason instead.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ReportError {
-    /// Nothing to report.
+    /// No model to report.
     #[error("the report has no model; expected at least one fitted model")]
     NoModels,
     /// No recursive estimate to report.
     #[error("the report has no trace; expected one to {most} recursive estimates")]
     NoTraces {
-        /// Most traces of a page.
+        /// Maximum number of traces of a page.
         most: usize,
     },
-    /// More recursive estimates than a figure can show over each other.
+    /// More recursive estimates than a figure can show.
     #[error("the report has {found} traces, expected at most {most}: write a second report for the others")]
     TooManyTraces {
         /// Number of traces given.
         found: usize,
-        /// Most traces of a page.
+        /// Maximum number of traces of a page.
         most: usize,
     },
-    /// A recursive estimate without a row.
+    /// A recursive estimate without rows.
     #[error("the trace {name:?} has no row, expected one or more: track a record that has samples")]
     EmptyTrace {
         /// Name of the trace.
@@ -38,16 +38,16 @@ pub enum ReportError {
     /// A study that failed.
     #[error(transparent)]
     Study(Box<StudyError>),
-    /// A figure that cannot be made in the format that was requested.
+    /// A figure that cannot be written in the requested format.
     #[error("the figure cannot be written in this format: {reason}")]
     Figure {
-        /// Why.
+        /// Reason.
         reason: String,
     },
-    /// The page template could not be filled: a defect of this crate.
+    /// A page template that could not be rendered: a defect of this crate.
     #[error("the page template could not be filled: {reason}; please report this as a defect")]
     Template {
-        /// Report of the template engine.
+        /// Error of the template engine.
         reason: String,
     },
 }

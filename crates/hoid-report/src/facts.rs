@@ -4,7 +4,7 @@ use hoid_analysis::{Account, Setting};
 use hoid_io::{QualityIssue, Step};
 use hoid_model::Fault;
 
-/// The processing and its inputs: version, records, settings, the processing of the records and the problems of them.
+/// Inputs and processing: version, records, settings, steps applied to the records and their problems.
 pub fn facts(names: &[String], settings: &[Setting], accounts: &[Account]) -> Vec<(String, String)> {
     let records = if names.len() == 1 { "record" } else { "records" };
     let mut rows = vec![

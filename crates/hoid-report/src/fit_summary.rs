@@ -1,5 +1,5 @@
-//! The head of a page: the verdict on the result, what it reports in a sentence, and the parameters
-//! with their errors. Everything else on a page explains it.
+//! The head of a page: the verdict on the result, a summary in one sentence, and the parameters
+//! with their errors. The rest of the page supports it.
 
 use hoid_model::{Verdict, VerdictLevel, numbers::significant, uncertainty::Estimate};
 use minijinja::{Value, context};
@@ -9,24 +9,24 @@ use crate::cells;
 /// Results of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitSummary {
-    /// The verdict on it.
+    /// Verdict on the fit.
     pub verdict: Verdict,
-    /// The answer as text, as [`sentence`] makes it.
+    /// The result as a sentence, made by [`sentence`].
     pub sentence: Option<String>,
-    /// The parameters; none if the models of the page state them.
+    /// The parameters; none if the models of the page list them.
     pub parameters: Vec<ParameterRow>,
 }
 
-/// A parameter of an answer.
+/// A parameter of a result.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterRow {
-    /// Its name, as `T_L`.
+    /// Its name, such as `T_L`.
     pub name: String,
     /// Its unit, empty if it has none or none was declared.
     pub unit: String,
     /// Value and standard error; none if it is not determined.
     pub estimate: Option<Estimate>,
-    /// The interval of 95 %; an end that is open is infinite.
+    /// The 95 % interval; an open end is infinite.
     pub interval: Option<(f64, f64)>,
     /// Notes on it, such as the share of a prior.
     pub remark: String,
@@ -76,15 +76,15 @@ const WORDS: [(&str, &str, &str); 7] = [
     ("delay", "tau_e", " s"),
 ];
 
-/// The answer as text: "gain 6.1, lead 0.60 s, delay 0.15 s; crossover 2.9 ± 0.1 rad/s, phase margin 34 ± 3°". A
-/// parameter that is missing or not finite is left out, and so is the loop; `None` if nothing is left.
+/// The result as text: "gain 6.1, lead 0.60 s, delay 0.15 s; crossover 2.9 ± 0.1 rad/s, phase margin 34 ± 3°". A
+/// parameter that is missing or not finite is omitted, and so is the loop; `None` if nothing remains.
 pub fn sentence<'a>(
     parameters: impl IntoIterator<Item = (&'a str, f64)>,
     crossover_rad_s: Option<Estimate>,
     phase_margin_deg: Option<Estimate>,
 ) -> Option<String> {
     let known: Vec<(&str, f64)> = parameters.into_iter().filter(|(_, value)| value.is_finite()).collect();
-    // K/T_I is reported where the gain itself is not known.
+    // K/T_I is given if the gain itself is not determined.
     let has_gain = known.iter().any(|(name, _)| *name == "K");
     let of = |(word, name, unit): &(&str, &str, &str)| {
         let found = known.iter().find(|(known, _)| known == name);

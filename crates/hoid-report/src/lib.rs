@@ -1,8 +1,8 @@
 //! Figures and HTML pages about identified models.
 //!
-//! A fit is a list of numbers; whether to believe it shows in pictures: the frequency response with
-//! its bands, the residual tests, the simulated output over the measured one. A [`Report`] puts
-//! them on one page, with styles and figures inside the file:
+//! A fit is a list of numbers; its reliability is seen in figures: the frequency response with its
+//! bands, the residual tests, the simulated and the measured output. A [`Report`] puts them on one
+//! page, with styles and figures inside the file:
 //!
 //! ```
 //! use hoid_ident::Estimator;
@@ -49,7 +49,7 @@
 //! | [`numbers`] | numbers with as many digits as their standard error allows |
 //! | [`render_with`], [`write_page`], [`write_report`] | templates of one's own in the same style, and pages into files |
 //!
-//! Nothing here prints, and the same data give the same bytes.
+//! This crate prints nothing, and the same data give the same bytes.
 
 mod cells;
 mod comparison;

@@ -1,5 +1,5 @@
-//! The figure of a fit of polynomials: the model through the describing function of the records, where they have a
-//! periodic excitation; else its frequency response with the bands of its coefficients.
+//! The figure of a polynomial model: the model with the describing function of the records, if they have a periodic
+//! excitation; otherwise its frequency response with the bands of its coefficients.
 
 use hoid_ident::{Fit, frequency::Description};
 use hoid_model::Record;
@@ -9,10 +9,10 @@ use crate::{
     figures::{BodeModel, ModelCurve, bode, describing},
 };
 
-/// A polynomial model in a figure.
+/// The figure of a polynomial model.
 pub fn model_figure(fit: &Fit, records: &[Record], described: Option<&Description>) -> String {
     let title = fit.title();
-    // What is after the semicolon does not fit below a figure of one column.
+    // The text after the semicolon does not fit below a figure with one column.
     let title = title.split(';').next().unwrap_or(&title).to_owned();
     let delay_s = fit.orders().nk as f64 * fit.model().sample_time().s();
     match described {
@@ -32,7 +32,7 @@ pub fn model_figure(fit: &Fit, records: &[Record], described: Option<&Descriptio
     }
 }
 
-/// The same for a page; none without a describing function, as the page has the response anyway.
+/// The same for a page; none without a describing function, since the page contains the response anyway.
 pub fn model_picture(fit: &Fit, records: &[Record], described: Option<&Description>) -> Option<Picture> {
     let svg = model_figure(fit, records, Some(described?));
     Some(Picture {

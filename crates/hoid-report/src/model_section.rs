@@ -1,4 +1,4 @@
-//! One model of a page: the fit, its records and what is known next to them.
+//! One model of a page: the fit, its records, and additional information.
 
 use hoid_ident::{
     Choice, Fit, MarginEstimates,
@@ -13,13 +13,13 @@ pub struct ModelSection<'a> {
     pub name: String,
     /// The model.
     pub fit: &'a Fit,
-    /// The records that it was fitted on.
+    /// The records of the fit.
     pub records: &'a [Record],
-    /// The search that chose its orders, if there was one.
+    /// The search that selected its orders, if there was one.
     pub candidates: Option<&'a Choice>,
-    /// The operator after the records, where it is known (simulation).
+    /// The true operator, if known (simulation).
     pub truth: Option<OperatorParameters>,
-    /// Margins of the loop of this model and the controlled element, where that is known.
+    /// Margins of the loop of this model and the controlled element, if known.
     pub margins: Option<MarginEstimates>,
 }
 
@@ -41,12 +41,12 @@ impl ModelSection<'_> {
     }
 }
 
-/// The operator of records that carry the truth, when it is the same throughout (a simulated run
-/// without a change).
+/// The operator of records that contain the true parameters, if they are constant throughout (a
+/// simulated run without a change).
 pub fn known_operator(records: &[Record]) -> Option<OperatorParameters> {
     let constant = |name: &str| {
         let first = *records.first()?.channel(name)?.first()?;
-        // A sigmoid far from its middle still moves in the last digits.
+        // A sigmoid far from its middle still changes the last digits.
         let same = |v: &f64| (v - first).abs() <= 1e-6 * first.abs();
         records
             .iter()

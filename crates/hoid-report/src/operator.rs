@@ -1,4 +1,4 @@
-//! The page and the figure of the operator of a person, as `hoid identify` and Python write them.
+//! The page and the figure of the operator of a person, as written by `hoid identify` and in Python.
 
 use hoid_analysis::Identified;
 use hoid_ident::{
@@ -54,8 +54,8 @@ impl<'a> Report<'a> {
     }
 }
 
-/// The figure of an operator: through the describing function of its records, where they have a periodic excitation;
-/// else its frequency response with its bands.
+/// The figure of an operator: with the describing function of its records, if they have a periodic excitation;
+/// otherwise its frequency response with its bands.
 pub fn operator_figure(found: &Identified) -> String {
     match &found.described {
         Some(described) => picture(&found.fit, described),
@@ -63,7 +63,7 @@ pub fn operator_figure(found: &Identified) -> String {
     }
 }
 
-/// The answer of an operator as text.
+/// The result for an operator as a sentence.
 pub fn sentence_of_operator(found: &Identified) -> Option<String> {
     let known = found.fit.operator(0).parameters.iter().filter(|p| p.determined);
     let element = found.controlled_element.as_ref();
@@ -75,7 +75,7 @@ pub fn sentence_of_operator(found: &Identified) -> Option<String> {
     )
 }
 
-/// Mark of a parameter that the data do not determine; empty otherwise.
+/// Mark of a parameter that the data do not determine; otherwise empty.
 pub fn undetermined(p: &Parameter) -> &'static str {
     match (p.determined, p.prior_share > 0.5) {
         (true, _) => "",
@@ -162,7 +162,7 @@ fn through_describing_function(fit: &FamilyFit, described: &Description) -> Pict
     }
 }
 
-/// The operator through the describing function.
+/// The figure of the operator with the describing function.
 fn picture(fit: &FamilyFit, described: &Description) -> String {
     let title = format!("{} through the describing function", fit.form);
     describing("describing", &title, described, &curves(fit, described))

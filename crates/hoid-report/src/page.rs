@@ -1,4 +1,4 @@
-//! The templates of the pages, how they are filled, and how a page is written.
+//! Rendering of the page templates, and writing of pages.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ const TEMPLATES: [(&str, &str); 5] = [
     ("style.css", include_str!("../templates/style.css")),
 ];
 
-/// The page of a template of this crate with its values.
+/// Renders a template of this crate with its values.
 ///
 /// # Errors
 /// [`ReportError::Template`] for a defect of this crate.
@@ -23,11 +23,11 @@ pub(crate) fn render(name: &str, values: Value) -> Result<String, ReportError> {
     render_with(&[], name, values)
 }
 
-/// The page of a template, which may be one of `own`: name and text of templates next to those of
-/// this crate, whose parts and style they can use.
+/// Renders a template, which may be one of `own`: names and texts of additional templates, which
+/// can use the parts and style of those of this crate.
 ///
 /// # Errors
-/// [`ReportError::Template`] where the template cannot be filled.
+/// [`ReportError::Template`] if the template cannot be rendered.
 pub fn render_with(own: &[(&str, &str)], name: &str, values: Value) -> Result<String, ReportError> {
     let defect = |e: minijinja::Error| ReportError::Template { reason: e.to_string() };
     let mut environment = Environment::new();
@@ -49,20 +49,20 @@ pub(crate) fn facts(pairs: &[(String, String)]) -> Vec<Value> {
     pairs.iter().map(|(label, text)| context! { label, text }).collect()
 }
 
-/// Writes a page into a directory.
+/// Writes a page to a directory.
 ///
 /// # Errors
-/// [`ReportError::Io`] when it cannot be written.
+/// [`ReportError::Io`] if it cannot be written.
 pub fn write_page(directory: &Path, name: &str, html: &str) -> Result<PathBuf, ReportError> {
     let path = directory.join(name);
     write_atomically(&path, |file| file.write_all(html.as_bytes()))?;
     Ok(path)
 }
 
-/// Writes a page as `report.html` into a directory, which is made if it is missing.
+/// Writes a page as `report.html` to a directory, which is created if it does not exist.
 ///
 /// # Errors
-/// [`ReportError::Io`] when it cannot be written.
+/// [`ReportError::Io`] if it cannot be written.
 pub fn write_report(directory: &Path, html: &str) -> Result<PathBuf, ReportError> {
     make_directory(directory)?;
     write_page(directory, "report.html", html)

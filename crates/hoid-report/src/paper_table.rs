@@ -1,9 +1,9 @@
 //! A result as a table for a paper: estimates with errors and intervals, in LaTeX (`.tex`, booktabs), Markdown
 //! (`.md`), or as data (CSV and the other formats of tables).
 //!
-//! The table is read from the object of the result ([`hoid_analysis::json`]), so that it reports what the JSON states.
-//! In LaTeX and Markdown a value has the digits that two digits of its error need; as data every number has all of its
-//! own, an error in a column after its value.
+//! The table is read from the JSON object of the result ([`hoid_analysis::json`]), so that both agree. In LaTeX and
+//! Markdown a value has the digits that two digits of its error need; in data files every number has all digits, and an
+//! error is in the column after its value.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use serde_json::{Map, Value};
 /// A table of a result.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PaperTable {
-    /// What it is of, a line each.
+    /// Comments, one per line.
     comments: Vec<String>,
     columns: Vec<Column>,
 }
@@ -29,7 +29,7 @@ struct Column {
 enum Cells {
     Text(Vec<String>),
     Number(Vec<f64>),
-    /// Values with their standard errors, which are in a column of this name as data.
+    /// Values with their standard errors, which are in a column of this name in data files.
     Estimate(Vec<[f64; 2]>, String),
     /// Ends of intervals, written with the digits of these errors.
     End(Vec<[f64; 2]>),
@@ -46,7 +46,7 @@ struct Row {
 }
 
 impl PaperTable {
-    /// The table of a result, by its object; `None` if nothing in it is an estimate.
+    /// The table of a result, from its object; `None` if it contains no estimate.
     pub fn of(object: &Map<String, Value>) -> Option<Self> {
         let text = |key: &str| object.get(key).and_then(Value::as_str).unwrap_or_default();
         let level = object.get("verdict").and_then(|verdict| verdict["level"].as_str());
@@ -66,7 +66,7 @@ impl PaperTable {
         filled.then_some(Self { comments, columns })
     }
 
-    /// Whether a table can be written to a place of this name.
+    /// Checks that a table can be written to a file of this name.
     ///
     /// # Errors
     /// [`IoError::UnknownFormat`].
@@ -77,10 +77,10 @@ impl PaperTable {
         }
     }
 
-    /// Writes it, whole or not at all, in the format that the extension represents.
+    /// Writes the table atomically, in the format of the extension.
     ///
     /// # Errors
-    /// The errors of [`PaperTable::check`] and of writing.
+    /// Those of [`PaperTable::check`] and of writing.
     pub fn write(&self, path: &Path) -> Result<(), IoError> {
         match Markup::of(path) {
             Some(markup) => {
@@ -143,7 +143,7 @@ impl Cells {
         }
     }
 
-    /// A column in which every cell is empty is left out of a text.
+    /// True unless all cells are empty; an empty column is left out of a text.
     fn says_something(&self) -> bool {
         match self {
             Self::Text(all) => all.iter().any(|text| !text.is_empty()),
@@ -172,17 +172,17 @@ fn column(name: &str, cells: Cells) -> Column {
     }
 }
 
-/// A number of the object; what is null is none.
+/// A number of the object; NaN for null.
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or(f64::NAN)
 }
 
-/// Parameters, those of the operator its position apart, and the loop.
+/// Parameters (those of the operator by position) and the loop.
 fn of_estimates(object: &Map<String, Value>) -> Vec<Column> {
     let none = Value::Null;
     let at = |object: &Map<String, Value>, key: &str| object.get(key).cloned().unwrap_or_default();
     let worth = &object.get("verdict").unwrap_or(&none)["of"];
-    // A trace is known by its last row.
+    // A trace is represented by its last row.
     let last = object
         .get("kind")
         .filter(|kind| *kind == "trace")
@@ -263,7 +263,7 @@ fn of_lines(lines: &[Value]) -> Vec<Column> {
     ]
 }
 
-/// The people of a group, one a row.
+/// The people of a group, one per row.
 fn of_people(people: &[Value]) -> Vec<Column> {
     let text =
         |of: &dyn Fn(&Value) -> Option<String>| Cells::Text(people.iter().map(|p| of(p).unwrap_or_default()).collect());
@@ -308,7 +308,7 @@ fn of_people(people: &[Value]) -> Vec<Column> {
     columns
 }
 
-/// The differences of a comparison, one a row.
+/// The differences of a comparison, one per row.
 fn of_differences(all: &[Value]) -> Vec<Column> {
     let text = |of: &dyn Fn(&Value) -> String| Cells::Text(all.iter().map(of).collect());
     let word = |d: &Value, key: &str| d[key].as_str().unwrap_or_default().to_owned();
@@ -343,7 +343,7 @@ fn of_differences(all: &[Value]) -> Vec<Column> {
     ]
 }
 
-/// How a table is written as a text.
+/// Markup language of a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Markup {
     Latex,
@@ -360,7 +360,7 @@ impl Markup {
         }
     }
 
-    /// A name or a word; of a parameter its symbol.
+    /// A name or a word; for a parameter its symbol.
     fn name(self, text: &str) -> String {
         let text = match text {
             "low" => "95 % from",
@@ -431,7 +431,7 @@ impl Markup {
     }
 }
 
-/// A letter that LaTeX takes for itself.
+/// Escapes a special character of LaTeX.
 fn escaped(c: char) -> String {
     match c {
         '\\' => "\\textbackslash{}".to_owned(),
@@ -442,7 +442,7 @@ fn escaped(c: char) -> String {
     }
 }
 
-/// `1.2e-7` as a power of ten.
+/// Formats `1.2e-7` as a power of ten.
 fn power(number: &str) -> String {
     match number.split_once('e') {
         Some((mantissa, exponent)) => format!("{mantissa} \\times 10^{{{exponent}}}"),

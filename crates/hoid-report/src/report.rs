@@ -14,23 +14,23 @@ use crate::{
     page, tables,
 };
 
-/// Records of a model whose time response is drawn.
+/// Maximum number of records of a model whose time response is drawn.
 const MOST_TIME_RESPONSES: usize = 4;
 
-/// Subject of the page.
+/// Content of the page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report<'a> {
     /// Heading of the page.
     pub title: String,
-    /// The processing and its inputs, as name and value: command, versions, records, span, seed.
+    /// Inputs and processing, as name and value: command, versions, records, span, seed.
     pub settings: Vec<(String, String)>,
     /// The models, one section each.
     pub models: Vec<ModelSection<'a>>,
     /// Remarks for the reader, such as warnings of the command.
     pub notes: Vec<String>,
-    /// Results of the fit, on top of the page.
+    /// Summary of the fit, at the top of the page.
     pub answer: Option<FitSummary>,
-    /// Figures that answer what was asked, before all others.
+    /// Figures of the main result, before all others.
     pub pictures: Vec<Picture>,
 }
 
@@ -39,12 +39,12 @@ pub struct Report<'a> {
 pub struct Picture {
     /// The figure, as SVG text.
     pub svg: String,
-    /// Caption, in a sentence.
+    /// Caption, one sentence.
     pub caption: String,
 }
 
 impl<'a> Report<'a> {
-    /// A report about a fit to records, with the search that chose its orders.
+    /// A report about a fit to records, with the search that selected its orders.
     pub fn of(title: &str, records: &'a [Record], choice: &'a Choice) -> Self {
         Self {
             title: title.to_owned(),
@@ -208,7 +208,7 @@ fn residual_tests(index: usize, name: &str, record: &Record, validation: &Valida
     }
 }
 
-/// Number of values outside the bounds among the chosen lags.
+/// Number of values outside the bounds among the selected lags.
 fn outside(correlation: &Correlation, of: impl Fn(i64) -> bool) -> usize {
     let pairs = correlation.lags.iter().zip(&correlation.values);
     pairs.filter(|(k, v)| of(**k) && v.abs() > correlation.bound_99).count()

@@ -1,5 +1,5 @@
-//! The tables of the page as values for the template. Where a number does not exist there is a dash
-//! and, next to it, the reason.
+//! The tables of the page as template values. A missing number is a dash, with the reason next to
+//! it.
 
 use hoid_ident::{
     Choice, Fit, InitialState, MarginEstimates,
@@ -15,7 +15,7 @@ use crate::{
     numbers::{DASH, Z_95, fixed, interval, plain, with_uncertainty},
 };
 
-/// Longest table of candidates.
+/// Maximum number of candidates in a table.
 const MOST_CANDIDATES: usize = 30;
 
 fn true_value(name: &str, truth: &OperatorParameters) -> Option<f64> {
@@ -32,7 +32,7 @@ fn true_value(name: &str, truth: &OperatorParameters) -> Option<f64> {
 
 const OPERATOR_NAMES: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 
-/// One column a model, one row a quantity.
+/// One column per model, one row per quantity.
 pub fn comparison(models: &[ModelSection<'_>], qualities: &[Result<GoodnessOfFit, String>]) -> Value {
     let row = |label: Value, unit: &str, cells: Vec<Value>, truth: Option<String>| {
         context! { label, unit, cells, truth => truth.unwrap_or_default() }
@@ -98,7 +98,7 @@ pub fn comparison(models: &[ModelSection<'_>], qualities: &[Result<GoodnessOfFit
     }
 }
 
-/// The truth, when all models that have one have the same.
+/// The true operator, if it is the same for all models that have one.
 fn common_truth(models: &[ModelSection<'_>]) -> Option<OperatorParameters> {
     let mut known = models.iter().filter_map(|m| m.truth);
     let first = known.next()?;
@@ -112,7 +112,7 @@ fn output_unit(records: &[Record]) -> String {
         .unwrap_or_default()
 }
 
-/// The unit of the outputs, when all models have the same.
+/// The unit of the outputs, if it is the same for all models.
 fn common_output_unit(models: &[ModelSection<'_>]) -> String {
     let first = models.first().map(|m| output_unit(m.records)).unwrap_or_default();
     if models.iter().all(|m| output_unit(m.records) == first) {
@@ -145,7 +145,7 @@ pub fn coefficients(fit: &Fit) -> Vec<Value> {
     rows.collect()
 }
 
-/// The operator's parameters, or why there are none.
+/// The parameters of the operator, or the reason why there are none.
 pub fn operator(fit: &Fit, truth: Option<&OperatorParameters>, gain: &GainUnit) -> Value {
     let estimate = match fit.operator() {
         Ok(estimate) => estimate,
@@ -171,12 +171,12 @@ pub fn operator(fit: &Fit, truth: Option<&OperatorParameters>, gain: &GainUnit) 
     context! { rows, has_truth => truth.is_some() }
 }
 
-/// The units of gains, of what the records are measured in.
+/// The units of gains, from those of the records.
 pub fn gain_unit(records: &[Record]) -> GainUnit {
     records.first().map(GainUnit::of).unwrap_or_default()
 }
 
-/// T_n and K_n by each discretisation, or why not.
+/// T_n and K_n by each discretisation, or the reason why there are none.
 pub fn remnant(fit: &Fit) -> Vec<Value> {
     let ways = [
         (
@@ -185,7 +185,7 @@ pub fn remnant(fit: &Fit) -> Vec<Value> {
         ),
         (RemnantDiscretisation::BackwardEuler, "backward Euler"),
     ];
-    // A grey box has fitted the remnant as it is held.
+    // A grey-box model includes the hold of the remnant.
     let count = if fit.is_grey_box() { 1 } else { ways.len() };
     let rows = ways.into_iter().take(count).map(|(how, name)| match fit.remnant(how) {
         Ok(r) => context! { how => name, order => r.order, t_n => cell(r.t_n_s), k_n => cell(r.k_n) },
@@ -194,7 +194,7 @@ pub fn remnant(fit: &Fit) -> Vec<Value> {
     rows.collect()
 }
 
-/// The reason why no discretisation gives T_n and K_n, when it is the same for all.
+/// The reason why no discretisation gives T_n and K_n, if it is the same for all.
 pub fn no_remnant(fit: &Fit) -> Option<String> {
     if fit.orders().nd == 0 {
         return Some("the model has no polynomial D".to_owned());
@@ -204,7 +204,7 @@ pub fn no_remnant(fit: &Fit) -> Option<String> {
     (reason(RemnantDiscretisation::BackwardEuler)? == first).then_some(first)
 }
 
-/// How the fit came about: label and text.
+/// Course of the fit: label and text.
 pub fn course(fit: &Fit, records: &[Record]) -> Vec<Value> {
     let end = fit.termination();
     let (n, p, s) = (fit.residual_count(), fit.free_count(), fit.state_count());
@@ -333,7 +333,7 @@ pub fn candidates(choice: &Choice) -> Value {
             Err(reason) => failed.push((candidate.orders, reason.to_string())),
         }
     }
-    // Stable: equals stay in the order of the search.
+    // Stable sort: equal candidates stay in the order of the search.
     fitted.sort_by(|a, b| a.0.total_cmp(&b.0));
     let best = fitted.first().map_or(0.0, |f| f.0);
     let all = fitted.len() + failed.len();

@@ -72,7 +72,7 @@ fn section_of<'a>(html: &'a str, name: &str) -> &'a str {
     &html[start..start + end]
 }
 
-/// Properties of every page: nothing from outside, no NaN, no two equal ids, references that exist.
+/// Properties of every page: no external resources, no NaN, unique ids, valid references.
 fn check_page(html: &str) {
     let without_namespace = html.replace("xmlns=\"http://www.w3.org/2000/svg\"", "");
     for outside in ["http", "src=", "<link", "<script", "@import", "url(\"", "//cdn"] {
@@ -221,8 +221,8 @@ fn a_series_shorter_than_the_lags_has_its_figures() {
     check_page(&html);
     assert!(html.contains(&format!(" of {lags} lags outside")));
 
-    // A record that the model cannot be compared with gives the reason, one without a name its
-    // number.
+    // For a record that the model cannot be compared with the reason is given, for one without a
+    // name its number.
     let other = [cut(12), cut(1)];
     let html = page(vec![section("ARX", &fit, &other)]);
     check_page(&html);
@@ -316,7 +316,7 @@ fn figures_are_the_same_twice_and_bounded_for_unstable_models() {
     let stable = figures::time_response("a", &records[0], &validation);
     assert!(stable == figures::time_response("a", &records[0], &validation));
     assert!(stable.contains("u (deg)") && stable.contains("time (s)"));
-    // Peaks are kept and yet the figure is small: 3 lines of at most 682 points, twice.
+    // Peaks are preserved and yet the figure is small: 3 lines of at most 682 points, twice.
     assert!(stable.len() < 90_000, "{}", stable.len());
     for (k, v) in validation.simulated.iter_mut().enumerate() {
         *v = 1.2_f64.powi(k as i32);
@@ -347,7 +347,7 @@ fn bode_has_a_band_for_each_model_with_errors_and_the_dashed_truth() {
         sample_time: SampleTime::HUNDREDTH,
     };
     let svg = figures::bode("b", &[model("first", &arx), model("second", &bj)], &[truth]);
-    // Two panels with one band a model.
+    // Two panels with one band per model.
     assert_eq!(svg.matches("fill-opacity=\"0.22\"").count(), 4, "bands");
     assert_eq!(
         svg.matches("stroke-dasharray").count(),

@@ -15,7 +15,7 @@ use hoid_report::figures::{
 
 const PARAMETERS: [&str; 4] = ["a_1", "a_2", "b_0", "b_1"];
 
-/// Numbers between -1 and 1 that look random (a linear congruence).
+/// Pseudo-random numbers between -1 and 1 (a linear congruence).
 struct Noise(u64);
 
 impl Noise {
@@ -200,7 +200,7 @@ fn curve(name: &str, kind: LineKind, shade: Shade, points: impl IntoIterator<Ite
     }
 }
 
-/// Obtained against demanded noise level.
+/// Obtained against specified noise level.
 fn obtained() -> CurveGrid {
     let demanded: Vec<f64> = (0..=30).map(|k| 0.01 * f64::from(k)).collect();
     let panel = |m: usize| {
@@ -469,7 +469,7 @@ fn figures_are_whole_and_the_same_each_time() {
     for ((name, svg), (_, second)) in figures().iter().zip(&again) {
         assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>"), "{name}");
         assert!(!svg.contains("NaN") && !svg.contains("inf"), "{name}");
-        // Signs of subscripts are all tags.
+        // All subscript markers become tags.
         assert!(
             !svg.contains(['\u{e000}', '\u{e001}', '\u{e002}', '\u{e003}', '\u{e004}']),
             "{name}"

@@ -58,7 +58,7 @@ fn report<'a>(record: &'a Record, traces: Vec<TraceSection<'a>>) -> TrackReport<
     }
 }
 
-/// Properties of every page: nothing from outside, no NaN, no two equal ids, references that exist.
+/// Properties of every page: no external resources, no NaN, unique ids, valid references.
 fn check_page(html: &str) {
     let without_namespace = html.replace("xmlns=\"http://www.w3.org/2000/svg\"", "");
     for outside in ["http", "src=", "<link", "<script", "@import", "url(\"", "//cdn"] {
@@ -132,7 +132,7 @@ fn three_methods_over_each_other_show_all_that_is_asked_for() {
         "a and f share a panel"
     );
 
-    // Rows that do not convert are counted, with the reason.
+    // Rows that cannot be converted are counted, with the reason.
     let unconvertible = (0..traces[0].len())
         .filter(|row| traces[0].operator(*row).is_err())
         .count();
@@ -145,7 +145,7 @@ fn three_methods_over_each_other_show_all_that_is_asked_for() {
     for trace in &traces {
         assert!(html.contains(&format!("<td class=\"n\">{}</td>", trace.counts().samples)));
     }
-    // Relative error against the truth, by its definition.
+    // Relative error, by its definition.
     let k_e = record.channel("K_e").unwrap();
     let squares: Vec<f64> = (0..traces[2].len())
         .filter(|row| traces[2].times_s()[*row] >= 10.0)
@@ -190,7 +190,7 @@ fn a_recording_has_no_truth() {
     assert!(!html.contains("<b>") && !html.contains("<deg>"));
     assert!(!html.contains(">truth<") && !html.contains("Relative error"));
     assert!(!html.contains("Dashed") && !html.contains("dashes") && !html.contains("Dots in colour"));
-    // Only the operator's own parameters move, so that their errors are shown.
+    // Only the parameters of the operator are estimated, so that their errors are shown.
     assert!(html.contains("Standard errors of the parameters of the operator"));
 }
 
@@ -287,7 +287,7 @@ fn a_batch_fit_beside_a_delay_that_changed_has_the_delay_of_its_span() {
     let trace = track(&record, &with_delay, 8).unwrap();
     let (_, fit) = batch_fit(&trace, &record, SPANS[1]).unwrap();
     assert!((34..=36).contains(&fit.orders().nk), "{}", fit.orders());
-    // The trace has no row there that specifies otherwise: the start's.
+    // The trace has no row there: that of the start applies.
     assert_eq!(batch_fit(&trace, &record, SPANS[0]).unwrap().1.orders().nk, 29);
 }
 

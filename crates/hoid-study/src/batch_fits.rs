@@ -1,8 +1,8 @@
-//! The batch fits that the estimators of a cell need, each made once for all runs of a block.
+//! The batch fits that the estimators of a cell need, each computed once for all runs of a block.
 //!
 //! A recursion that starts from a fit of a span and an estimator that makes the same fit share it,
-//! and the fits of the runs are searched in one batch ([`Estimator::fit_each`]). The results do not
-//! depend on who shares a fit.
+//! and the fits of all runs are searched in one batch ([`Estimator::fit_each`]). The results do not
+//! depend on this sharing.
 
 use std::borrow::Cow;
 
@@ -14,20 +14,20 @@ use crate::{
     prepared::Preparation,
 };
 
-/// A fit that is needed: the estimator, and what it is fitted to.
+/// A requested fit: the estimator, and the preparation of the record.
 type FitRequest = (Estimator, Preparation);
 
 /// The fits of some runs.
 pub(crate) struct BatchFits {
-    /// For each estimator, the number of its request.
+    /// For each estimator, the index of its request.
     requested: Vec<Option<usize>>,
     /// For each request, the fit of each run.
     fits: Vec<Vec<Result<Fit, String>>>,
 }
 
 impl BatchFits {
-    /// All fits that these estimators need of these runs. None when `go_on` states no before one of
-    /// them.
+    /// Computes all fits that these estimators need for these runs. None if `go_on` returns false
+    /// before one of them.
     pub fn of(
         estimators: &[(&EstimatorCell, Task)],
         runs: &[&Record],
@@ -54,7 +54,7 @@ impl BatchFits {
         Some(Self { requested, fits })
     }
 
-    /// The fit of a run that an estimator (by its place) needs; none if it needs none.
+    /// The fit of a run for an estimator (by index); none if it needs none.
     pub fn of_run(&self, estimator: usize, run: usize) -> Option<&Result<Fit, String>> {
         let request = (*self.requested.get(estimator)?)?;
         self.fits.get(request)?.get(run)
@@ -65,7 +65,7 @@ fn request(estimator: &EstimatorCell, task: &Task, record: &Record) -> Option<Fi
     let preparation = Preparation::of(estimator);
     match task {
         Task::Fit(options) => Some(((**options).clone(), preparation)),
-        // The start span is one of the record as it was prepared.
+        // The start span refers to the prepared record.
         Task::Track(options) if preparation.is_none() => {
             let span_s = Some(options.start_span(record)?);
             Some((options.start_estimator(), Preparation { span_s, ..preparation }))

@@ -14,10 +14,10 @@ use crate::{
     prepared::Preparation,
 };
 
-/// Samples between two points of a trace at which its errors are taken: far less than any memory.
+/// Samples between two points of a trace at which its errors are evaluated: far less than any memory length.
 const ERRORS_EVERY: usize = 4;
 
-/// Replications whose fits are searched in one batch; a run of 82 s at 100 Hz takes a megabyte.
+/// Replications whose fits are searched in one batch; a run of 82 s at 100 Hz takes 1 MB.
 const AT_A_TIME: usize = 50;
 
 /// Some replications of a cell.
@@ -25,11 +25,11 @@ const AT_A_TIME: usize = 50;
 pub(crate) struct Block {
     /// Number of the block in the study.
     pub index: u64,
-    /// Number of its cell.
+    /// Index of its cell.
     pub cell: usize,
     /// First replication.
     pub first: u64,
-    /// Replications.
+    /// Number of replications.
     pub count: u64,
 }
 
@@ -52,7 +52,7 @@ pub(crate) fn blocks(plan: &Plan) -> Vec<Block> {
     all
 }
 
-/// Runs a block. `done` is called with the number of estimates made; none when `go_on` states no.
+/// Runs a block. `done` is called with the number of completed estimates; none if `go_on` returns false.
 pub(crate) fn run_block(
     plan: &Plan,
     schemas: &Schemas,
@@ -96,21 +96,21 @@ pub(crate) fn run_block(
     Some(cell_run.rows.into_tables(schemas))
 }
 
-/// A replication and its record, or why there is none.
+/// A replication and its record, or the reason why there is none.
 type Run = (u64, Result<Record, String>);
 
 /// The estimators of a cell on its runs.
 struct CellRun<'a> {
     plan: &'a Plan,
     estimators: Vec<(&'a EstimatorCell, Task)>,
-    /// Output of the run without remnant, simulated when an estimator needs it.
+    /// Output of the run without remnant, simulated if an estimator needs it.
     without_remnant: Option<Vec<f64>>,
     rows: EstimateRows<'a>,
 }
 
 impl<'a> CellRun<'a> {
-    /// Estimates of these runs. None when `go_on` states no; it is called before each estimator,
-    /// some of which take a tenth of a second.
+    /// Estimates of these runs. None if `go_on` returns false; it is called before each estimator,
+    /// some of which take 0.1 s.
     fn estimate_all(
         &mut self,
         simulator: &Simulator,
@@ -192,7 +192,7 @@ impl<'a> CellRun<'a> {
         Ok(())
     }
 
-    /// As `hoid identify` does it with the recording.
+    /// Analysis as by `hoid identify`.
     fn analyse(
         &mut self,
         asked: &ResolvedRequest,
@@ -239,7 +239,7 @@ impl<'a> CellRun<'a> {
         }
     }
 
-    /// The noise levels of a run against the same run without remnant.
+    /// Noise levels of a run, compared with the same run without remnant.
     fn describe(&mut self, simulator: &Simulator, record: &Record) -> Result<(), String> {
         let u0 = match self.without_remnant.take() {
             Some(known) => known,

@@ -1,4 +1,4 @@
-//! The tables of a study: which columns there are, and rows that are filled by name.
+//! The tables of a study: their columns, and rows filled by column name.
 //!
 //! | table | a row is | columns |
 //! |---|---|---|
@@ -6,7 +6,7 @@
 //! | traces | one kept point of a recursion | cell, replication, estimator, t; theta and operator |
 //! | cells | one scenario of the grid | its settings and its true parameters |
 //!
-//! A number that does not exist (the operator of a model that does not convert, nk of an output
+//! A number that does not exist (the operator of a model that cannot be converted, nk of an output
 //! model) is an empty cell.
 
 use std::collections::BTreeMap;
@@ -16,13 +16,13 @@ use hoid_io::{ColumnKind, ColumnSchema, ColumnValues, OutputColumn, OutputTable,
 
 use crate::plan::{Plan, Task, analysis};
 
-/// The operator's parameters, in the order of all tables.
+/// Parameters of the operator, in the order of all tables.
 pub const OPERATOR: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
-/// Quantities examined in a trace: these and the delay, in the order of
+/// Quantities evaluated in a trace: these and the delay, in the order of
 /// [`hoid_model::uncertainty::OperatorEstimate::rows`].
 pub(crate) const TRACED: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 
-/// Rows under known columns.
+/// Rows with given columns.
 #[derive(Debug, Clone)]
 pub(crate) struct Rows {
     columns: Vec<OutputColumn>,
@@ -52,7 +52,7 @@ impl Rows {
         }
     }
 
-    /// Starts a row: empty cells, zero counts.
+    /// Starts a row with empty cells and zero counts.
     pub fn begin(&mut self) {
         self.rows += 1;
         for column in &mut self.columns {
@@ -64,8 +64,8 @@ impl Rows {
         }
     }
 
-    /// Sets a number of the row; a column that the table does not have is not searched for twice:
-    /// plans decide which there are.
+    /// Sets a number of the row; a column that the table does not have is ignored: the plan
+    /// determines the columns.
     pub fn real(&mut self, name: &str, value: f64) {
         if let Some(ColumnValues::Real(values)) = self.column(name)
             && let Some(last) = values.last_mut()
@@ -123,7 +123,7 @@ impl Rows {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Schemas {
     pub fits: TableSchema,
-    /// None if no traces are kept.
+    /// None if traces are not kept.
     pub traces: Option<TableSchema>,
 }
 
@@ -138,7 +138,7 @@ impl Schemas {
     }
 }
 
-/// Notes on each table of a study.
+/// Comments on each table of a study.
 pub(crate) fn comments(plan: &Plan) -> Vec<String> {
     vec![
         format!("hoid {} study {}", env!("CARGO_PKG_VERSION"), plan.name),
@@ -147,7 +147,7 @@ pub(crate) fn comments(plan: &Plan) -> Vec<String> {
     ]
 }
 
-/// Axes that have no column of their own: each gets one of its name.
+/// Axes without a column of their own: each gets one with its name.
 pub(crate) fn extra_axes(plan: &Plan) -> Vec<String> {
     const KNOWN: [&str; 15] = [
         "name",

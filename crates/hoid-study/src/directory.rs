@@ -1,4 +1,4 @@
-//! The directory of a study: its plan, its parts and its tables.
+//! The directory of a study: its plan, parts and tables.
 
 use std::{
     fs,
@@ -11,22 +11,22 @@ use crate::{Plan, StudyError};
 
 pub(crate) const PLAN: &str = "plan.toml";
 
-/// Where the parts of a block stand.
+/// Path of the parts of a block.
 pub(crate) fn part(directory: &Path, block: u64, table: &str) -> PathBuf {
     directory.join("parts").join(format!("{block:06}-{table}.parquet"))
 }
 
-/// Position of the seal of a block.
+/// Path of the seal of a block.
 pub(crate) fn seal_path(directory: &Path, block: u64) -> PathBuf {
     directory.join("parts").join(format!("{block:06}-seal.json"))
 }
 
-/// Writes the plan next to the results.
+/// Writes the plan to the directory of the results.
 pub(crate) fn write_plan(plan: &Plan, directory: &Path) -> Result<(), StudyError> {
     write_source(&directory.join(PLAN), plan.text())
 }
 
-/// Writes what the results are made of next to them, never over something else of the same name.
+/// Writes a copy of a source to the directory of the results, without replacing another file of the same name.
 pub(crate) fn write_source(path: &Path, text: &str) -> Result<(), StudyError> {
     if path.exists() {
         if hoid_io::read_bytes(path)? == text.as_bytes() {
@@ -39,7 +39,7 @@ pub(crate) fn write_source(path: &Path, text: &str) -> Result<(), StudyError> {
     Ok(hoid_io::write_atomically(path, |file| file.write_all(text.as_bytes()))?)
 }
 
-/// Removes the partial output of a killed run: everything in `parts` that has not got its name yet.
+/// Removes the partial output of a killed run: all files in `parts` without their final names.
 pub(crate) fn sweep(parts: &Path) -> Result<(), StudyError> {
     hoid_io::make_directory(parts)?;
     let unwritable = |source| IoError::Unwritable {
@@ -63,7 +63,7 @@ fn is_hidden(path: &Path) -> bool {
         .is_some_and(|name| name.to_string_lossy().starts_with('.'))
 }
 
-/// Removes the parts of a study that has its tables.
+/// Removes the parts of a study whose tables are written.
 pub(crate) fn remove_parts(directory: &Path) -> Result<(), StudyError> {
     let parts = directory.join("parts");
     if !parts.exists() {
@@ -77,12 +77,12 @@ pub(crate) fn remove_parts(directory: &Path) -> Result<(), StudyError> {
     })
 }
 
-/// Where a table of a study is written.
+/// Path of a table of a study.
 pub(crate) fn table_path(directory: &Path, table: &str, csv: bool) -> PathBuf {
     directory.join(format!("{table}.{}", if csv { "csv" } else { "parquet" }))
 }
 
-/// The tables that are there.
+/// The existing tables.
 pub(crate) fn tables(directory: &Path) -> Vec<PathBuf> {
     let all = ["cells", "fits", "summary", "traces", "trace-summary"]
         .into_iter()

@@ -1,19 +1,19 @@
-//! Why a study cannot be run.
+//! Errors of studies.
 
 use hoid_io::IoError;
 use thiserror::Error;
 
-/// Errors of a study as a whole. A fit that fails is a row of the results with its reason, not an
+/// Errors of a study as a whole. A failed fit is a row of the results with its reason, not an
 /// error.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StudyError {
-    /// A plan without meaning.
+    /// An invalid plan.
     #[error("plan {path}{}: {reason}", .line.map_or_else(String::new, |line| format!(", line {line}")))]
     Plan {
         /// The file.
         path: String,
-        /// Line, from 1, where one can be named.
+        /// Line, from 1, if known.
         line: Option<usize>,
         /// The problem and the expected value.
         reason: String,
@@ -21,13 +21,13 @@ pub enum StudyError {
     /// A file that cannot be read or written.
     #[error(transparent)]
     Io(#[from] IoError),
-    /// A shard that is invalid.
+    /// An invalid shard.
     #[error("shard {found:?}: expected I/N with 1 <= I <= N, such as 2/7")]
     BadShard {
         /// The value given.
         found: String,
     },
-    /// A `study.json` that is not one.
+    /// An invalid `study.json`.
     #[error(
         "{file}: {reason}; expected the file that hoid wrote: take another directory, or remove this one to start again"
     )]
@@ -37,13 +37,13 @@ pub enum StudyError {
         /// The problem.
         reason: String,
     },
-    /// Results would be overwritten.
+    /// Results that would be overwritten.
     #[error("{directory} already holds a study: continue with --resume, or take another directory")]
     Occupied {
         /// The directory.
         directory: String,
     },
-    /// A plan or manifest of the user in the place of the copy next to the results.
+    /// A plan or manifest of the user that the copy with the results would replace.
     #[error(
         "{file} is already present and would be replaced by what is run now; take another directory for the results"
     )]
@@ -73,13 +73,13 @@ pub enum StudyError {
         /// The directory.
         directory: String,
     },
-    /// A study without its tables.
+    /// A study without tables.
     #[error("{directory} holds a study that is not finished: continue with --resume, or merge its shards")]
     Unfinished {
         /// The directory.
         directory: String,
     },
-    /// A table that is not what the plan next to it reports.
+    /// A table that does not fit the plan.
     #[error("{file}: {reason}; expected the table that hoid wrote: run the study again")]
     Table {
         /// The file.
@@ -87,43 +87,43 @@ pub enum StudyError {
         /// The problem.
         reason: String,
     },
-    /// A study that is already whole.
+    /// A study that is already complete.
     #[error("{directory} holds a whole study, there is nothing to merge: expected directories written with --shard")]
     Whole {
         /// The directory.
         directory: String,
     },
-    /// A part that is duplicated.
+    /// A duplicated part.
     #[error("block {block} is both in {first} and in {second}: name each shard once")]
     Overlap {
         /// The block.
         block: u64,
-        /// Where it is.
+        /// Its first place.
         first: String,
-        /// Where it is too.
+        /// Its second place.
         second: String,
     },
-    /// Parts that are missing.
+    /// Missing parts.
     #[error(
         "{missing} of {blocks} blocks of {plan} are missing, the first is {first}: run the missing shards, or finish those that were stopped with --resume"
     )]
     Gap {
-        /// How many.
+        /// Number of missing blocks.
         missing: u64,
-        /// Of how many.
+        /// Number of all blocks.
         blocks: u64,
-        /// The first that is missing.
+        /// The first missing block.
         first: u64,
         /// Name of the study.
         plan: String,
     },
-    /// Threads that the system does not give.
+    /// Threads that the system cannot provide.
     #[error("no threads: {reason}; try --jobs 1")]
     Threads {
         /// Error reported by the operating system.
         reason: String,
     },
-    /// A pattern of file invalid names.
+    /// An invalid pattern of file names.
     #[error("pattern {pattern:?}: {reason}; expected something like {{subject}}_{{condition}}_{{run}}.csv")]
     Pattern {
         /// The pattern.
@@ -140,10 +140,10 @@ pub enum StudyError {
         directory: String,
         /// The pattern.
         pattern: String,
-        /// Some of the files that are there.
+        /// Some of the existing files.
         found: String,
     },
-    /// A virtual experiment would be written over another.
+    /// A virtual experiment that would overwrite another.
     #[error("{directory} already holds an experiment; take another directory")]
     ExperimentThere {
         /// The directory.
@@ -152,7 +152,7 @@ pub enum StudyError {
     /// A virtual experiment that cannot be simulated.
     #[error("the virtual experiment cannot be simulated: {reason}")]
     Virtual {
-        /// Why, and the remedy.
+        /// Reason and remedy.
         reason: String,
     },
 }

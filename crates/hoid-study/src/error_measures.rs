@@ -1,22 +1,22 @@
-//! Error measures of an estimate whose truth is known.
+//! Error measures of an estimate whose true value is known.
 //!
-//! - `vaf`, %: `100 (1 - sum (u - u_s)^2 / sum u^2)` of the simulated output u_s, no mean removed.
-//! - `delta_vaf`, %: `vaf` less that of another estimator with the same nk on the same run.
+//! - `vaf`, %: `100 (1 - sum (u - u_s)^2 / sum u^2)` of the simulated output u_s, without removing a mean.
+//! - `delta_vaf`, %: `vaf` minus that of another estimator with the same nk on the same run.
 //! - `response_error`, %: root of the mean over the lines of the forcing function of
-//!   `|H - H0|^2 / |H0|^2`, where H0 is the simulated operator as it is held at the sample time of
+//!   `|H - H0|^2 / |H0|^2`, where H0 is the simulated operator with a hold at the sample time of
 //!   the simulation. It needs no conversion, so that models of any order can be compared.
-//! - `rms_<p>`, %: root mean square of the relative error of a trace from 10 s after the start on,
-//!   over what converts.
-//! - `settle50_<p>`, `settle90_<p>`, s: time after t_M at which the trace has first covered 50 or
-//!   90 % of the step of a parameter.
+//! - `rms_<p>`, %: root mean square of the relative error of a trace from 10 s after the start,
+//!   over the rows that can be converted.
+//! - `settle50_<p>`, `settle90_<p>`, s: time from t_M until the trace first covers 50 or 90 % of
+//!   the step of a parameter.
 //! - `before_<p>`, `after_<p>`, %: mean relative error of a trace from 10 s after the start to t_M,
 //!   and over the last 10 s: their spread over the replications is that of the summary.
 //!   `covered_<p>`, `covered_through_<p>`, %: points of a trace, after its start fit and within 5 s
-//!   after a change, in which 1.96 standard errors cover the truth.
+//!   after a change, at which 1.96 standard errors cover the true value.
 //! - `false_alarms`: changes declared more than 5 s after a true one, or before the first; `hours`:
-//!   the time in which they could be. `found`, %: true changes after the start fit that were
-//!   declared within 5 s; `lag`, s: mean time to the declaration of those.
-//! - `diverged`: a coefficient is not a number, or its magnitude is beyond 10.
+//!   the time in which they could occur. `found`, %: true changes after the start fit that were
+//!   declared within 5 s; `lag`, s: mean time to their declaration.
+//! - `diverged`: a coefficient is not a number, or its magnitude exceeds 10.
 //! - `noise_level_obtained`: `(var u - var u0) / var u` with u0 of the run without remnant,
 //!   `noise_level_response`: `var(u - u0) / var u`, which lacks the chance correlation of the two,
 //!   and `noise_level_remnant`: `var n / var u`.
@@ -28,9 +28,9 @@ use hoid_track::{StartAt, Trace};
 
 use crate::{columns::TRACED, plan::Cell};
 
-/// Time from which the errors of a trace count, s.
+/// Time from which the errors of a trace are evaluated, s.
 const ERRORS_FROM_S: f64 = 10.0;
-/// Magnitude of a coefficient beyond which a recursion has diverged.
+/// Magnitude of a coefficient above which a recursion has diverged.
 const DIVERGED: f64 = 10.0;
 
 /// The true response at the lines of the forcing function.
@@ -67,7 +67,7 @@ impl TrueResponse {
     }
 }
 
-/// The errors of a trace against the true parameters of its record.
+/// Errors of a trace relative to the true parameters of its record.
 pub(crate) struct TraceErrors {
     pub rms_percent: [f64; TRACED.len()],
     /// 50 and 90 % of the step.
@@ -124,19 +124,19 @@ impl TraceErrors {
     }
 }
 
-/// Time within which a change is to be declared, and during which bands are examined apart, s.
+/// Time after a change within which it is to be declared, and during which bands are evaluated separately, s.
 const THROUGH_S: f64 = 5.0;
-/// Length of the end of a trace whose mean error is taken, s.
+/// Length of the end of a trace whose mean error is evaluated, s.
 const END_S: f64 = 10.0;
-/// Standard errors of a band of 95 %.
+/// Half width of a 95 % band, standard errors.
 const BAND: f64 = 1.96;
 
-/// How a trace follows a change, its bands, and what it declares.
+/// Response of a trace to a change, its bands, and its declared changes.
 pub(crate) struct ChangeMeasures {
     /// Mean relative error before the change and at the end, %.
     pub before_percent: [f64; TRACED.len()],
     pub after_percent: [f64; TRACED.len()],
-    /// Covered after the start fit, and within 5 s after a change, %.
+    /// Coverage after the start fit, and within 5 s after a change, %.
     pub covered_percent: [f64; TRACED.len()],
     pub covered_through_percent: [f64; TRACED.len()],
     pub false_alarms: f64,
@@ -145,7 +145,7 @@ pub(crate) struct ChangeMeasures {
     pub lag_s: f64,
 }
 
-/// Sums for the mean of something over points.
+/// Sum and count for a mean over points.
 #[derive(Clone, Copy, Default)]
 struct Mean(f64, f64);
 
@@ -167,7 +167,7 @@ impl ChangeMeasures {
         let end_s = record.time_s(record.len());
         let changes_s = scenario.schedule.changes_s(end_s);
         let first_s = changes_s.first().copied().unwrap_or(f64::INFINITY);
-        // A two-sided estimate moves from the start on; its alarms are those of the causal one.
+        // A two-sided estimate moves from the start; its alarms are those of the causal one.
         let fitted_s = match trace.options().start {
             StartAt::Span(Some((_, to))) => to,
             _ => trace.updated_from_s(),

@@ -25,14 +25,14 @@ pub(crate) struct BlockTables {
     pub traces: Option<OutputTable>,
 }
 
-/// The tables of a block while they are filled.
+/// The tables of a block in progress.
 pub(crate) struct EstimateRows<'a> {
     plan: &'a Plan,
     cell: &'a Cell,
     /// Axes with a column of their own.
     extra: Vec<String>,
     true_response: Option<TrueResponse>,
-    /// VAF of the estimators on this replication, by name and nk.
+    /// VAF of the estimators in this replication, by name and nk.
     vafs: Vec<(&'a str, usize, f64)>,
     fits: Rows,
     traces: Option<Rows>,
@@ -61,7 +61,7 @@ impl<'a> EstimateRows<'a> {
         }
     }
 
-    /// Starts a replication: its estimators are compared with each other.
+    /// Starts a replication, within which estimators are compared.
     pub fn begin_replication(&mut self) {
         self.vafs.clear();
     }
@@ -108,7 +108,7 @@ impl<'a> EstimateRows<'a> {
         rows.real("to_s", to);
     }
 
-    /// The estimate that was started has failed.
+    /// Records that the current estimate failed.
     pub fn failed(&mut self, reason: &str) {
         self.fits.text("status", "failed");
         self.fits.text("reason", reason);
@@ -130,7 +130,7 @@ impl<'a> EstimateRows<'a> {
         rows.text("status", "ok");
     }
 
-    /// How a search ended.
+    /// Termination of a search.
     pub fn termination(&mut self, termination: Termination) {
         let rows = &mut self.fits;
         rows.text("termination", &termination.reason.to_string());
@@ -190,7 +190,7 @@ impl<'a> EstimateRows<'a> {
         Ok(())
     }
 
-    /// The operator of a person.
+    /// The operator of an analysis.
     pub fn operator_row(&mut self, found: &Identified) -> Result<(), String> {
         let (fit, record) = (&found.fit, &found.data.records[0]);
         let of = fit.operator(0);
@@ -218,7 +218,7 @@ impl<'a> EstimateRows<'a> {
         Ok(())
     }
 
-    /// An operator whose gains change: each before (1) and after (2) the change.
+    /// An operator with changing gains: each before (1) and after (2) the change.
     pub fn change_row(&mut self, found: &Identified<SigmoidFit>) -> Result<(), String> {
         let (fit, record) = (&found.fit, &found.data.records[0]);
         let simulated = fit.simulate(record).map_err(|error| error.to_string())?;
@@ -242,7 +242,7 @@ impl<'a> EstimateRows<'a> {
         Ok(())
     }
 
-    /// Verdict on the estimate, and the kinds of the findings against it.
+    /// Verdict on the estimate, and the kinds of its findings.
     pub fn verdict(&mut self, verdict: &Verdict) {
         let against = verdict
             .findings()
@@ -342,7 +342,7 @@ impl<'a> EstimateRows<'a> {
     }
 }
 
-/// Part of the output that a model simulates, %.
+/// Share of the output that a model simulates, %.
 fn vaf(record: &Record, simulated: &Series) -> f64 {
     hoid_ident::validation::vaf(&record.output()[simulated.first..], &simulated.values)
 }

@@ -13,7 +13,7 @@ use crate::{
     truth::cells_table,
 };
 
-/// Makes the tables of a study from its parts, in the order of the blocks.
+/// Writes the tables of a study from its parts, in the order of the blocks.
 pub(crate) fn join(
     plan: &Plan,
     schemas: &Schemas,

@@ -1,9 +1,9 @@
 //! Monte Carlo studies of estimators, and groups of recorded runs.
 //!
-//! How large are bias and spread of an estimate, and do its standard errors cover the error? One record cannot
-//! determine. A study simulates many: a [`Plan`] names scenarios (operator, task, remnant) and estimators, each list in
-//! it is an axis of a grid, and [`run`] estimates every cell of the grid in many replications, each with its own random
-//! stream. [`Results`] reads the tables back, and a [`Query`] picks rows:
+//! How large are the bias and spread of an estimate, and do its standard errors cover the error? A single record cannot
+//! answer this. A study simulates many: a [`Plan`] contains scenarios (operator, task, remnant) and estimators, each
+//! list in it is an axis of a grid, and [`run`] estimates every cell of the grid in many replications, each with its
+//! own random stream. [`Results`] reads the tables, and a [`Query`] selects rows:
 //!
 //! ```
 //! use hoid_study::{Plan, Query, Results, RunOptions, run};

@@ -1,4 +1,4 @@
-//! Joining the shards of a study. A block that is damaged is computed again.
+//! Merging of the shards of a study. A damaged block is computed again.
 
 use std::{
     collections::BTreeMap,
@@ -18,11 +18,11 @@ use crate::{
     seal::{OnDisk, notes_on, on_disk},
 };
 
-/// Joins the shards of a study.
+/// Merges the shards of a study.
 ///
 /// # Errors
 /// [`StudyError::OtherStudy`] for shards of different plans, seeds or versions, [`StudyError::Overlap`] and
-/// [`StudyError::Gap`] when blocks are duplicated or not at all, [`StudyError::NoStudy`] for a directory without one,
+/// [`StudyError::Gap`] for duplicated and missing blocks, [`StudyError::NoStudy`] for a directory without a study,
 /// [`StudyError::Unsealed`] for one whose blocks have no checksums.
 pub fn merge(shards: &[PathBuf], directory: &Path, csv: bool) -> Result<Outcome, StudyError> {
     let mut plan: Option<(Plan, RunRecord)> = None;

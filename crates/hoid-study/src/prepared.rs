@@ -1,4 +1,4 @@
-//! The record as an estimator takes it: a span, every n-th sample, without mean or line.
+//! The record as used by an estimator: a span, every n-th sample, without mean or linear trend.
 
 use std::borrow::Cow;
 
@@ -6,14 +6,14 @@ use hoid_model::{Channel, Detrend, Record, SampleTime};
 
 use crate::plan::EstimatorCell;
 
-/// Treatment of a record before it is used.
+/// Preparation of a record before an estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Preparation {
-    /// The span that is taken, s; none for all.
+    /// Span that is used, s; none for the whole record.
     pub span_s: Option<(f64, f64)>,
     /// Every `decimate`-th sample.
     pub decimate: usize,
-    /// The part subtracted.
+    /// The trend removed.
     pub detrend: Detrend,
 }
 
@@ -27,12 +27,12 @@ impl Preparation {
         }
     }
 
-    /// True for a record as it is.
+    /// True if the record is used unchanged.
     pub fn is_none(&self) -> bool {
         self.span_s.is_none() && self.decimate == 1 && self.detrend == Detrend::None
     }
 
-    /// The record as an estimator takes it.
+    /// Returns the prepared record.
     pub fn of_record<'r>(&self, record: &'r Record) -> Result<Cow<'r, Record>, String> {
         let mut record = match self.span_s {
             None => Cow::Borrowed(record),

@@ -1,8 +1,8 @@
-//! Queries: which rows of a study.
+//! Queries, which select rows of a study.
 
 use std::collections::BTreeMap;
 
-/// A description of rows; keys that it does not name may have any value.
+/// A selection of rows; unspecified keys may have any value.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Query {
     quantity: Option<String>,
@@ -83,103 +83,103 @@ impl Query {
         self
     }
 
-    /// The quantity, where one is named.
+    /// Returns the quantity, if specified.
     pub fn quantity(&self) -> Option<&str> {
         self.quantity.as_deref()
     }
 
-    /// For the cell of this number.
+    /// Selects the cell with this number.
     #[must_use]
     pub fn cell(mut self, cell: u64) -> Self {
         self.cell = Some(cell);
         self
     }
 
-    /// For the scenario of this name.
+    /// Selects the scenario with this name.
     #[must_use]
     pub fn scenario(mut self, scenario: &str) -> Self {
         self.scenario = Some(scenario.to_owned());
         self
     }
 
-    /// For cells that started from this condition.
+    /// Selects the cells based on this condition.
     #[must_use]
     pub fn condition(mut self, condition: &str) -> Self {
         self.condition = Some(condition.to_owned());
         self
     }
 
-    /// For a simulated remnant of this order m0.
+    /// Selects a simulated remnant of this order m0.
     #[must_use]
     pub fn remnant_order(mut self, order: usize) -> Self {
         self.remnant_order = Some(order);
         self
     }
 
-    /// For this demanded noise level.
+    /// Selects this specified noise level.
     #[must_use]
     pub fn noise_level(mut self, level: f64) -> Self {
         self.noise_level = Some(level);
         self
     }
 
-    /// For this time constant of the simulated remnant, s.
+    /// Selects this time constant of the simulated remnant, s.
     #[must_use]
     pub fn t_n_s(mut self, t_n_s: f64) -> Self {
         self.t_n_s = Some(t_n_s);
         self
     }
 
-    /// For this entry of a list of the plan, such as ("memory", "1s").
+    /// Selects this entry of a list of the plan, such as ("memory", "1s").
     #[must_use]
     pub fn axis(mut self, key: &str, value: &str) -> Self {
         self.axes.push((key.to_owned(), value.to_owned()));
         self
     }
 
-    /// For the estimator with this label.
+    /// Selects the estimator with this label.
     #[must_use]
     pub fn estimator(mut self, label: &str) -> Self {
         self.estimator = Some(label.to_owned());
         self
     }
 
-    /// For the estimators of this name.
+    /// Selects the estimators with this name.
     #[must_use]
     pub fn name(mut self, name: &str) -> Self {
         self.name = Some(name.to_owned());
         self
     }
 
-    /// For this method.
+    /// Selects this method.
     #[must_use]
     pub fn method(mut self, method: &str) -> Self {
         self.method = Some(method.to_owned());
         self
     }
 
-    /// Of noise models of this order m*.
+    /// Selects noise models of this order m*.
     #[must_use]
     pub fn nd(mut self, nd: usize) -> Self {
         self.nd = Some(nd);
         self
     }
 
-    /// For models with this delay n_k*, samples.
+    /// Selects models with this delay n_k*, samples.
     #[must_use]
     pub fn nk(mut self, nk: usize) -> Self {
         self.nk = Some(nk);
         self
     }
 
-    /// From the start with this label.
+    /// Selects the start with this label.
     #[must_use]
     pub fn start(mut self, start: &str) -> Self {
         self.start = Some(start.to_owned());
         self
     }
 
-    /// For estimators that took every n-th sample.
+    /// Selects estimators that use every n-th sample.
     #[must_use]
     pub fn decimate(mut self, decimate: usize) -> Self {
         self.decimate = Some(decimate);
@@ -190,7 +190,7 @@ impl Query {
         fn is<T: PartialEq>(asked: Option<&T>, found: &T) -> bool {
             asked.is_none_or(|asked| asked == found)
         }
-        // Levels and time constants are written in a plan and in a query with the same few digits.
+        // Levels and time constants have the same few digits in a plan and in a query.
         let near = |asked: Option<f64>, found: f64| asked.is_none_or(|asked| (asked - found).abs() <= 1e-9);
         is(self.cell.as_ref(), &s.cell)
             && is(self.remnant_order.as_ref(), &s.remnant_order)

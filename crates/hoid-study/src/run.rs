@@ -1,9 +1,9 @@
-//! Running a study: blocks over threads, parts on disk, resume.
+//! Execution of a study: blocks over threads, parts on disk, resume.
 //!
-//! A block is written as one file a table when it is finished, traces first, next to its place and then renamed, and at
-//! last its seal (`seal`). A study that was killed therefore has whole blocks and nothing else, and continues with the
-//! blocks that have no seal or do not agree with it. When all blocks are there, the parts are joined in the order of
-//! the plan; which thread or machine made a part does not show.
+//! A finished block is written as one file per table, traces first, each next to its place and then renamed, and
+//! finally its seal (`seal`). A killed study therefore has complete blocks only, and continues with the blocks that
+//! have no seal or do not agree with it. When all blocks are complete, the parts are joined in the order of the plan;
+//! the result does not depend on the thread or machine that computed a part.
 
 use std::{
     path::{Path, PathBuf},
@@ -25,50 +25,50 @@ use crate::{
     shard::Shard,
 };
 
-/// How a study is run.
+/// Options of running a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RunOptions {
-    /// A shard of the study; none for all.
+    /// Shard of the study; none for all.
     pub shard: Option<Shard>,
-    /// Threads; none for one a core.
+    /// Number of threads; none for one per core.
     pub jobs: Option<usize>,
-    /// Continue with a study that was stopped.
+    /// Continue a stopped study.
     pub resume: bool,
     /// Write the tables as CSV instead of Parquet.
     pub csv: bool,
 }
 
-/// How far a study is.
+/// Progress of a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
-    /// Estimates that are done, those of an earlier run included.
+    /// Completed estimates, including those of an earlier run.
     pub done: u64,
-    /// Estimates in all.
+    /// Total number of estimates.
     pub total: u64,
-    /// Estimates that an earlier run had done.
+    /// Estimates completed by an earlier run.
     pub known: u64,
 }
 
 /// Result of a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Outcome {
-    /// True when all blocks of the study (or of its shard) are there.
+    /// True if all blocks of the study (or of its shard) are complete.
     pub finished: bool,
     /// Estimates made by this run.
     pub estimates: u64,
-    /// The tables; empty for a shard, which waits to be merged.
+    /// The tables; empty for a shard, which is to be merged.
     pub tables: Vec<PathBuf>,
     /// Warnings about the directory: damaged blocks that were computed again.
     pub notes: Vec<String>,
 }
 
-/// Runs a study into a directory. `progress` is called from any thread after each estimate; `go_on`
-/// is called before each estimate, and what it stops can be resumed.
+/// Runs a study in a directory. `progress` is called from any thread after each estimate; `go_on`
+/// is called before each estimate, and a study that it stops can be resumed.
 ///
 /// # Errors
-/// [`StudyError::Occupied`] when the directory holds a study without `resume`, [`StudyError::OtherStudy`] when it is
-/// another one, [`StudyError::SourceThere`] if there is another plan, [`StudyError::Io`] when a file cannot be written
-/// or another process works on the directory.
+/// [`StudyError::Occupied`] if the directory holds a study and `resume` is not set, [`StudyError::OtherStudy`] if it is
+/// a different one, [`StudyError::SourceThere`] if there is another plan, [`StudyError::Io`] if a file cannot be
+/// written or another process uses the directory.
 pub fn run(
     plan: &Plan,
     directory: &Path,
@@ -106,7 +106,7 @@ pub fn run(
         let done = done.fetch_add(n, Ordering::Relaxed) + n;
         progress(Progress { done, total, known });
     };
-    // Once one block was stopped, the next do not start with simulating their runs.
+    // After a block has been stopped, the next ones do not start to simulate their runs.
     let stopped = AtomicBool::new(false);
     let one = |block: &Block| -> Result<bool, StudyError> {
         if stopped.load(Ordering::Relaxed) {
@@ -157,7 +157,7 @@ pub(crate) fn write_tables(
     write_block(directory, plan_sha256, block.index, &all)
 }
 
-/// Blocks that are whole, those that are to be computed, and why some of these are damaged.
+/// Complete blocks, those to be computed, and the reasons why some of these are damaged.
 fn sorted(directory: &Path, plan_sha256: &str, mine: &[Block]) -> (Vec<Block>, Vec<Block>, Vec<(u64, String)>) {
     let (mut there, mut open, mut damaged) = (Vec::new(), Vec::new(), Vec::new());
     for block in mine {
@@ -173,7 +173,7 @@ fn sorted(directory: &Path, plan_sha256: &str, mine: &[Block]) -> (Vec<Block>, V
     (there, open, damaged)
 }
 
-/// Makes the directory ready, or finds what it holds.
+/// Prepares the directory, or reads what it holds.
 fn prepare(plan: &Plan, directory: &Path, manifest: &RunRecord, resume: bool) -> Result<RunRecord, StudyError> {
     let shown = || directory.display().to_string();
     if let Some(found) = RunRecord::read(directory)? {
@@ -199,8 +199,8 @@ fn prepare(plan: &Plan, directory: &Path, manifest: &RunRecord, resume: bool) ->
     Ok(manifest.clone())
 }
 
-/// Makes a directory that is known ready to continue: output in progress is removed, and what an
-/// earlier program left without seals is named as sealed from here on, for it has no block yet.
+/// Prepares a directory for continuation: partial output is removed, and one that an earlier
+/// version left without seals is marked as sealed, since it has no block yet.
 pub(crate) fn ready(directory: &Path, found: &RunRecord, record: &RunRecord) -> Result<(), StudyError> {
     if found.complete {
         return remove_parts(directory);
@@ -212,7 +212,7 @@ pub(crate) fn ready(directory: &Path, found: &RunRecord, record: &RunRecord) -> 
     Ok(())
 }
 
-/// Does the open blocks on `jobs` threads, or one a core; true when each was finished.
+/// Runs the open blocks on `jobs` threads, or one per core; true if all were finished.
 pub(crate) fn on_threads<T: Sync>(
     jobs: Option<usize>,
     open: &[T],

@@ -1,8 +1,8 @@
-//! Files next to the results: `study.json`.
+//! The file `study.json` of the directory of results.
 //!
-//! It reports which plan and which program made the parts of a directory, and which shard of the
-//! study they are. Two directories belong together when plan, replications, seed and version are
-//! the same.
+//! It records which plan and which program produced the parts of a directory, and which shard of
+//! the study they are. Two directories belong together if plan, replications, seed and version are
+//! equal.
 
 use std::path::Path;
 
@@ -22,9 +22,9 @@ pub(crate) struct RunRecord {
     /// Blocks of the whole study.
     pub blocks: u64,
     pub shard: Option<Shard>,
-    /// True once the tables are there.
+    /// True once the tables are written.
     pub complete: bool,
-    /// True if blocks have seals; an earlier program wrote none.
+    /// True if blocks have seals; earlier versions wrote none.
     #[serde(default)]
     pub sealed: bool,
 }
@@ -46,14 +46,14 @@ impl RunRecord {
         }
     }
 
-    /// Report about a directory whose blocks have no seals.
+    /// Note on a directory whose blocks have no seals.
     pub fn note_on_seals(&self) -> Option<String> {
         let unsealed = !self.sealed && !self.complete;
         unsealed
             .then(|| "its blocks carry no checksums, an earlier hoid wrote them: all were computed again".to_owned())
     }
 
-    /// The manifest of a directory; none if it holds no study.
+    /// The record of a directory; none if it holds no study.
     pub fn read(directory: &Path) -> Result<Option<Self>, StudyError> {
         let path = directory.join(NAME);
         if !path.exists() {
@@ -76,8 +76,8 @@ impl RunRecord {
 
     /// Difference that prevents merging two parts into one study; none if they match.
     pub fn differs(&self, other: &Self) -> Option<String> {
-        // What a user may have changed on purpose first: each of these also changes the hash of the
-        // plan, which reports less.
+        // Settings that a user may have changed first: each of these also changes the hash of the
+        // plan, which is less informative.
         let pairs = [
             ("hoid version", self.hoid.clone(), other.hoid.clone()),
             ("study", self.study.clone(), other.study.clone()),

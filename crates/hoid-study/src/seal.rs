@@ -1,9 +1,9 @@
-//! Definition of a block on disk: its plan, its number, and the checksum of each of its tables.
+//! Seal of a block on disk: its plan, its number, and the checksum of each of its tables.
 //!
-//! The seal of a block is written after its tables. A block is whole when its seal names this plan
-//! and this block and each table has the bytes that the seal reports; a damaged disk, a cut file
-//! and a block in the place of another are found so, and the block is computed again. A block
-//! without a seal was on its way when its process was stopped.
+//! The seal of a block is written after its tables. A block is complete if its seal names this plan
+//! and this block and each table has the checksum in the seal; this detects a damaged disk, a
+//! truncated file and a misplaced block, and the block is computed again. A block without a seal
+//! was in progress when its process was stopped.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -16,7 +16,7 @@ use crate::{
     directory::{part, seal_path},
 };
 
-/// The content of the file of a seal.
+/// The content of a seal file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Seal {
     plan_sha256: String,
@@ -25,12 +25,12 @@ struct Seal {
     tables: BTreeMap<String, String>,
 }
 
-/// A block on disk.
+/// State of a block on disk.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum OnDisk {
     Whole,
     Missing,
-    /// Why its content does not match its header.
+    /// Reason why its content does not match its seal.
     Damaged(String),
 }
 
@@ -58,7 +58,7 @@ pub(crate) fn write_block(
     })?)
 }
 
-/// Part of a block on disk.
+/// State of a block on disk.
 pub(crate) fn on_disk(directory: &Path, plan_sha256: &str, block: u64) -> OnDisk {
     let path = seal_path(directory, block);
     if !path.exists() {
@@ -89,10 +89,10 @@ pub(crate) fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Damaged blocks that are named one by one.
+/// Maximum number of damaged blocks named individually.
 const MOST_NAMED: usize = 5;
 
-/// Report about blocks that are computed again.
+/// Notes on blocks that are computed again.
 pub(crate) fn notes_on(damaged: &[(u64, String)]) -> Vec<String> {
     let mut notes: Vec<String> = damaged
         .iter()
@@ -148,7 +148,7 @@ mod tests {
         assert!(matches!(on_disk(d, "plan", 0), OnDisk::Damaged(_)));
         fs::write(&path, good).unwrap();
         assert_eq!(on_disk(d, "plan", 0), OnDisk::Whole);
-        // Block 1 replaced by block 0, its seal too.
+        // Block 1 replaced by block 0, including its seal.
         for (from, to) in [
             (part(d, 0, "fits"), part(d, 1, "fits")),
             (seal_path(d, 0), seal_path(d, 1)),

@@ -1,4 +1,4 @@
-//! Shards: parts of a study that are run apart.
+//! Shards: parts of a study that are run separately.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,9 +7,9 @@ use crate::StudyError;
 /// A shard of a study: part `index` of `of`, from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shard {
-    /// Which.
+    /// Index of the shard.
     pub index: u64,
-    /// Of how many.
+    /// Number of shards.
     pub of: u64,
 }
 
@@ -33,8 +33,8 @@ impl std::fmt::Display for Shard {
 }
 
 impl Shard {
-    /// Whether a block belongs to it: blocks are dealt out in turn, so that shards take about the
-    /// same time.
+    /// True if a block belongs to the shard: blocks are distributed in turn, so that shards take
+    /// about the same time.
     pub(crate) fn has(self, block: u64) -> bool {
         block % self.of == self.index - 1
     }

@@ -12,12 +12,12 @@
 
 use hoid_numerics::statistics::{self, finite_sorted, mean};
 
-/// Statement of a box plot and a table about some values.
+/// Statistics of values for a box plot and a table.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Statistics {
-    /// Values, those that are not numbers left out.
+    /// Number of values, excluding those that are not numbers.
     pub count: usize,
-    /// Values left out.
+    /// Number of excluded values.
     pub missing: usize,
     /// Mean.
     pub mean: f64,
@@ -48,7 +48,7 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// The statistics of some values; of none, all but the counts are not numbers.
+    /// Computes the statistics of values; without values, all but the counts are not numbers.
     pub fn of(values: &[f64]) -> Self {
         let sorted = finite_sorted(values.iter().copied());
         let (n, missing) = (sorted.len(), values.len() - sorted.len());
@@ -126,12 +126,12 @@ fn deviation(second: f64, fourth: f64, n: usize) -> (f64, f64) {
     (sd, se)
 }
 
-/// Quantile of sorted values, interpolated; no number of none.
+/// Quantile of sorted values, interpolated; not a number if there are none.
 pub fn quantile(sorted: &[f64], p: f64) -> f64 {
     statistics::quantile(sorted, p).unwrap_or(f64::NAN)
 }
 
-/// Median of values; those that are not numbers are left out.
+/// Median of values; those that are not numbers are excluded.
 pub fn median(values: &[f64]) -> f64 {
     statistics::quantile_of(values, 0.5).unwrap_or(f64::NAN)
 }

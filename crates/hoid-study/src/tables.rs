@@ -9,7 +9,7 @@ use hoid_io::{ColumnValues, OutputTable};
 
 use crate::StudyError;
 
-/// Position of a table: as Parquet, or else as CSV.
+/// Path of a table: as Parquet if it exists, otherwise as CSV.
 pub(crate) fn table_path(directory: &Path, table: &str) -> PathBuf {
     let parquet = directory.join(format!("{table}.parquet"));
     if parquet.exists() {
@@ -19,8 +19,7 @@ pub(crate) fn table_path(directory: &Path, table: &str) -> PathBuf {
     }
 }
 
-/// A table by its columns. A CSV column of whole numbers or of nothing does not show of which kind
-/// it was.
+/// A table by its columns. The kind of a CSV column of integers or without values is unknown.
 pub(crate) struct Columns {
     file: String,
     table: OutputTable,

@@ -11,8 +11,7 @@ use crate::{
     plan::{Cell, EstimatorCell, Task},
 };
 
-/// True value of a column of the table of fits, where it is known and does not change within the
-/// span.
+/// True value of a column of the table of fits, if it is known and constant within the span.
 pub fn true_value(cell: &Cell, estimator: &EstimatorCell, name: &str) -> f64 {
     let scenario = cell.resolved.scenario();
     let (from, to) = match estimator.task {
@@ -33,7 +32,7 @@ pub fn true_value(cell: &Cell, estimator: &EstimatorCell, name: &str) -> f64 {
     } else {
         after
     };
-    // For a form that is not the lead K is the gain at rest too.
+    // For a form other than the lead, K is the static gain too.
     let named = if name == "K" { "K_e" } else { name };
     if let Some(i) = OPERATOR.iter().position(|p| *p == named) {
         return state.operator[i];
@@ -59,8 +58,7 @@ fn close(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-2 * a.abs().max(b.abs())
 }
 
-/// For an operator whose gains change: before (1) and after (2) the change, its instant and its
-/// rate.
+/// For an operator with changing gains: before (1) and after (2) the change, its time and its rate.
 fn of_change(cell: &Cell, name: &str) -> f64 {
     let scenario = cell.resolved.scenario();
     let ends = cell.truth();
@@ -68,7 +66,7 @@ fn of_change(cell: &Cell, name: &str) -> f64 {
     let place = |parameter: &str| OPERATOR.iter().position(|p| *p == parameter);
     let end = |digit| name.strip_suffix(digit).and_then(place);
     match (name, &scenario.schedule) {
-        // Who changes there and back is not who is searched for.
+        // An operator who changes back and forth does not match the model.
         (_, Schedule::Alternating { .. }) => f64::NAN,
         ("t_M", schedule) => schedule.change_s().unwrap_or(f64::NAN),
         ("G", schedule) => schedule.rate_per_s().unwrap_or(f64::NAN),
@@ -82,7 +80,7 @@ fn of_change(cell: &Cell, name: &str) -> f64 {
     }
 }
 
-/// Coefficients of D and the innovation variance of the remnant as it is held over each sample.
+/// Coefficients of D and the innovation variance of the remnant with a hold over each sample.
 fn of_noise_model(cell: &Cell, estimator: &EstimatorCell, k_n: f64, name: &str) -> f64 {
     let remnant = cell.resolved.scenario().remnant;
     let by_polynomials = matches!(estimator.task, Task::Fit(_))

@@ -24,11 +24,11 @@ pub struct TrueState {
 }
 
 impl Cell {
-    /// True parameters before and after the change; the same where nothing changes.
+    /// True parameters before and after the change; equal if nothing changes.
     pub fn truth(&self) -> [TrueState; 2] {
         let scenario = self.resolved.scenario();
-        // Long before the change, and long after it or in the middle of the time until the person
-        // changes back.
+        // Long before the change, and long after it or in the middle of the interval until the
+        // operator changes back.
         let ends = match scenario.schedule {
             Schedule::Constant => [0.0; 2],
             Schedule::Sigmoid { .. } => [-1e9, 1e9],

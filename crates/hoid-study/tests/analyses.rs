@@ -1,5 +1,5 @@
-//! Estimators of a study that are run as `hoid identify` runs them: the operator of a person, one who changes,
-//! instrumental variables, each with its verdict.
+//! Estimators of a study run as by `hoid identify`: the operator of a person, one with changing gains, instrumental
+//! variables, each with its verdict.
 #![allow(clippy::unwrap_used)]
 
 use hoid_analysis::{Identification, Identified, Polynomials, Recordings};
@@ -54,7 +54,7 @@ name = "SRIV"
 method = "sriv"
 "#;
 
-/// A study of a plan in a directory, its fits.
+/// A study of a plan in a directory, and its fits.
 fn fits(text: &str) -> (tempfile::TempDir, OutputTable) {
     let directory = tempfile::tempdir().unwrap();
     let plan = Plan::parse(text, "people.toml").unwrap();
@@ -181,7 +181,7 @@ fn a_row_is_the_analysis_of_the_run() {
         assert_eq!(real(&fits, &name, at), estimate.value, "{name}");
     }
 
-    // The summary counts the verdicts, and takes errors against the simulated scenario.
+    // The summary counts the verdicts, and errors are relative to the simulated scenario.
     let results = Results::read(directory.path()).unwrap();
     let one = |quantity: &str, scenario: &str, name: &str| {
         let query = Query::of(quantity).scenario(scenario).name(name);
@@ -191,7 +191,7 @@ fn a_row_is_the_analysis_of_the_run() {
         let levels = ["trustworthy", "doubtful", "not_determined"].map(|level| one(level, scenario, name));
         assert!((levels.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{name}: {levels:?}");
     }
-    // No one who changes is reported as constant.
+    // No operator with changing gains is reported as constant.
     assert_eq!(one("trustworthy", "change", "lead"), 0.0);
     assert!(one("bias_t_M", "change", "change").abs() < 2.0);
     assert!(one("bias_K_e2", "change", "change").abs() < 30.0);
@@ -210,7 +210,7 @@ fn a_lead_of_another_form_has_no_bias() {
     assert!(of("bias_K").unwrap().statistics.mean.abs() < 30.0);
 }
 
-/// What cannot be fitted is a row with its reason, and has no verdict.
+/// A failed fit is a row with its reason, and has no verdict.
 #[test]
 fn a_run_that_cannot_be_fitted_says_why() {
     let text = PLAN.replace("method = ", "span_s = [0.0, 0.05]\nmethod = ");

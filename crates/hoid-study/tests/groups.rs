@@ -1,4 +1,4 @@
-//! Groups of recorded runs as their users analyse them, on simulated people.
+//! Groups of recorded runs, analysed on simulated persons.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -80,7 +80,7 @@ fn a_group_gives_its_people_back_and_goes_on_when_it_was_stopped() {
     }
     assert!(content(&whole) == content(&pieces));
 
-    // A group that was stopped, with a table of each kind of block damaged.
+    // A stopped group, with a damaged table of each kind of block.
     let damaged = out.path().join("damaged");
     let left = AtomicU64::new(6);
     let go_on = || {
@@ -98,7 +98,7 @@ fn a_group_gives_its_people_back_and_goes_on_when_it_was_stopped() {
     let outcome = run_group(&manifest, data.path(), &damaged, &options(2, true), &|_| (), &|| true).unwrap();
     assert_eq!(outcome.notes.len(), 2, "{:?}", outcome.notes);
     assert!(content(&whole) == content(&damaged));
-    // Nothing is written among the recordings.
+    // No file is written among the recordings.
     let among = run_group(
         &manifest,
         data.path(),
@@ -136,7 +136,7 @@ fn a_group_gives_its_people_back_and_goes_on_when_it_was_stopped() {
         let error = rows.iter().map(|i| errors[*i].powi(2)).sum::<f64>().sqrt() / 2.0;
         assert!((mean - k_e).abs() < 4.0 * error, "{who}: {mean} +- {error}");
     }
-    // The change of C4 shows in the sub-batches.
+    // The change of C4 is visible in the sub-batches.
     let averages = read_table(&whole.join("averages.parquet")).unwrap();
     let of = |when: &str| {
         let row = (0..texts(&averages, "subject").len())
@@ -283,8 +283,8 @@ fn a_bad_file_is_a_row_and_a_bad_manifest_an_error() {
     );
 }
 
-/// Runs of two people who change at the seam are joined, and the findings in the frequency domain
-/// is the simulated scenario.
+/// Runs of two persons joined at the seam, and the agreement of the fits with the describing
+/// function.
 #[test]
 fn joined_runs_settle_and_fits_agree_with_the_describing_function() {
     let data = recorded();
@@ -374,7 +374,7 @@ run = "2"
         of("phase_margin_deg")
     );
 
-    // The manifest states where the change is, or the seam does.
+    // The change is given by the manifest or by the seam.
     let both = text.replace(
         "[[runs]]\nfile = \"A_C1_1.csv\"\nsubject",
         "[conditions.\"A then B\"]\nchange_s = 5.0\n\n[[runs]]\nfile = \"A_C1_1.csv\"\nsubject",
@@ -383,15 +383,15 @@ run = "2"
     assert!(refused.contains("seam"), "{refused}");
 }
 
-/// A sample of delay more in every file is a sample of nk more, by the operator of the person (C1)
-/// and by the fits to all runs at once (C4, which is reported to change).
+/// One more sample of delay in every file is one more sample of nk, by the operator of the person
+/// (C1) and by the joint fits to all runs (C4, for which a change is declared).
 #[test]
 fn the_delay_moves_with_the_output() {
     let data = recorded();
     let late = tempfile::tempdir().unwrap();
     let mut manifest = manifest(data.path());
     manifest.runs.retain(|run| run.subject == "A");
-    // ARX takes longer delays, which are not to end at the range.
+    // ARX selects longer delays, which must not reach the limit of the range.
     manifest.analysis.delay_s = (0.27, 0.42);
     manifest.analysis.methods.clear();
     manifest.analysis.each_run = false;

@@ -1,5 +1,5 @@
-//! Plans of studies, manifests of groups and scenarios whose text was changed: read or refused as
-//! text that name the file, and never a panic; data that are read can be read again.
+//! Modified texts of plans of studies, manifests of groups and scenarios: read, or refused with a
+//! message that names the file, without a panic; accepted data can be read again.
 #![allow(clippy::unwrap_used)]
 
 use std::{fs, path::Path};
@@ -86,7 +86,7 @@ condition = "fo"
 run = "1"
 "#;
 
-/// Values that are where others belong.
+/// Values in wrong places.
 const VALUES: [&str; 30] = [
     "",
     "0",
@@ -123,7 +123,7 @@ const CHARACTERS: [char; 14] = [
     '[', ']', '{', '}', '"', '\'', '=', '.', ',', '#', '\n', '\0', '\u{1b}', '\u{fffd}',
 ];
 
-/// Treatment of a text.
+/// Modification of a text.
 #[derive(Debug, Clone)]
 enum Change {
     Value(Index, Index),
@@ -188,7 +188,7 @@ fn changed(text: &str, by: &[Change]) -> String {
     lines.join("\n")
 }
 
-/// A message names its file, is short, and holds nothing that a terminal obeys.
+/// A message names its file, is short, and contains no terminal control characters.
 fn message(said: &str) -> Result<(), TestCaseError> {
     prop_assert!(said.contains("made-up.toml"), "{}", said);
     prop_assert!(said.chars().count() < 4000, "{} characters", said.len());

@@ -1,4 +1,4 @@
-//! Bad plans fail before anything runs, naming file, line and remedy.
+//! Invalid plans fail before anything runs, with file, line and remedy.
 #![allow(clippy::unwrap_used)]
 
 use hoid_study::{Plan, plan_schema};
@@ -27,7 +27,7 @@ memory = 256
 fn bad_plans_name_line_and_remedy() {
     assert!(Plan::parse(GOOD, "good.toml").is_ok());
     let cases = [
-        // (what is replaced, by what, line, words of the message)
+        // (text to replace, replacement, line, words of the message)
         ("name = \"x\"", "nam = \"x\"", 1, vec!["unknown field", "nam"]),
         ("name = \"x\"", "name = \"a/b\"", 1, vec!["a/b", "letters"]),
         (
@@ -128,7 +128,7 @@ fn bad_plans_name_line_and_remedy() {
     }
 }
 
-/// Options of what is run as `hoid identify` runs it: as the registry has them, checked before anything runs.
+/// Options of analyses run as by `hoid identify`: as in the registry, checked before anything runs.
 #[test]
 fn options_of_an_operator_are_checked() {
     let of = |text: &str| {
@@ -251,7 +251,7 @@ fn an_earlier_name_of_a_method_is_read() {
     assert_ne!(by("population"), by("multiple-model"));
 }
 
-/// The published schema is the one that the program has.
+/// The published schema equals that of the program.
 #[test]
 fn the_book_has_the_schema() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/reference/plan.schema.json");

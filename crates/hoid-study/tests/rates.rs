@@ -1,4 +1,4 @@
-//! Groups that are recorded at a high rate: decimated automatically, the same people and lines.
+//! Groups recorded at a high rate: automatic decimation preserves operators and lines.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -15,7 +15,7 @@ use hoid_study::{
     group::{Manifest, NumberOrText, PeopleExperiment, PreparationSettings, run_group, simulate_people},
 };
 
-/// A person's runs at a rate, analysed: the manifest, and crossover, margin and delay with their errors.
+/// The runs of a person at a rate, analysed: the manifest, and crossover, margin and delay with their errors.
 fn analysed(directory: &Path, sample_time_s: f64) -> (Manifest, [(f64, f64); 3]) {
     let experiment = PeopleExperiment {
         subjects: 1,
@@ -90,8 +90,8 @@ fn a_group_at_1000_hz_is_that_at_100_hz() {
     let expected = describe_runs(&whole, &options).unwrap();
     let lines = read_table(&out.join("describing-functions.parquet")).unwrap();
     for (k, (line, phase)) in expected.function.lines.iter().zip(expected.phases_deg()).enumerate() {
-        // What the filter takes from the ends is noise to the lines: a small part of their errors. The lead
-        // of the input alone would be .26 deg at 1 rad/s.
+        // The samples that the filter cuts at the ends appear as noise at the lines: a small part of their errors. The
+        // lead of the input by itself would be .26 deg at 1 rad/s.
         let magnitude = line.magnitude_db();
         for (name, expected, least) in [("magnitude_db", magnitude, 0.02), ("phase_deg", phase, 0.1)] {
             let distance = (reals(&lines, name)[k] - expected.value).abs();
@@ -126,7 +126,7 @@ fn the_rate_of_a_group_as_typed() {
     ] {
         assert_eq!(settings.by_rate(None).unwrap().factor(ts), factor, "{settings:?}");
     }
-    // A condition that names the rate wins.
+    // A rate given by a condition takes precedence.
     assert_eq!(
         of(text("off"), None)
             .by_rate(Some(&of(text("auto"), None)))

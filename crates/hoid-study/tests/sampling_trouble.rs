@@ -1,4 +1,4 @@
-//! Sampling trouble that was planted is found where it is, and none if there is none.
+//! Simulated sampling defects are detected at their places, and none are reported without defects.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
@@ -24,7 +24,7 @@ fn experiment(trouble: &[SamplingDefect]) -> VirtualExperiment {
     }
 }
 
-/// The troubles of each run, and the run itself without any.
+/// The sampling problems of each run, and the run without defects.
 fn found(trouble: &[SamplingDefect], options: &ReadOptions) -> Vec<(Vec<Found>, Record)> {
     let (clean, troubled) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     simulate_group(&experiment(&[]), clean.path(), &|| ()).unwrap();
@@ -149,7 +149,7 @@ fn a_record_is_cut_where_it_is_masked() {
             shortest_s,
         )
     };
-    // Without a mask the gaps are an error as ever.
+    // Without a mask the gaps are an error as before.
     assert!(cut(&[], 2.0).unwrap_err().to_string().contains("samples missing"));
     let segments = cut(&[QualityIssueKind::Gap, QualityIssueKind::Stalled], 1.0).unwrap();
     assert!(segments.len() > 10);

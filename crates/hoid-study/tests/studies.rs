@@ -1,5 +1,5 @@
-//! Studies as their users run them: the same bytes for any division of the work, resumed after any
-//! end, refused when parts do not belong together.
+//! Studies as a whole: the same bytes for any division of the work, resumed after any interruption,
+//! refused if parts do not belong together.
 #![allow(clippy::unwrap_used)]
 
 use std::{
@@ -172,8 +172,8 @@ fn a_stopped_study_goes_on_and_repeats_nothing() {
     let (mut made, mut sessions) = (0, 0);
     loop {
         sessions += 1;
-        // Three replications at a time, each asked for by every estimator: blocks that are not
-        // finished are lost.
+        // Three replications at a time, each requested by every estimator: unfinished blocks are
+        // lost.
         let left = AtomicU64::new(3 * plan.estimators.len() as u64);
         let go_on = || {
             left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1))
@@ -192,14 +192,14 @@ fn a_stopped_study_goes_on_and_repeats_nothing() {
         if outcome.finished {
             break;
         }
-        // What a killed program leaves behind: a file on its way.
+        // A file in progress that a killed program leaves.
         fs::write(directory.path().join("parts/.tmp123"), b"half").unwrap();
         assert!(sessions < 20, "no end");
     }
     assert!(sessions > 2, "{sessions}");
     assert!(made >= total);
     assert!(content(directory.path()) == expected);
-    // A finished study is found finished.
+    // A finished study is recognised as finished.
     let outcome = run(&plan, directory.path(), &options, &|_| (), &|| true).unwrap();
     assert_eq!((outcome.finished, outcome.estimates), (true, 0));
 }
@@ -240,7 +240,7 @@ fn parts_that_do_not_belong_together_are_refused() {
     assert!(matches!(of(&[]), StudyError::NoStudy { .. }));
     assert!(!at("out").exists(), "nothing is left of what was refused");
 
-    // A directory is not overwritten, nor continued with something else.
+    // A directory is not overwritten, nor continued with a different study.
     let again = quiet(&plan(), &at("1"), shard(1, 3)).unwrap_err();
     assert!(matches!(again, StudyError::Occupied { .. }));
     let resume = RunOptions {
@@ -285,13 +285,13 @@ fn text<'a>(table: &'a OutputTable, column: &str, row: usize) -> &'a str {
     }
 }
 
-/// A row is the result of simulating and fitting that run by itself gives, to the last bit.
+/// A row equals the result of simulating and fitting that run separately, to the last bit.
 #[test]
 fn a_row_is_the_run_by_itself() {
     let (directory, _) = whole(2);
     let fits = read_table(&directory.path().join("fits.parquet")).unwrap();
     let rows = fits.columns[0].values.len();
-    // 5 replications in two cells by 4 estimators, one in the silent cell by 3.
+    // 5 replications in two cells by 4 estimators, one in the cell without remnant by 3.
     assert_eq!(rows, 2 * 5 * 4 + 3);
     let row = (0..rows)
         .find(|r| {
@@ -325,7 +325,7 @@ fn a_row_is_the_run_by_itself() {
         );
     }
     assert_eq!(real(&fits, "K_e", row), fit.operator().unwrap().k_e.value);
-    // In the silent cell ARX is exact.
+    // In the cell without remnant ARX is exact.
     let silent = (0..rows)
         .find(|r| whole_number(&fits, "cell", *r) == 2 && real(&fits, "nk", *r) == 29.0)
         .unwrap();

@@ -1,4 +1,4 @@
-//! Why the thesis could not be reproduced.
+//! Errors of the reproduction of the thesis.
 
 use hoid_ident::IdentError;
 use hoid_io::IoError;
@@ -8,7 +8,7 @@ use hoid_sim::SimError;
 use hoid_study::StudyError;
 use thiserror::Error;
 
-/// Everything that stops a reproduction.
+/// Reason why a reproduction failed.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ThesisError {
@@ -23,25 +23,25 @@ pub enum ThesisError {
     /// Tables that cannot be read, or a page that cannot be written.
     #[error(transparent)]
     Io(#[from] IoError),
-    /// A page that could not be made.
+    /// A page that could not be rendered.
     #[error(transparent)]
     Report(Box<ReportError>),
     /// A study that failed.
     #[error(transparent)]
     Study(Box<StudyError>),
-    /// A comparator that a record does not serve.
+    /// A comparator for which a record is unsuitable.
     #[error("{method}: {quantity} is {found}, expected {expected}")]
     Unsuited {
         /// The comparator.
         method: &'static str,
         /// The problem.
         quantity: String,
-        /// The value as found.
+        /// The value found.
         found: String,
-        /// As it should be.
+        /// The expected value.
         expected: String,
     },
-    /// An estimator that failed, or an option that it does not have.
+    /// An estimator that failed, or an invalid option.
     #[error(transparent)]
     Estimator(Box<IdentError>),
     /// An invalid model.

@@ -1,10 +1,10 @@
-//! The thesis, reproduced: its studies, tables, figures and claims (A. Ortiz Moya, *Time-Varying
-//! Human-Operator Identification with Box-Jenkins Models*, MSc thesis, Delft University of
-//! Technology, 2023).
+//! Reproduction of the thesis: its studies, tables, figures and claims (A. Ortiz Moya,
+//! *Time-Varying Human-Operator Identification with Box-Jenkins Models*, MSc thesis, Delft
+//! University of Technology, 2023).
 //!
 //! The text compares ARX and Box-Jenkins models of the human operator, in batches and recursively,
-//! by simulation. [`reproduce`] runs its studies, draws its tables and figures, tests what it
-//! claims, and writes a page that shows all of it:
+//! by simulation. [`reproduce`] runs its studies, draws its tables and figures, tests its claims,
+//! and writes a page with the results:
 //!
 //! ```no_run
 //! use hoid_thesis::{Reproduction, ReproductionEvent, reproduce};

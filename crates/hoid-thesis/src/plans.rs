@@ -1,4 +1,4 @@
-//! The studies of the thesis, as named plans, next to those that come with the program anyway.
+//! The studies of the thesis, as named plans, in addition to the built-in ones.
 
 use hoid_study::{NamedPlan, PLANS};
 
@@ -11,7 +11,7 @@ macro_rules! named {
     };
 }
 
-/// The named plans of the reproduction, in the order in which they are run.
+/// The named plans of the reproduction, in the order of execution.
 pub const TEXT_PLANS: &[NamedPlan] = named![
     "noise-level",
     "bias",
@@ -33,12 +33,12 @@ pub const SURVEY: &NamedPlan = &NamedPlan {
     text: include_str!("../plans/survey.toml"),
 };
 
-/// The named plans of the list: those of the thesis, and those beyond it.
+/// The listed named plans: those of the thesis, and additional ones.
 pub fn named_plans() -> impl Iterator<Item = &'static NamedPlan> {
     TEXT_PLANS.iter().chain(PLANS)
 }
 
-/// The named plan of a name: one of the list, or [`SURVEY`], which is for comparison.
+/// The plan with a given name: a listed one, or [`SURVEY`], which is for comparison.
 pub fn find(name: &str) -> Option<&'static NamedPlan> {
     named_plans().chain([SURVEY]).find(|plan| plan.name == name)
 }

@@ -1,5 +1,5 @@
-//! The page of the book that reports where each row of the thesis is: what it names is made, what
-//! is made is named, and its numbers are those of its rows.
+//! Checks the page of the book that lists the rows of the thesis: each listed item is made, each
+//! item made is listed, and the numbers are those of its rows.
 #![allow(clippy::unwrap_used)]
 
 use std::{collections::BTreeSet, path::Path};
@@ -16,7 +16,7 @@ fn rows<'a>(page: &'a str, heading: &str) -> Vec<Vec<&'a str>> {
         .collect()
 }
 
-/// `C.1` to `C.16` and the like, one by one; any other text as it is.
+/// Expands `C.1` to `C.16` and the like; any other text unchanged.
 fn each(first: &str, last: &str) -> Vec<String> {
     let (letter, from) = first.rsplit_once('.').unwrap_or(("", first));
     let to: u32 = last.rsplit_once('.').map_or(last, |(_, n)| n).parse().unwrap();
@@ -33,7 +33,7 @@ fn count(cell: &str) -> usize {
     numbers.split(", ").map(of).sum()
 }
 
-/// What is between backticks, ranges one by one.
+/// Texts between backticks, with ranges expanded.
 fn quoted(cell: &str) -> Vec<String> {
     let parts: Vec<&str> = cell.split('`').collect();
     let mut names = Vec::new();
@@ -74,7 +74,7 @@ fn the_page_of_rows_is_true() {
         } else if made.contains(&name) || plans.contains(name.as_str()) {
             named.insert(name);
         } else {
-            // Options and methods are in the options of the program.
+            // Options and methods are those of the program.
             let options = include_str!("../../../docs/src/reference/command-line.md");
             assert!(name == CLAIMS || options.contains(&name), "{name} is nothing");
         }

@@ -1,8 +1,8 @@
 //! The challenge on recorded people (`hoid_challenge`, `people`).
 //!
-//! `cargo xtask slow challenge-people [--kinds fo-so,...] [--methods NAME,...] [--runs N] [--part I/N]
-//! [--out DIRECTORY]`; the environment variable `HOID_HUMAN_DATA` names the directory of the
-//! recordings, which are not part of the project. Its lines are not to be kept in it either.
+//! `cargo xtask slow challenge-people [--kinds fo-so,...] [--methods NAME,...] [--runs N] [--part I/N] [--out
+//! DIRECTORY]`; the environment variable `HOID_HUMAN_DATA` names the directory of the recordings, which are not part of
+//! the project. Its results must not be stored in the project either.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 use std::{path::PathBuf, process::ExitCode};

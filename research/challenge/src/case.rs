@@ -7,7 +7,7 @@ use super::operator::{Parameter, Plant};
 pub enum Form {
     /// Gain and lead: the operator of the thesis.
     Lead,
-    /// A gain alone.
+    /// A gain only.
     Gain,
     /// Gain, lead and lag: people on `1/s`.
     LeadLag,
@@ -15,7 +15,7 @@ pub enum Form {
     Lead2Lag,
     /// Gain and lead after a neuromuscular system of third order.
     ThirdOrder,
-    /// Gain and lead, and the dynamics of a stick of 20 to 30 rad/s.
+    /// Gain and lead, and the dynamics of a stick with 20 to 30 rad/s.
     StickDynamics,
 }
 
@@ -25,20 +25,19 @@ pub enum Forcing {
     /// A disturbance at the input of the plant: primes times 0.05 Hz up to 1.55 Hz, amplitudes as
     /// 1 over frequency.
     Disturbance,
-    /// The same as a target.
+    /// The same lines as a target.
     Target,
     /// Ten sines from 0.157 to 13.8 rad/s as a target, those above 2.6 rad/s ten times smaller (D. T.
     /// McRuer et al., AFFDL-TR-65-15, 1965).
     McRuer,
 }
 
-/// When the person looks and acts.
+/// Sampling of the operator's input and output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sight {
-    /// Error and control are held over each sample, as on a display that is drawn again and a stick
-    /// that is read.
+    /// Error and control are held over each sample, as with a sampled display and stick.
     Held,
-    /// Continuously; the recorder samples.
+    /// Continuous; only the recorder samples.
     Continuous,
 }
 
@@ -47,16 +46,16 @@ pub enum Sight {
 pub enum Spectrum {
     /// `1/(T_n s + 1)^m`.
     Lag(usize),
-    /// A lag of first order, a peak at omega_nm (20 % of the variance) and a drift of 3 to 10 s (10 %).
+    /// A first-order lag, a peak at omega_nm (20 % of the variance) and a drift of 3 to 10 s (10 %).
     Rich,
-    /// A lag of first order, and a narrow peak at 50 to 60 rad/s with a quarter of the variance.
+    /// A first-order lag, and a narrow peak at 50 to 60 rad/s with a quarter of the variance.
     Tremor,
 }
 
-/// How the strength of the remnant continues.
+/// Time course of the remnant's strength.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Course {
-    /// It stays.
+    /// Constant.
     Steady,
     /// Standard deviation times `1 + a sin(2 pi t/30 s + phase)`: from one end to the other in 15 s.
     Wander(f64),
@@ -66,61 +65,61 @@ pub enum Course {
     Error,
     /// Proportional to the running rms of u over 1 s.
     Control,
-    /// One sample in fifty seven times as large.
+    /// One sample in fifty is seven times as large.
     Impulsive,
-    /// 80 % of the variance in two pulses a second.
+    /// 80 % of the variance in two pulses per second.
     Pulsed,
-    /// On and off for 2 s each in the mean; off with a ninth of the variance.
+    /// Alternately on and off for 2 s each on average; with a ninth of the variance when off.
     Intermittent,
 }
 
-/// Effects of stick and recorder.
+/// Imperfections of stick and recorder.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Blemish {
-    /// Nothing.
+    /// None.
     None,
-    /// A random walk of the stick, rms of u per root second, in the loop.
+    /// A random walk of the stick in the loop, rms of u per root second.
     Drift(f64),
-    /// Offset of recorded e and u, in their rms.
+    /// Offset of recorded e and u, relative to their rms.
     Offset(f64),
-    /// The stick reads in steps of this part of the rms of u, in the loop.
+    /// Quantisation of the stick in the loop, in steps of this fraction of the rms of u.
     Quantised(f64),
-    /// The stick ends at a given number of rms of u, in the loop.
+    /// Saturation of the stick in the loop at this multiple of the rms of u.
     Saturated(f64),
-    /// Every 50 s in the mean one recorded sample of u is off by a given number of standard
-    /// deviations of the innovations.
+    /// Outliers of recorded u every 50 s on average, by this number of standard deviations of the
+    /// innovations.
     Glitches(f64),
     /// Recorded e and u are NaN for 3 s from 60 s on.
     Missing,
-    /// They are zero for 3 s from 60 s on.
+    /// Recorded e and u are zero for 3 s from 60 s on.
     Silent,
-    /// No one acts and nothing moves for the first a given number of seconds.
+    /// No activity for the first seconds, of the given number.
     IdleStart(f64),
-    /// From so many seconds on u is recorded with the wrong sign.
+    /// From this time on, s, u is recorded with the wrong sign.
     Polarity(f64),
 }
 
-/// A change of the operator alone: remnant, plant and forcing stay.
+/// A change of the operator only: remnant, plant and forcing function are unchanged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shift {
     /// When it starts, s.
     pub at_s: f64,
-    /// How long it takes, s; the factor grows geometrically.
+    /// Duration, s; the factor changes geometrically.
     pub takes_s: f64,
-    /// The part that changes.
+    /// The parameter that changes.
     pub parameter: Parameter,
-    /// By which factor.
+    /// Its factor.
     pub factor: f64,
 }
 
-/// Information about the delay that a method gets.
+/// Information about the delay that is given to a method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DelayKnown {
-    /// Its value, which is a whole number of samples.
+    /// Its value, a whole number of samples.
     Whole,
-    /// Its value to the next sample; it lies half a sample off.
+    /// Its value rounded to a sample; it differs by half a sample.
     Fraction,
-    /// Nothing.
+    /// None.
     No,
 }
 
@@ -131,7 +130,7 @@ pub enum Theme {
     Remnants,
     /// Changes of each size.
     Changes,
-    /// When and how the person changes.
+    /// Time and course of changes.
     Courses,
     /// Changes under each remnant.
     ChangesInRemnants,
@@ -156,13 +155,13 @@ hoid_model::named_choice!(Theme, "theme of the challenge", 7, {
 /// A case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Case {
-    /// Its name: random streams belong to it.
+    /// Its name, which determines its random streams.
     pub name: String,
     /// Its theme.
     pub theme: Theme,
-    /// Its definition, in a line.
+    /// Description, one line.
     pub meaning: String,
-    /// Samples a second.
+    /// Samples per second.
     pub rate_hz: f64,
     /// Length of a record, s.
     pub length_s: f64,
@@ -172,25 +171,25 @@ pub struct Case {
     pub form: Form,
     /// The excitation.
     pub forcing: Forcing,
-    /// When the person looks and acts.
+    /// Sampling of the operator's input and output.
     pub sight: Sight,
     /// Spectrum of the remnant.
     pub spectrum: Spectrum,
-    /// Its strength.
+    /// Time course of its strength.
     pub course: Course,
-    /// Its standard deviation in that of u without it.
+    /// Its standard deviation relative to that of u without it.
     pub ratio: f64,
-    /// Stick and recorder.
+    /// Imperfections of stick and recorder.
     pub blemish: Blemish,
     /// Changes in order of time.
     pub shifts: Vec<Shift>,
-    /// The report of the delay.
+    /// Information about the delay.
     pub delay: DelayKnown,
 }
 
 impl Case {
-    /// The case that all others are variants of: gain and lead on `1/s^2`, a disturbance, a steady
-    /// remnant of first order, 100 Hz, 90 s, no one changes.
+    /// The base case: gain and lead on `1/s^2`, a disturbance, a steady first-order remnant, 100
+    /// Hz, 90 s, no change.
     pub(super) fn baseline(theme: Theme, name: impl Into<String>, meaning: impl Into<String>) -> Self {
         Self {
             name: name.into(),
@@ -211,7 +210,7 @@ impl Case {
         }
     }
 
-    /// The start span that every method is given, s: the first third, 30 s at most.
+    /// The start span given to every method, s: the first third, at most 30 s.
     pub fn start_s(&self) -> (f64, f64) {
         (0.0, (self.length_s / 3.0).min(30.0))
     }
@@ -226,7 +225,7 @@ impl Case {
         times
     }
 
-    /// True if all that changes does so within two seconds: there is a moment to be found.
+    /// True if all changes are completed within two seconds, so that they have a definite time.
     pub fn changes_at_once(&self) -> bool {
         self.shifts.iter().all(|shift| shift.takes_s <= 2.0)
     }

@@ -1,15 +1,15 @@
 //! The cases.
 //!
-//! A change starts at 45 s where nothing else is specified and takes half a second. Sizes that no
-//! loop bears (a delay times two on `1/s^2`) are those of the persons who bear them: who would lose
-//! control is drawn again ([`draw`](super::draw)).
+//! A change starts at 45 s unless specified otherwise and takes half a second. Sizes for which most
+//! loops are unstable (a delay times two on `1/s^2`) apply to persons with a stable loop: others
+//! are drawn again ([`draw`](super::draw)).
 
 use super::{
     case::{Blemish, Case, Course, DelayKnown, Forcing, Form, Shift, Sight, Spectrum, Theme},
     operator::{Parameter, Plant},
 };
 
-/// When a change starts, and how long it takes, s.
+/// Default start and duration of a change, s.
 const AT_S: f64 = 45.0;
 const TAKES_S: f64 = 0.5;
 
@@ -37,7 +37,7 @@ pub fn cases() -> Vec<Case> {
 /// A named spectrum, course or blemish.
 type Kind = (&'static str, &'static str, Spectrum, Course, Blemish);
 
-/// Every remnant, and every thing that stick and recorder do.
+/// All remnants, and all imperfections of stick and recorder.
 const KINDS: [Kind; 21] = {
     use Blemish as B;
     use Course as C;
@@ -205,7 +205,7 @@ fn changes() -> Vec<Case> {
     let mut all = Vec::new();
     for (name, parameter) in named {
         for (percent, factor) in [(10, 1.1), (30, 1.3), (100, 2.0)] {
-            // Up where a loop bears it, down where it would not.
+            // Increased if the loop remains stable, otherwise decreased.
             let factor = if parameter == Gain || parameter == KE {
                 1.0 / factor
             } else {
@@ -369,7 +369,7 @@ fn loops() -> Vec<Case> {
             Form::ThirdOrder,
         ),
     ];
-    // The gain of an unstable plant may grow, not fall: below one it is not held.
+    // With an unstable plant the gain may increase, not decrease: below one the loop is unstable.
     for case in all.iter_mut().filter(|case| case.plant == Plant::Unstable) {
         case.shifts = vec![shift(Parameter::Gain, 1.4)];
     }

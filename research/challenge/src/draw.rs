@@ -1,9 +1,9 @@
-//! Participants of a run: seeds and persons.
+//! Seeds and persons of a run.
 //!
-//! Every run has a person of its own, so that no method can know the numbers. Parameters are
-//! uniform over ranges of people (see [`hoid_sim::people`] for the sources), the gain follows from a
-//! crossover that is drawn. A person whose loop is not stable, or rings (`|1/(1 + Y P)|` over 3.5),
-//! before a change, after it or half-way, is drawn again.
+//! Every run has a different person, so that no method can know the parameters. Parameters are
+//! uniform over ranges of people (see [`hoid_sim::people`] for the sources), the gain follows from
+//! a random crossover frequency. A person whose loop is unstable, or poorly damped (`|1/(1 + Y P)|`
+//! over 3.5), before, after or half-way through a change, is drawn again.
 
 use std::{fmt, str::FromStr};
 
@@ -15,19 +15,19 @@ use super::{
     operator::{Operator, Plant},
 };
 
-/// Which runs.
+/// Set of seeds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Seeds {
-    /// Those for making a method.
+    /// Seeds for the development of a method.
     Open,
-    /// Those for its judgement: run once, when it is made.
+    /// Seeds for its evaluation, used once when it is finished.
     Sealed,
 }
 
 hoid_model::named_choice!(Seeds, "seeds of the challenge", 2, { Open => "open", Sealed => "sealed" });
 
 impl Seeds {
-    /// The seed of all their runs.
+    /// The seed of all runs of the set.
     pub(super) fn seed(self) -> u64 {
         match self {
             Self::Open => 2_026_112_201,
@@ -39,14 +39,14 @@ impl Seeds {
 /// A run of a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RunOf {
-    /// Which seeds.
+    /// Set of seeds.
     pub seeds: Seeds,
-    /// Its number.
+    /// Number of the run.
     pub number: u64,
 }
 
 impl RunOf {
-    /// A stream of the run: those of a case depend on its name alone, so that cases can be added.
+    /// A random stream of the run: those of a case depend on its name only, so that cases can be added.
     pub(super) fn stream(self, case: &Case, tag: u64) -> RunSeed {
         // FNV-1a.
         let name = case.name.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
@@ -68,7 +68,7 @@ pub struct Portion {
 }
 
 impl Portion {
-    /// All of it.
+    /// The whole work.
     pub const ALL: Self = Self { index: 1, of: 1 };
 
     /// True if item i belongs to it.
@@ -95,14 +95,14 @@ impl fmt::Display for Portion {
     }
 }
 
-/// Draws before a case counts as one that no person can stabilise.
+/// Number of draws after which no person can stabilise a case.
 const MOST_DRAWS: usize = 2000;
 const NUMBERS: usize = 10;
 /// Largest `|1/(1 + Y P)|`.
 const LARGEST_SENSITIVITY: f64 = 3.5;
 const PERSON: u64 = 1;
 
-/// The person of a run; `attempt` counts those who lost control in the simulation.
+/// The person of a run; `attempt` counts previous persons who lost control in the simulation.
 pub(super) fn person(case: &Case, run: RunOf, ts: SampleTime, attempt: usize) -> Result<Operator, SimError> {
     let numbers = run.stream(case, PERSON).uniform(NUMBERS * MOST_DRAWS);
     let mut left = attempt;
@@ -127,7 +127,7 @@ fn drawn(case: &Case, ts: SampleTime, draw: &[f64]) -> Result<Option<Operator>, 
     let (lead, delay, crossover) = match case.plant {
         Plant::Integrator => ((0.3, 0.7), (0.12, 0.22), (2.0, 4.0)),
         Plant::Unstable => ((0.3, 0.7), (0.1, 0.16), (2.5, 4.0)),
-        // People's two leads are each as long as the one of a plant of second order.
+        // Each of the two leads is as long as the single one on a second-order plant.
         Plant::Lagged if case.form == Form::Lead2Lag => ((0.5, 1.0), (0.14, 0.24), (1.2, 2.5)),
         Plant::Lagged => ((0.4, 0.9), (0.16, 0.28), (1.5, 2.8)),
         Plant::DoubleIntegrator => ((0.5, 1.5), (0.16, 0.3), (1.0, 2.2)),
@@ -172,7 +172,7 @@ fn drawn(case: &Case, ts: SampleTime, draw: &[f64]) -> Result<Option<Operator>, 
         states.push(before.times(shift.parameter, shift.factor.sqrt()));
         states.push(before.times(shift.parameter, shift.factor));
     }
-    // What is held is late by half a sample twice.
+    // Two holds add half a sample of delay each.
     let late = if case.sight == Sight::Held { ts.s() } else { 0.0 };
     for state in states {
         let state = Operator {
@@ -186,7 +186,7 @@ fn drawn(case: &Case, ts: SampleTime, draw: &[f64]) -> Result<Option<Operator>, 
     Ok(Some(first))
 }
 
-/// True if the loop is stable and does not ring.
+/// True if the loop is stable and sufficiently damped.
 fn is_borne(operator: &Operator, plant: Plant) -> Result<bool, ModelError> {
     let sensitivity = |i: i32| {
         let omega = 0.1 * 10f64.powf(f64::from(i) / 40.0);

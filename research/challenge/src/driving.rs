@@ -1,5 +1,5 @@
-//! Excitation of the loop of a case: target or disturbance, their size in u and e, and the course
-//! of the remnant's strength.
+//! Excitation of the loop of a case: target or disturbance, their size in u and e, and the time
+//! course of the remnant's strength.
 
 use std::f64::consts::TAU;
 
@@ -18,7 +18,7 @@ use super::{
 
 const PHASES: u64 = 3;
 
-/// The course of the remnant's strength.
+/// The time course of the remnant's strength.
 pub(super) struct Strength {
     course: Course,
     sizes: [f64; 2],
@@ -52,13 +52,13 @@ impl Strength {
         }
     }
 
-    /// Takes u into its running mean square over 1 s.
+    /// Updates the running mean square of u over 1 s.
     pub fn follow(&mut self, u: f64) {
         self.square += self.forgets * (u * u - self.square);
     }
 }
 
-/// Target or disturbance of a run, of unit rms.
+/// Target or disturbance of a run, with unit rms.
 pub(super) fn forcing(case: &Case, run: RunOf) -> Result<ForcingFunction, SimError> {
     let lines: Vec<Sinusoid> = match case.forcing {
         Forcing::McRuer => MCRUER_RAD_S
@@ -70,7 +70,7 @@ pub(super) fn forcing(case: &Case, run: RunOf) -> Result<ForcingFunction, SimErr
             })
             .collect(),
         Forcing::Disturbance | Forcing::Target => {
-            // Loops on plants of second order are slower.
+            // Loops on second-order plants are slower.
             let largest = if matches!(case.plant, Plant::Integrator | Plant::Unstable) {
                 31
             } else {

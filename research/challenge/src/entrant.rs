@@ -2,7 +2,7 @@
 
 use hoid_model::{Complex64, Record, SampleTime};
 
-/// Signals that are to be followed, sample by sample.
+/// Signals to process, sample by sample.
 #[derive(Debug, Clone)]
 pub struct Task {
     /// Time between two samples.
@@ -13,20 +13,21 @@ pub struct Task {
     pub u: Vec<f64>,
     /// Name of the run.
     pub label: String,
-    /// The span that may be used at once for a start, s. Nothing is asked before its end.
+    /// The span that may be used at once for a start, s. No estimate is requested before its end.
     pub start_s: (f64, f64),
-    /// The delay in samples with the one of the hold, where it is reported.
+    /// The delay in samples including that of the hold, if given.
     pub nk: Option<usize>,
     /// Frequencies at which the response is requested, rad/s.
     pub lines_rad_s: Vec<f64>,
     /// Times at which it is requested, s, in order.
     pub asked_s: Vec<f64>,
-    /// Where two recordings were joined.
+    /// The seam of two joined recordings.
     pub seam: Option<Seam>,
 }
 
-/// The data before the second of two recordings. A filter that has the end of the first in it would
-/// jump at the seam as no person does: it takes these samples first, and its estimate stays.
+/// Data before the second of two recordings. A filter whose state is that of the end of the first
+/// would jump at the seam as no person does: it processes these samples first, without an update of
+/// the estimate.
 #[derive(Debug, Clone)]
 pub struct Seam {
     /// First sample of the second recording.
@@ -48,12 +49,12 @@ impl Task {
         ((t_s / self.sample_time.s() + 1e-6) as usize).min(self.e.len().saturating_sub(1))
     }
 
-    /// The whole as a record, where all of it was recorded.
+    /// The whole as a record, if all of it was recorded.
     pub fn record(&self) -> Option<Record> {
         self.span(0, self.e.len())
     }
 
-    /// The start span as a record, where all of it was recorded.
+    /// The start span as a record, if all of it was recorded.
     pub fn start_record(&self) -> Option<Record> {
         self.span(self.sample(self.start_s.0), self.sample(self.start_s.1))
     }
@@ -65,8 +66,8 @@ impl Task {
         Some(record.labelled(self.label.clone()).starting_at(self.time_s(from)))
     }
 
-    /// All samples in order, with the history of the second recording before it: sample, or none if
-    /// it is history; error; control.
+    /// All samples in order, with the history of the second recording before it: sample index, or
+    /// none for the history; error; control.
     pub fn samples(&self) -> impl Iterator<Item = (Option<usize>, f64, f64)> + '_ {
         let at = self.seam.as_ref().map_or(self.e.len(), |seam| seam.at);
         let own = move |from: usize, to: usize| (from..to).map(move |k| (Some(k), self.e[k], self.u[k]));
@@ -77,10 +78,10 @@ impl Task {
     }
 }
 
-/// Report about the response at a time.
+/// Estimate of the response at a time.
 #[derive(Debug, Clone, Default)]
 pub struct ReportedResponse {
-    /// H at each line; empty if nothing is specified.
+    /// H at each line; empty if there is none.
     pub response: Vec<Complex64>,
     /// Variances of its real and imaginary part and their covariance, at each line.
     pub covariance: Option<Vec<[f64; 3]>>,
@@ -89,35 +90,35 @@ pub struct ReportedResponse {
     pub parameters: Vec<(&'static str, f64, Option<f64>)>,
 }
 
-/// A change that was declared.
+/// A declared change.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Alarm {
-    /// When, s.
+    /// Time, s.
     pub t_s: f64,
-    /// True if it is reported to be of the remnant alone.
+    /// True if it is attributed to the remnant only.
     pub of_remnant: bool,
 }
 
 /// Result of an entrant.
 #[derive(Debug, Clone, Default)]
 pub struct EntrantResult {
-    /// The report at each time that was requested.
+    /// The estimate at each requested time.
     pub said: Vec<ReportedResponse>,
-    /// The changes that were declared; none for one that declares none.
+    /// The declared changes; none for an entrant that declares none.
     pub alarms: Option<Vec<Alarm>>,
     /// Names of the findings against the result.
     pub findings: Vec<String>,
 }
 
-/// One who takes part.
+/// A participant of the challenge.
 pub trait Entrant: Send + Sync {
     /// Its name.
     fn name(&self) -> String;
 
-    /// Follows the signals.
+    /// Processes the signals.
     ///
     /// # Errors
-    /// Why it cannot.
+    /// The reason for a failure.
     fn follow(&self, task: &Task) -> Result<EntrantResult, String>;
 }
 

@@ -1,4 +1,4 @@
-//! Why a challenge cannot be run.
+//! Errors of the challenge.
 
 use hoid_io::IoError;
 use thiserror::Error;
@@ -7,7 +7,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ChallengeError {
-    /// A case, an entrant, a recording or a line that cannot be used.
+    /// An invalid case, entrant, recording or line.
     #[error("challenge: {reason}")]
     Refused {
         /// The problem and the expected value.

@@ -1,11 +1,11 @@
-//! The challenge: cases that can refute a tracker, and how its estimates fare in them.
+//! The challenge: cases that can refute a tracker, and the performance of its estimates in them.
 //!
-//! A tracker that is judged on loops like those it was made on is judged by its maker. Here the loop is another one
-//! ([`simulate()`] shares nothing with the simulators of the methods), every run has a person of its own, the remnant
-//! need not be steady, normal or small, the operator need not have the form that is supposed, and the numbers of merit
-//! are those of the response that a person has, next to what could be known: the likelihood ratio of the true models,
-//! and a batch fit that knows the change. There are two sets of seeds, one for making a method and one for its
-//! judgement, run once.
+//! A tracker that is only evaluated on loops like those it was developed on is not tested independently. Here the loop
+//! is different ([`simulate()`] shares nothing with the simulators of the methods), every run has a different person,
+//! the remnant need not be steady, normal or small, the operator need not have the assumed form, and the figures of
+//! merit are those of the response of a person, compared with bounds: the likelihood ratio of the true models, and a
+//! batch fit with known changes. There are two sets of seeds, one for the development of a method and one for its
+//! evaluation, used once.
 //!
 //! | file | contents |
 //! |---|---|

@@ -1,9 +1,9 @@
-//! Reliability of an answer: the line of an entrant in a run.
+//! Evaluation of an entrant in a run: one line.
 //!
 //! The response is requested at seven lines from .5 to 6 rad/s, at +2, +4, +8, +13, +18 and +28 s after each change,
-//! once before the first, and every 10 s without a change. The error is the mean of `|dH|/|H|` over the lines; who
-//! carries no information, or no number, has the error 1, that of saying zero. The band of a line covers when real and
-//! imaginary part lie within 1.96 standard errors, each counted by itself.
+//! once before the first, and every 10 s without a change. The error is the mean of `|dH|/|H|` over the lines; a
+//! missing estimate, or one that is not a number, has the error 1, that of a zero response. The band of a line covers
+//! if the real or imaginary part lies within 1.96 standard errors, each counted separately.
 
 use std::collections::BTreeMap;
 
@@ -18,45 +18,45 @@ use super::{
     simulate::{Run, Truth, simulate},
 };
 
-/// Seconds after a change at which the response is requested.
+/// Times after a change at which the response is requested, s.
 pub const AFTER_S: [f64; 6] = [2.0, 4.0, 8.0, 13.0, 18.0, 28.0];
 /// Lines, rad/s: seven from .5 to 6 on a logarithmic scale.
 const LINES: usize = 7;
 const LINES_RAD_S: (f64, f64) = (0.5, 6.0);
-/// Seconds before the first change at which it is requested.
+/// Time before the first change at which it is requested, s.
 const BEFORE_S: f64 = 0.5;
-/// Seconds between two without a change, and times of its own of the long case.
+/// Interval of the requests without a change, s, and separate times for the long case.
 const STEADY_S: f64 = 10.0;
 const LONG_S: [f64; 4] = [60.0, 120.0, 200.0, 300.0];
-/// Largest error that is kept: a response that runs away counts as this.
+/// Largest error: that of a diverging response is limited to this.
 const LARGEST: f64 = 10.0;
 const STUDENT: f64 = 1.96;
-/// An alarm up to so long after a change is not false; one up to [`FOUND_S`] has found it.
+/// Time after a change within which an alarm is not false; within [`FOUND_S`] it has found the change.
 const OF_CHANGE_S: f64 = 12.0;
-/// The seconds within which a change is to be found.
+/// Times within which a change is to be found, s.
 pub const FOUND_S: [f64; 2] = [5.0, 8.0];
 
-/// The name of the batch fit that knows the changes.
+/// The name of the batch fit with known changes.
 pub const BATCH: &str = "batch (oracle)";
 
-/// An entrant in a run.
+/// Results of an entrant in a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Line {
     /// The case.
     pub case: String,
-    /// Its number in the seeds.
+    /// Number of the run in the seeds.
     pub run: u64,
     /// The entrant.
     pub method: String,
-    /// Why it could not follow.
+    /// Reason for a failure.
     pub failed: Option<String>,
-    /// What it reported at each time.
+    /// Results at each time.
     pub moments: Vec<Moment>,
-    /// Alarms that no change explains; none for one that declares none.
+    /// Number of alarms without a change; none for an entrant that declares none.
     pub false_alarms: Option<usize>,
-    /// Those among them that are reported to be of the remnant alone.
+    /// Number of these that are attributed to the remnant only.
     pub of_remnant: usize,
-    /// Seconds in which an alarm is false.
+    /// Time in which an alarm is false, s.
     pub exposed_s: f64,
     /// The changes.
     pub changes: Vec<ChangeOutcome>,
@@ -64,18 +64,18 @@ pub struct Line {
     pub findings: Vec<String>,
 }
 
-/// The report at a time.
+/// Result at a time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Moment {
     /// `+8` after a change, `before`, `steady`, or the time of the long case.
     pub label: String,
-    /// When, s.
+    /// Time, s.
     pub t_s: f64,
     /// Mean of |dH|/|H|.
     pub error: f64,
-    /// Bands of the response that hold the truth, and all.
+    /// Number of bands of the response that cover the truth, and of all.
     pub covered: [usize; 2],
-    /// Relative error of each parameter, and whether its band holds the truth.
+    /// Relative error of each parameter, and whether its band covers the truth.
     pub parameters: BTreeMap<String, (f64, Option<bool>)>,
 }
 
@@ -86,7 +86,7 @@ pub struct ChangeOutcome {
     pub at_s: f64,
     /// Logarithm of the true likelihood ratio within 5 and 8 s.
     pub evidence: [f64; 2],
-    /// Seconds to the first alarm, where there is one within 8 s.
+    /// Time to the first alarm, s, if there is one within 8 s.
     pub after_s: Option<f64>,
 }
 
@@ -97,7 +97,7 @@ pub(super) fn lines_rad_s() -> Vec<f64> {
     (0..LINES).map(of).collect()
 }
 
-/// Times that are requested, each with its label.
+/// Requested times with their labels.
 pub(super) fn asked(changes_s: &[f64], start_s: f64, length_s: f64, is_long: bool) -> Vec<(String, f64)> {
     let mut all = Vec::new();
     let steady = |from: f64| {
@@ -125,7 +125,7 @@ pub struct Posed {
     run: Run,
     task: Task,
     labels: Vec<String>,
-    /// Changes that have a moment.
+    /// Changes with a definite time.
     changes: Vec<ChangeOutcome>,
 }
 
@@ -133,7 +133,7 @@ impl Posed {
     /// The run of a case.
     ///
     /// # Errors
-    /// Where no one bears the case.
+    /// If no person can stabilise the case.
     pub fn new(case: &Case, of: RunOf) -> Result<Self, String> {
         let run = simulate(case, of).map_err(|e| e.to_string())?;
         let changes_s = if case.changes_at_once() {
@@ -176,13 +176,13 @@ impl Posed {
     pub fn line(&self, entrant: &dyn Entrant) -> Line {
         let mut line = self.measured(entrant.name(), entrant.follow(&self.task));
         if !self.case.changes_at_once() {
-            // While someone changes slowly an alarm is neither false nor late.
+            // During a slow change an alarm is neither false nor late.
             (line.false_alarms, line.exposed_s, line.of_remnant) = (None, 0.0, 0);
         }
         line
     }
 
-    /// The line of the batch fit that knows the changes.
+    /// The line of the batch fit with known changes.
     pub fn batch(&self) -> Line {
         let changes_s: Vec<f64> = self.changes.iter().map(|change| change.at_s).collect();
         let tau_e_s = self.run.truth.operator(0.0).tau_e_s;
@@ -198,7 +198,7 @@ impl Posed {
         let at = |omega: f64, t_s: f64| truth.response(omega, t_s);
         let mut line = scored(&self.task, &self.labels, &at, method, answer, &self.changes);
         (line.case, line.run) = (self.case.name.clone(), self.number);
-        // Parameters have names where the operator is that of the thesis, as it was recorded.
+        // Parameters have names if the operator is that of the thesis, as recorded.
         let named = truth.operator(0.0).is_lead() && !matches!(self.case.blemish, Blemish::Polarity(_));
         for moment in &mut line.moments {
             match named {
@@ -210,8 +210,7 @@ impl Posed {
     }
 }
 
-/// Turns values and bands into errors: `(value, None)` and the name with ` se` are what
-/// [`scored`] leaves.
+/// Converts values and bands to errors: [`scored`] leaves `(value, None)` and the name with ` se`.
 fn with_truth(parameters: &mut BTreeMap<String, (f64, Option<bool>)>, truth: &Truth, t_s: f64) {
     let said = std::mem::take(parameters);
     for (name, value) in truth.operator(t_s).named() {
@@ -226,7 +225,7 @@ fn with_truth(parameters: &mut BTreeMap<String, (f64, Option<bool>)>, truth: &Tr
     }
 }
 
-/// The line of an answer against a true response; parameters are left as they were reported.
+/// Evaluates an estimate with a true response; parameters are left unchanged.
 pub(super) fn scored(
     task: &Task,
     labels: &[String],
@@ -293,7 +292,7 @@ pub(super) fn scored(
     }
 }
 
-/// Mean of |dH|/|H|, bands that hold and all.
+/// Mean of |dH|/|H|, number of bands that cover, and of all.
 fn of_response(said: &ReportedResponse, truths: &[Complex64]) -> (f64, [usize; 2]) {
     if said.response.len() != truths.len() {
         return (1.0, [0, 0]);
@@ -347,7 +346,7 @@ mod tests {
         }
     }
 
-    /// The truth itself has no error, and its alarm is the one that is found.
+    /// The true response has no error, and an alarm at the true time finds the change.
     #[test]
     fn the_truth_has_no_error_and_silence_has_the_error_one() {
         let case = super::super::cases()

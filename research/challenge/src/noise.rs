@@ -1,19 +1,19 @@
 //! Remnants of the challenge.
 //!
-//! `n(k) = sigma sum over parts of G_i(q) s(k) w_i(k)`: G_i of unit power, w_i white and of unit
-//! variance, s(k) the course of the strength, known before sample k. A lag is
-//! `x += (1 - e^(-Ts/T)) (w - x)`, as often as its order; a peak has its poles at
+//! `n(k) = sigma sum over parts of G_i(q) s(k) w_i(k)`: G_i of unit power, w_i white with unit
+//! variance, s(k) the time course of the strength, known before sample k. A lag is
+//! `x += (1 - e^(-Ts/T)) (w - x)`, repeated according to its order; a peak has its poles at
 //! `e^(-zeta omega Ts) e^(+-j omega sqrt(1 - zeta^2) Ts)`.
 
 use hoid_sim::RunSeed;
 
 use super::case::{Course, Spectrum};
 
-/// One part: its filter and how much it weighs.
+/// One part: its filter and its weight.
 #[derive(Debug, Clone)]
 struct Part {
     filter: Filter,
-    /// Standard deviation over that of the filter's output for white noise.
+    /// Standard deviation relative to that of the filter's output for white noise.
     scale: f64,
 }
 
@@ -78,12 +78,12 @@ pub(super) struct Noise {
 
 /// Length of an impulse response, s: the slowest part is a drift of 10 s.
 const MEMORY_S: f64 = 60.0;
-/// Order of the autoregressive model that whitens a remnant.
+/// Order of the autoregressive model for whitening a remnant.
 const WHITENING: usize = 30;
 
 impl Noise {
-    /// The remnant of a run of some samples; `numbers` from `[0, 1)` give time constants, `streams`
-    /// the stream of each part and of its pulses.
+    /// The remnant of a run of the given length; `numbers` from `[0, 1)` give time constants,
+    /// `streams` the random streams of the parts and their pulses.
     pub fn new(
         spectrum: Spectrum,
         course: Course,
@@ -123,7 +123,7 @@ impl Noise {
         Self { parts, driving, ts_s }
     }
 
-    /// The value of sample k, of unit variance for s = 1.
+    /// The value at sample k, with unit variance for s = 1.
     pub fn step(&mut self, k: usize, s: f64) -> f64 {
         let each = self.parts.iter_mut().zip(&self.driving);
         each.map(|(part, w)| part.scale * part.filter.step(s * w[k])).sum()
@@ -141,7 +141,7 @@ impl Noise {
                 *sum += part.scale * part.scale * products;
             }
         }
-        // As much white noise as keeps the recursion from rounding.
+        // White noise is added against rounding errors of the recursion.
         covariance[0] *= 1.0 + 1e-9;
         levinson(&covariance)
     }
@@ -166,15 +166,15 @@ pub(super) fn levinson(covariance: &[f64]) -> (Vec<f64>, f64) {
     (a, variance)
 }
 
-/// Times of a pulse in a second, and how large one sample in fifty is.
+/// Number of pulses per second, and size of one sample in fifty.
 const PULSES_PER_S: f64 = 2.0;
 const PULSES_PART: f64 = 0.8;
 const IMPULSES: (f64, f64) = (0.02, 7.0);
 const ON_OFF_S: f64 = 2.0;
 const ON_OFF: [f64; 2] = [0.2, 1.8];
 
-/// The density of w as weights and variances of normal densities: what an oracle knows of it. Each
-/// mixture has the variance one.
+/// The density of w as weights and variances of normal densities, for the oracle. Each mixture has
+/// unit variance.
 pub(super) fn density(course: Course, ts_s: f64) -> Vec<(f64, f64)> {
     match course {
         Course::Impulsive => {
@@ -204,7 +204,7 @@ fn driven(course: Course, normal: RunSeed, uniform: RunSeed, ts_s: f64, samples:
             }
         }
         Course::Intermittent => {
-            // The chain of two states with these mean times, seen at the samples.
+            // The two-state chain with these mean times, sampled.
             let chance = 0.5 * (1.0 - (-2.0 * ts_s / ON_OFF_S).exp());
             let mut on = draws.first().is_some_and(|draw| *draw < 0.5);
             for (w, draw) in w.iter_mut().zip(draws.into_iter().rev()) {

@@ -3,13 +3,13 @@
 //! `Y(s) = K (T_L s + 1)^p / (T_I s + 1) * omega^2/(s^2 + 2 zeta omega s + omega^2) / (T_3 s + 1)
 //! * omega_s^2/(s^2 + 1.4 omega_s s + omega_s^2) * e^(-tau s)`,
 //!
-//! each factor where the form has it: the lag of people on `1/s` (D. T. McRuer and H. R. Jex, IEEE
+//! each factor if the form has it: the lag of operators on `1/s` (D. T. McRuer and H. R. Jex, IEEE
 //! Trans. Human Factors in Electronics 8 (1967) 231-249), the neuromuscular system of third order
 //! (R. E. Magdaleno and D. T. McRuer, NASA CR-1757 (1971)), the dynamics of a stick.
 //!
-//! Between recorded samples, the record can determine: where the person sees each error held over a
-//! sample, the response from sampled e to sampled u at low frequencies is `Y(j omega)` times the
-//! hold `(1 - e^(-j omega Ts))/(j omega Ts)`; where they see it all the time, `Y(j omega)`.
+//! The response seen in the record depends on the intersample behaviour: if each error is held over
+//! a sample, the response from sampled e to sampled u at low frequencies is `Y(j omega)` times the
+//! hold `(1 - e^(-j omega Ts))/(j omega Ts)`; for a continuous error it is `Y(j omega)`.
 
 use hoid_model::{Complex64, ContinuousTransferFunction, ModelError, SampleTime, polynomial};
 
@@ -39,9 +39,9 @@ pub struct Operator {
 /// Parameter of an operator that changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Parameter {
-    /// K_e: the gain at low frequencies, K_e_dot stays.
+    /// K_e: the gain at low frequencies; K_e_dot is unchanged.
     KE,
-    /// K_e_dot: the lead, K_e stays.
+    /// K_e_dot: the lead; K_e is unchanged.
     KEDot,
     /// Both: K.
     Gain,
@@ -57,7 +57,7 @@ pub enum Parameter {
 const STICK_DAMPING: f64 = 0.7;
 
 impl Operator {
-    /// The same with one parameter times a factor.
+    /// The operator with one parameter multiplied by a factor.
     #[must_use]
     pub fn times(mut self, parameter: Parameter, factor: f64) -> Self {
         match parameter {
@@ -104,7 +104,7 @@ impl Operator {
         polynomial::value(&self.numerator(), s) / polynomial::value(&self.denominator(), s) * (-s * self.tau_e_s).exp()
     }
 
-    /// Its names and values as those of the operator of the thesis: K_e, K_e_dot in s, omega_nm in
+    /// Names and values as those of the operator of the thesis: K_e, K_e_dot in s, omega_nm in
     /// rad/s, zeta_nm, tau_e in s.
     pub fn named(&self) -> [(&'static str, f64); 5] {
         [
@@ -173,11 +173,11 @@ pub fn hold(omega_rad_s: f64, sample_time: SampleTime) -> Complex64 {
     (Complex64::from(1.0) - (-j).exp()) / j
 }
 
-/// Largest order of a system here.
+/// Largest order of a system.
 pub(super) const MOST_STATES: usize = 6;
 
 /// A system without numerator, `x = v/(a_0 + a_1 s + ... + a_n s^n)`, with x and its derivatives as
-/// states: outputs are sums of them, so that a gain that changes is felt at once.
+/// states: outputs are sums of them, so that a change of the gain acts at once.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Canonical {
     /// x, its first derivative, ...
@@ -189,7 +189,7 @@ impl Canonical {
         Self { x: [0.0; MOST_STATES] }
     }
 
-    /// A step of the classical method of Runge and Kutta with the input at its start, middle and end.
+    /// A Runge-Kutta step of fourth order with the input at its start, middle and end.
     pub fn advance(&mut self, denominator: &[f64], v: [f64; 3], h: f64) {
         let n = denominator.len() - 1;
         let slope = |x: &[f64; MOST_STATES], v: f64| {

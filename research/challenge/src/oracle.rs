@@ -1,15 +1,15 @@
-//! The available information: bounds that no method can exceed.
+//! Bounds from the available information that no method can exceed.
 //!
 //! **Evidence of a change.** The logarithm of the likelihood ratio of the true model after a change against the true
-//! model before it, the change's time, the remnant's spectrum, density and course known:
-//! `sum over k of log f(A n/s) - log f(A (n + delta)/s)`, n the remnant, delta the response of the person now less that
-//! of the person before the change to the same errors, A the whitening filter. Over 12 a change is certain: no test at
-//! one false alarm an hour misses it but by its own fault. It is computed before stick and recorder, where the model is
-//! exact.
+//! model before it, with known time of the change and known spectrum, density and time course of the remnant:
+//! `sum over k of log f(A n/s) - log f(A (n + delta)/s)`, n the remnant, delta the response of the present operator
+//! minus that of the operator before the change to the same errors, A the whitening filter. Above 12 a change is
+//! certain: a good test with one false alarm per hour finds it. It is computed before stick and recorder, where the
+//! model is exact.
 //!
-//! **The batch fit that knows the change.** Box-Jenkins by the prediction error method with the true
-//! delay and a noise model of order 4 on everything since the last change: it uses every sample, and
-//! its errors are what the same data give once nothing has to be followed.
+//! **Batch fit with known changes.** Box-Jenkins by the prediction error method with the true delay
+//! and a noise model of order 4 on all data since the last change: it uses every sample, and its
+//! errors are those that the same data give without tracking.
 
 use hoid_ident::Estimator;
 use hoid_model::{Orders, Structure};
@@ -21,16 +21,16 @@ use super::{
     simulate::Run,
 };
 
-/// Logarithm of the likelihood ratio from which a change is certain.
+/// Logarithm of the likelihood ratio above which a change is certain.
 pub const CERTAIN: f64 = 12.0;
-/// Lower limit of the strength: at a zero of the error the remnant would vanish and reveal the
-/// response.
+/// Lower limit of the strength: otherwise the remnant would vanish at a zero of the error and
+/// reveal the response.
 const LEAST_LEVEL: f64 = 0.05;
-/// Order of the noise model of the batch fit, and the least seconds that it takes.
+/// Order of the noise model of the batch fit, and its shortest span, s.
 const ND: usize = 4;
 const LEAST_S: f64 = 7.5;
 
-/// Logarithm of the likelihood ratio over some seconds since a change, by its number.
+/// Logarithm of the likelihood ratio over some seconds after a change, by its index.
 pub fn evidence(case: &Case, run: &Run, change: usize, seconds: f64) -> f64 {
     let hidden = &run.hidden;
     let Some((first, before)) = hidden.before.get(change) else {
@@ -40,7 +40,7 @@ pub fn evidence(case: &Case, run: &Run, change: usize, seconds: f64) -> f64 {
     let density = density(case.course, run.sample_time.s());
     let log = |w: f64| {
         let each = density.iter().map(|(p, v)| p / v.sqrt() * (-0.5 * w * w / v).exp());
-        // Where all underflow the widest decides.
+        // If all underflow the widest density determines the result.
         let widest = density.iter().map(|(_, v)| *v).fold(0.0, f64::max);
         each.sum::<f64>().ln().max(-0.5 * w * w / widest - 20.0)
     };
@@ -64,8 +64,8 @@ pub fn evidence(case: &Case, run: &Run, change: usize, seconds: f64) -> f64 {
         .sum()
 }
 
-/// Batch fit at the requested times, with known `changes_s`; nothing if it has too few seconds or
-/// fails.
+/// Batch fit at the requested times, with known `changes_s`; nothing if the span is too short or
+/// the fit fails.
 pub fn batch(task: &Task, changes_s: &[f64], tau_e_s: f64) -> Vec<ReportedResponse> {
     let nk = (tau_e_s / task.sample_time.s()).round() as usize + 1;
     let structure = Structure::BoxJenkins;
@@ -75,7 +75,7 @@ pub fn batch(task: &Task, changes_s: &[f64], tau_e_s: f64) -> Vec<ReportedRespon
     };
     let estimator = Estimator::new(structure, orders);
     let at = |t_s: &f64| -> Option<ReportedResponse> {
-        // What changes takes half a second.
+        // A change takes half a second.
         let from = (changes_s.iter().rev().find(|c| *c < t_s)).map_or(task.start_s.0, |c| c + 0.5);
         if t_s - from < LEAST_S {
             return None;

@@ -1,11 +1,11 @@
 //! The same measures on recorded people.
 //!
-//! Trials of one person, each 40 s after its ramp at 60 Hz, are joined: one on `1/s` to one on `1/(s(s+1))` and the
-//! other way round, a change of the plant and so of the person at 40 s, and two of one plant, a seam without a change.
-//! The second trial brings its own ramp as history ([`Seam`]): no filter jumps. Single trials are time without a
-//! change. The truth is the person's average describing function over their other trials on that plant, at the seven
-//! lowest lines of the disturbance: `sum U conj(D) / sum E conj(D)` over trials of two whole periods. Nothing is
-//! reported of the delay. The control of a row was read a sample before it was written: e(k) is next to u(k+1).
+//! Trials of one person, each 40 s after its ramp at 60 Hz, are joined: one on `1/s` to one on `1/(s(s+1))` and vice
+//! versa, a change of the plant and so of the operator at 40 s, and two of one plant, a seam without a change. The
+//! second trial has its own ramp as history ([`Seam`]): no filter jumps. Single trials are time without a change. The
+//! true response is the person's average describing function over their other trials on that plant, at the seven lowest
+//! lines of the disturbance: `sum U conj(D) / sum E conj(D)` over trials of two whole periods. The delay is not given.
+//! The control of a row was read a sample before it was written: e(k) is aligned with u(k+1).
 //!
 //! The recordings are not part of the project.
 
@@ -23,7 +23,7 @@ use super::{
 };
 use crate::ChallengeError;
 
-/// Seconds of the ramp, of a trial after it, and of a period.
+/// Length of the ramp, of a trial after it, and of a period, s.
 const RAMP_S: f64 = 5.0;
 const TRIAL_S: f64 = 40.0;
 const PERIOD_S: f64 = 20.0;
@@ -37,14 +37,14 @@ const SINGLE_START_S: (f64, f64) = (5.0, 20.0);
 /// The change of the plant is known: its evidence is not computed.
 const SURE: f64 = 1e9;
 
-/// Tasks to run.
+/// Options of the runs.
 #[derive(Debug, Clone)]
 pub struct PeopleOptions {
     /// Directory of the recordings.
     pub recordings: std::path::PathBuf,
-    /// Directory of the lines.
+    /// Directory of the results.
     pub directory: std::path::PathBuf,
-    /// Joined records of each kind and person at most.
+    /// Maximum number of joined records of each kind and person.
     pub runs: usize,
     /// Kinds: `fo-so`, `so-fo`, `fo-fo`, `so-so`, `fo`, `so`; none for all.
     pub kinds: Vec<String>,
@@ -54,7 +54,7 @@ pub struct PeopleOptions {
     pub portion: Portion,
 }
 
-/// A trial: e and u with the ramp, and what they have at the lines after it.
+/// A trial: e and u with the ramp, and their coefficients at the lines after it.
 struct Trial {
     e: Vec<f64>,
     u: Vec<f64>,
@@ -168,7 +168,7 @@ impl Trial {
     }
 }
 
-/// Which trials make a record: plant and place of the first and of the second.
+/// The trials of a record: plant and index of the first and of the second.
 struct Joined {
     person: String,
     first: (String, usize),
@@ -191,7 +191,7 @@ impl Joined {
         }
     }
 
-    /// Its place among those of its kind.
+    /// Its index among those of its kind.
     fn number(&self) -> usize {
         match &self.second {
             Some((second, _)) if *second == self.first.0 => self.first.1 / 2,
@@ -217,7 +217,7 @@ impl Joined {
                 u: next.u[..ramp].to_vec(),
             }
         });
-        // The person's response on a plant, without the trials that are in the record.
+        // The person's response on a plant, without the trials in the record.
         let average = |plant: &str| -> Vec<Complex64> {
             let used: Vec<usize> = [Some(&self.first), self.second.as_ref()]
                 .into_iter()
@@ -238,7 +238,7 @@ impl Joined {
         let changes = self.second.as_ref().is_some_and(|second| second.0 != self.first.0);
         let start_s = if self.second.is_some() { START_S } else { SINGLE_START_S };
         let length_s = e.len() as f64 / RATE_HZ;
-        // A seam is asked about at the same times as a change.
+        // At a seam the response is requested at the same times as at a change.
         let at_s: &[f64] = if self.second.is_some() { &[TRIAL_S] } else { &[] };
         let (labels, asked_s): (Vec<String>, Vec<f64>) = asked(at_s, start_s.1, length_s, false).into_iter().unzip();
         let found = ChangeOutcome {

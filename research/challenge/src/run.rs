@@ -1,9 +1,9 @@
-//! Runs of the challenge, on all threads, kept on disk.
+//! Runs of the challenge, on all threads, stored on disk.
 //!
-//! Each run of a case is a file, a line of JSON for each entrant. It is written next to and
-//! renamed; what is there is not computed again, so that a challenge can be stopped, continue, take
-//! in another entrant, or be done in parts on several machines. Nothing depends on the number of
-//! threads.
+//! Each run of a case is a file, with a line of JSON for each entrant. It is written to a temporary
+//! file and renamed; existing results are not computed again, so that a challenge can be stopped,
+//! continued, extended by another entrant, or run in parts on several machines. The results do not
+//! depend on the number of threads.
 
 use std::path::{Path, PathBuf};
 
@@ -19,27 +19,27 @@ use super::{
 };
 use crate::ChallengeError;
 
-/// Tasks to run.
+/// Options of the runs.
 #[derive(Debug, Clone)]
 pub struct ChallengeOptions {
-    /// Directory of the lines.
+    /// Directory of the results.
     pub directory: PathBuf,
-    /// Which seeds.
+    /// Set of seeds.
     pub seeds: Seeds,
-    /// Runs of each case.
+    /// Number of runs of each case.
     pub runs: u64,
     /// Names of cases, their starts (`none-`), or themes; none for all.
     pub cases: Vec<String>,
-    /// Names of entrants; none for all. `batch` is the batch fit that knows the changes.
+    /// Names of entrants; none for all. `batch` is the batch fit with known changes.
     pub methods: Vec<String>,
     /// Part of the runs.
     pub portion: Portion,
 }
 
-/// The entrants of these names, all where there are none, and whether the batch fit is among them.
+/// The entrants with these names, all if none are given, and whether the batch fit is among them.
 ///
 /// # Errors
-/// [`ChallengeError::Refused`] for a name that is invalid.
+/// [`ChallengeError::Refused`] for an invalid name.
 pub(super) fn chosen_entrants(names: &[String]) -> Result<(Vec<Box<dyn Entrant>>, bool), ChallengeError> {
     let mut all = entrants();
     let known: Vec<String> = all.iter().map(|c| c.name()).chain(["batch".to_owned()]).collect();
@@ -53,10 +53,10 @@ pub(super) fn chosen_entrants(names: &[String]) -> Result<(Vec<Box<dyn Entrant>>
     Ok((all, names.is_empty() || names.iter().any(|n| n == "batch")))
 }
 
-/// The cases of these names, starts or themes; all where there are none.
+/// The cases with these names, name starts or themes; all if none are given.
 ///
 /// # Errors
-/// [`ChallengeError::Refused`] for a name of nothing.
+/// [`ChallengeError::Refused`] for an unknown name.
 pub fn chosen_cases(names: &[String]) -> Result<Vec<Case>, ChallengeError> {
     let all = cases();
     let is = |case: &Case, name: &String| {
@@ -79,7 +79,7 @@ pub(super) fn refused(reason: String) -> ChallengeError {
     ChallengeError::Refused { reason }
 }
 
-/// Runs the missing parts; the lines of all that was chosen, in the order of cases, runs and
+/// Runs the missing parts; returns the lines of all selected cases, in the order of cases, runs and
 /// entrants. `each` is called after every run.
 ///
 /// # Errors
@@ -116,10 +116,10 @@ pub fn challenge(options: &ChallengeOptions, each: &(dyn Fn(&str) + Sync)) -> Re
     Ok(lines.concat())
 }
 
-/// Gives the line of an entrant, or of the batch fit.
+/// Computes the line of an entrant, or of the batch fit.
 pub(super) type LineOf = Box<dyn Fn(Option<&dyn Entrant>) -> Line>;
 
-/// The lines of a run: those of the file, and those that do not exist computed and added.
+/// The lines of a run: those in the file, and missing ones, which are computed and added.
 pub(super) fn kept(
     folder: &Path,
     number: u64,
@@ -187,7 +187,7 @@ mod tests {
         }
     }
 
-    /// A run that is there is read, not computed; the lines are the same in any order and with any
+    /// An existing run is read, not computed; the lines are the same in any order and with any
     /// number of threads.
     #[test]
     fn what_is_there_is_not_computed_again() {

@@ -1,14 +1,14 @@
-//! The loop of a case, simulated step by step in continuous time.
+//! Simulation of the loop of a case, step by step in continuous time.
 //!
 //! `e = f - y`, `u = stick(Y e + n)`, `y = P (u + d)`; 15 s of run-in. Operator and plant are
-//! integrated in steps of a millisecond or less ([`Canonical`]); the delay is read from the history
-//! of e, at any fraction of a step: a held error enters each step with its mean over that step, one
-//! that is seen all the time with its values between the steps. Nothing here is shared with the
-//! simulators of [`hoid_sim`] but the random streams.
+//! integrated in steps of at most a millisecond ([`Canonical`]); the delay is read from the history
+//! of e, at any fraction of a step: a held error enters each step with its mean over that step, a
+//! continuous one with its values between the steps. Only the random streams are shared with the
+//! simulators of [`hoid_sim`].
 //!
-//! Next to the signals a run keeps what only an oracle knows: the remnant, the course of its
-//! strength, the true response, and what the person before the change each change would have
-//! answered to the same errors.
+//! In addition to the signals a run contains data for the oracle: the remnant, the time course of
+//! its strength, the true response, and the response of the operator before each change to the same
+//! errors.
 
 use std::f64::consts::TAU;
 
@@ -24,7 +24,7 @@ use super::{
     world::{Held, World},
 };
 
-/// A run with all that is true of it.
+/// A run with its true values.
 #[derive(Debug, Clone)]
 pub struct Run {
     /// Time between two samples.
@@ -68,7 +68,7 @@ impl Truth {
         response * self.sign(t_s)
     }
 
-    /// -1 where u is recorded with the wrong sign.
+    /// -1 where u is recorded with the wrong sign, otherwise 1.
     fn sign(&self, t_s: f64) -> f64 {
         match self.case.blemish {
             Blemish::Polarity(at_s) if t_s >= at_s => -1.0,
@@ -76,12 +76,12 @@ impl Truth {
         }
     }
 
-    /// The operator's delay in samples of `q^-nk`, where it is reported: with the one of the hold.
+    /// The operator's delay in samples of `q^-nk`, including that of the hold, if it is given.
     pub fn told_nk(&self) -> Option<usize> {
         let samples = self.first.tau_e_s / self.sample_time.s();
         match self.case.delay {
             DelayKnown::No => None,
-            // Rounding of a whole number is none.
+            // A rounded whole number is a whole number.
             DelayKnown::Whole | DelayKnown::Fraction => Some((samples + 1e-6).floor() as usize + 1),
         }
     }
@@ -97,7 +97,7 @@ fn held(operator: &Operator, omega_rad_s: f64, sample_time: SampleTime) -> Compl
     each.sum()
 }
 
-/// Aliases on either side; they fall as the square of their number, or faster.
+/// Number of aliases on either side; they decrease with the square of their index, or faster.
 const ALIASES: i32 = 100;
 
 /// True values, sample by sample.
@@ -105,21 +105,21 @@ const ALIASES: i32 = 100;
 pub struct Hidden {
     /// Remnant, before stick and recorder.
     pub(super) n: Vec<f64>,
-    /// Course s of its strength.
+    /// Time course s of its strength.
     pub(super) level: Vec<f64>,
     /// Response to the error, before stick and recorder, with the recorded sign.
     pub(super) response: Vec<f64>,
-    /// For each change its first sample, and from there on the response of the person before the
+    /// For each change its first sample, and from there on the response of the operator before the
     /// change.
     pub(super) before: Vec<(usize, Vec<f64>)>,
-    /// Whitening filter of n over its standard deviation.
+    /// Whitening filter of n divided by its standard deviation.
     pub(super) whitening: Vec<f64>,
     /// Standard deviation of the innovations of n for s = 1.
     pub(super) innovation: f64,
 }
 
 const RUN_IN_S: f64 = 15.0;
-/// Persons who may lose control in the simulation.
+/// Maximum number of persons who lose control in the simulation.
 const MOST_ATTEMPTS: usize = 20;
 /// Standard deviations of u beyond which control is lost.
 const LOST: f64 = 30.0;
@@ -131,7 +131,7 @@ const WALK: u64 = 5;
 /// A run of a case.
 ///
 /// # Errors
-/// [`SimError`] that are not feasible for any person the case.
+/// [`SimError`] for a case that is not feasible for any person.
 pub fn simulate(case: &Case, run: RunOf) -> Result<Run, SimError> {
     let sample_time = SampleTime::new(1.0 / case.rate_hz)?;
     let mut outcome = Err(SimError::Diverged {
@@ -165,7 +165,7 @@ fn of_person(case: &Case, run: RunOf, operator: Operator, sample_time: SampleTim
         Blemish::IdleStart(s) => s,
         _ => f64::NEG_INFINITY,
     };
-    // One sample more, for anything between two.
+    // One more sample, for interpolation.
     let mut excitation = lines.samples(time(0), sample_time, total + 1);
     for (k, value) in excitation.iter_mut().enumerate() {
         if time(k) < idle_s {
@@ -324,7 +324,7 @@ impl Run {
         }
     }
 
-    /// Recorded e and u as a record, where all of it was recorded; the excitation is the channel
+    /// Recorded e and u as a record, if all of it was recorded; the excitation is the channel
     /// `excitation`.
     pub fn record(&self) -> Option<Record> {
         let channel = |name: &str, values: &[f64]| Channel::new(name, "", values.to_vec());
@@ -347,8 +347,8 @@ mod tests {
         number: 0,
     };
 
-    /// U/E at the lines of the excitation over whole periods of 20 s, without a remnant, is the
-    /// response that is called the truth: held and continuous, a whole delay and a fraction.
+    /// U/E at the lines of the excitation over whole periods of 20 s, without a remnant, equals the
+    /// true response: held and continuous, a whole delay and a fractional one.
     #[test]
     fn the_loop_has_the_response_that_is_called_true() {
         for (name, within) in [("none-lag-1", 1e-3), ("delay-half-60", 1e-3), ("continuous-60", 4e-3)] {
@@ -360,7 +360,7 @@ mod tests {
             };
             let run = simulate(&quiet, RUN).unwrap();
             let per_second = quiet.rate_hz as usize;
-            // Late enough for the transient of the start to be gone.
+            // Late enough for the initial transient to have decayed.
             let span = 60 * per_second..80 * per_second;
             for multiple in [2.0, 3.0, 5.0, 11.0, 19.0] {
                 let omega = multiple * TAU / 20.0;
@@ -408,7 +408,7 @@ mod tests {
         assert!(run.u.iter().filter(|u| u.abs() == largest).count() > 50);
     }
 
-    /// Everybody who is drawn keeps control.
+    /// Each selected person keeps control.
     #[test]
     fn every_loop_runs() {
         let are_loops = |case: &Case| {

@@ -7,13 +7,12 @@ use super::{
     oracle::CERTAIN,
 };
 
-/// Methods next to each other in a table that fits a page 1200 pixels wide: of numbers, and of
-/// words.
+/// Number of methods in one table of a page 1200 pixels wide: for numbers, and for words.
 const BESIDE: usize = 7;
 const WORDS_BESIDE: usize = 5;
 
-/// The tables of lines: error of H, its course after a change, alarms, changes found, coverage,
-/// parameters, findings.
+/// The tables of results: error of H, its time course after a change, alarms, changes found,
+/// coverage, parameters, findings.
 pub fn tables(lines: &[Line]) -> String {
     let mut text = String::new();
     let methods = in_order(lines.iter().map(|line| line.method.as_str()));
@@ -227,7 +226,7 @@ fn overview(lines: &[Line], methods: &[&str], cases: &[&str]) -> String {
     text
 }
 
-/// Entrants that failed, why, and where.
+/// Failed entrants, with reasons and cases.
 fn failures(lines: &[Line]) -> String {
     let failed = || (lines.iter()).filter_map(|line| Some((line, line.failed.as_deref()?)));
     let mut text = String::new();
@@ -297,8 +296,7 @@ fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     all
 }
 
-/// A row for each case and a column for each method, in as many tables, one below the other, as a page needs that has
-/// room for this many methods next to each other.
+/// A row for each case and a column for each method, split into tables with at most the given number of methods.
 fn by_case(text: &mut String, cases: &[&str], methods: &[&str], beside: usize, cell: impl Fn(&str, &str) -> String) {
     let each = methods.len().div_ceil(methods.len().div_ceil(beside).max(1)).max(1);
     for (i, some) in methods.chunks(each).enumerate() {
@@ -332,7 +330,7 @@ fn share(of: usize, all: usize) -> String {
     }
 }
 
-/// The median; none of nothing.
+/// The median; none if there are no values.
 fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let n = values.len();

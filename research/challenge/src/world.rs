@@ -1,8 +1,8 @@
 //! Operator and plant between two samples, and the history of the error.
 //!
-//! Steps of a millisecond or less. The delay is read from the history at any fraction of a step: a
-//! held error enters each step with its mean over that step, one that is seen all the time with its
-//! values between the steps.
+//! Steps of at most a millisecond. The delay is read from the history at any fraction of a step: a
+//! held error enters each step with its mean over that step, a continuous one with its values
+//! between the steps.
 
 use super::{
     case::{Case, Forcing, Sight},
@@ -37,7 +37,7 @@ pub(super) struct World {
     sight: Sight,
     disturbed: bool,
     ts: f64,
-    /// Steps in a sample.
+    /// Number of steps per sample.
     steps: usize,
     /// The error of each sample (held), or of each step.
     errors: Vec<f64>,
@@ -59,8 +59,8 @@ impl World {
         }
     }
 
-    /// From sample k to the next: `error` and `control` at its start, excitation and remnant at its
-    /// start and end.
+    /// Advances from sample k to the next: `error` and `control` at its start, excitation and
+    /// remnant at its start and end.
     #[allow(clippy::too_many_arguments)]
     pub fn sample(
         &mut self,
@@ -106,7 +106,7 @@ impl World {
         }
     }
 
-    /// Input of the operator at start, middle and end of the step that starts at a place, in steps.
+    /// Input of the operator at start, middle and end of the step that starts at a position, in steps.
     fn input(&self, place: f64) -> [f64; 3] {
         match self.sight {
             Sight::Held => [self.mean_held(place); 3],
@@ -114,7 +114,7 @@ impl World {
         }
     }
 
-    /// Mean of the held error over the step that starts at a place, in steps.
+    /// Mean of the held error over the step that starts at a position, in steps.
     fn mean_held(&self, place: f64) -> f64 {
         let n = self.steps as f64;
         let (first, last) = (place / n, (place + 1.0) / n);
@@ -125,7 +125,7 @@ impl World {
                 self.errors.get(sample as usize).copied().unwrap_or(0.0)
             }
         };
-        // A place on the border except for rounding is on it.
+        // A position on the border, up to rounding, is on it.
         let edge = (first + 1.0 - 1e-9).floor();
         if edge >= last || edge <= first {
             return value(first + 1e-9);
@@ -134,7 +134,7 @@ impl World {
         part * value(first) + (1.0 - part) * value(edge)
     }
 
-    /// The error at a place, in steps.
+    /// The error at a position, in steps.
     fn seen(&self, place: f64) -> f64 {
         if place < 0.0 {
             return 0.0;

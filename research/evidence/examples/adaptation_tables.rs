@@ -1,5 +1,4 @@
-//! The tables of `research/notes/comparison-tables.md`, from the results of the
-//! study, as they stand there:
+//! The tables of `research/notes/comparison-tables.md`, from the results of the study:
 //!
 //! `hoid study run adaptation --out adaptation` and
 //! `cargo run --release -p hoid-evidence --example adaptation_tables -- adaptation`
@@ -19,14 +18,14 @@ const OTHERS: [(&str, &str); 4] = [
     ("again and again", "C4, C6, and back every 10.24 s"),
     ("neuromuscular", "ω_nm to 8 rad/s, ζ_nm to .5"),
 ];
-/// Delays that are not the prior.
+/// Delays that differ from the prior.
 const DELAYS: [(&str, &str); 3] = [
     ("delay alone", "C1, C2, τ_e to .34 s"),
     ("delay too", "C4, C6, τ_e to .34 s"),
     ("other delay", "C4, C6, τ_e .25 or .31 s"),
 ];
 const WITH_DELAY: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
-/// Methods of which all cells are shown.
+/// Methods whose cells are all shown.
 const SHOWN: [&str; 5] = ["RLS", "RPEM", "physical", "multiple-model", "two-sided"];
 const CHANGING: [&str; 4] = ["C3", "C4", "C5", "C6"];
 const STEADY: [&str; 2] = ["C1", "C2"];
@@ -88,10 +87,10 @@ impl Tables {
         rows.iter().map(|row| row.statistics.median).collect()
     }
 
-    /// Median errors over the better of RLS and RPEM, cell by cell.
+    /// Ratio of median errors to the better of RLS and RPEM, cell by cell.
     fn relative(&self, quantity: &str, conditions: &[&str], name: &str) -> Vec<f64> {
         let of = |name: &str| self.medians(quantity, "all", conditions, name);
-        // A method without a single convertible estimate is not a number, which min leaves out.
+        // A method without a single convertible estimate is NaN, which min ignores.
         let better: Vec<f64> = of("RLS").iter().zip(of("RPEM")).map(|(a, b)| a.min(b)).collect();
         of(name)
             .iter()
@@ -126,8 +125,8 @@ impl Tables {
                     let rows = self.rows(&format!("{what}_{p}"), "all", &CHANGING, name);
                     let bias: Vec<f64> = rows.iter().map(|row| row.statistics.median.abs()).collect();
                     let spread = |row: &&SummaryRow| {
-                        // For a normal sample the standard deviation; a few that diverged do not
-                        // count.
+                        // The standard deviation of a normal sample; a few diverged runs do not
+                        // affect it.
                         (row.statistics.upper_quartile - row.statistics.lower_quartile) / 1.349
                     };
                     let spread: Vec<f64> = rows.iter().map(spread).collect();
@@ -227,7 +226,7 @@ impl Tables {
         println!();
     }
 
-    /// Errors of all methods in other cases, and what those that declare changes report there.
+    /// Errors of all methods in other cases, and the declared changes there.
     fn elsewhere(&self, cases: &[(&str, &str)], quantities: &[&str], telling: &[&str]) {
         let titles: Vec<&str> = cases.iter().map(|(_, title)| *title).collect();
         println!(
@@ -326,7 +325,7 @@ fn line(name: &str, cells: impl Iterator<Item = String>) {
     println!("| {name} | {} |", cells.collect::<Vec<_>>().join(" | "));
 }
 
-/// Two digits after the point below ten, none above a hundred.
+/// Two decimals below ten, none above a hundred.
 fn short(value: f64) -> String {
     match value.abs() {
         v if v > 999.0 => ">999".to_owned(),

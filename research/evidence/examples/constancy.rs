@@ -1,4 +1,4 @@
-//! How often constant operators are called not constant, and how often changes are seen.
+//! False alarm rate and power of the test of constancy.
 //!
 //! Clean runs of C1 and C2 (Box-Jenkins and grey box) and of virtual people of every kind of remnant and
 //! controlled element (their true form, one to three runs), `--runs N` of each (default 10), then the
@@ -19,7 +19,7 @@ use hoid_sim::{
 };
 use rayon::prelude::*;
 
-/// u comes later by a given number of samples from a share of the record on.
+/// Delays u by a given number of samples from a share of the record on.
 fn late(record: &Record, share: f64, by: usize) -> Record {
     let at = (share * record.len() as f64) as usize;
     let late = |t: usize| record.output()[if t >= at { t.saturating_sub(by) } else { t }];
@@ -31,7 +31,7 @@ fn with_output(record: &Record, output: Vec<f64>) -> Record {
     Record::new(record.sample_time(), e, Channel::new("u", "", output)).unwrap()
 }
 
-/// The last third is that of another run.
+/// Replaces the last third by that of another run.
 fn joined(record: &Record, other: &Record) -> Record {
     let from = 2 * record.len() / 3;
     let of = |a: &[f64], b: &[f64]| [&a[..from], &b[from..]].concat();
@@ -44,7 +44,7 @@ fn bare(record: &Record) -> Record {
     with_output(record, record.output().to_vec())
 }
 
-/// The fitted model, the processing of it, and whether it was called not constant.
+/// The model, the modification of the record, and whether it was reported as not constant.
 type Row = (String, String, Option<bool>);
 
 fn told(verdict: &Verdict) -> bool {

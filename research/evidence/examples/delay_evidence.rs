@@ -15,7 +15,7 @@ use hoid_track::{Method, StartAt, TrackOptions, track};
 const COLUMNS: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 const LEVELS: [f64; 3] = [0.01, 0.1, 0.2];
 const FOUND_WITHIN_S: f64 = 5.0;
-/// nk of the start fit, and the delays that are tracked, s.
+/// nk of the start fit, and the tracked delays, s.
 const NK: usize = 29;
 const RANGE_S: (f64, f64) = (0.2, 0.4);
 
@@ -167,7 +167,7 @@ fn follow(record: &Record, options: &TrackOptions, changes: bool) -> RunResult {
         for (i, (_, _, e)) in operator.rows().iter().enumerate() {
             let error = e.value - truth[i][k];
             squares[i] += (error / truth[i][k]).powi(2);
-            // A delay that is held has no error bar.
+            // A fixed delay has no error bar.
             let inside = e
                 .standard_error
                 .map_or(f64::NAN, |se| f64::from(error.abs() <= 1.96 * se));

@@ -1,12 +1,12 @@
-//! Draws the share of changes that are found against false alarms an hour, from the table that
-//! `cargo run --release -p hoid-evidence --example multiple_model_evidence -- detection 40` prints:
+//! Draws the share of detected changes against false alarms per hour, from the table printed by
+//! `cargo run --release -p hoid-evidence --example multiple_model_evidence -- detection 40`:
 //!
 //! `cargo run -p hoid-evidence --example detection_figure -- detection.txt > docs/src/images/detection.svg`
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid_report::figures::{Curve, CurveGrid, CurvePanel, LineKind, Shade, curves};
 
-/// Where a rate of zero is drawn, 1/h: below one alarm in all hours of the table.
+/// Position of a zero rate, 1/h: below one alarm in all hours of the table.
 const NONE: f64 = 0.02;
 
 fn main() {
@@ -25,7 +25,7 @@ fn main() {
                 .filter(|cells| cells[1].starts_with(statistic))
                 .map(|cells| (number(cells[3]).max(NONE), number(cells[column])))
                 .collect();
-            // Of thresholds without a false alarm the best is the lowest.
+            // Of the thresholds without a false alarm the lowest is the best.
             points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
             let silent = points.iter().rposition(|p| p.0 <= NONE).unwrap_or(0);
             let points = &points[silent..];

@@ -2,8 +2,8 @@
 //!
 //! `cargo run --release -p hoid-evidence --example evidence -- coverage|efficiency|starts|delay [RUNS]`
 //!
-//! `cargo run --release -p hoid-evidence --example evidence -- speed [RUNS] [PYTHON]` times the Box-Jenkins fit next to
-//! SciPy; PYTHON is an interpreter that has numpy and scipy, `python3` by default.
+//! `cargo run --release -p hoid-evidence --example evidence -- speed [RUNS] [PYTHON]` compares the time of the
+//! Box-Jenkins fit with that of SciPy; PYTHON is an interpreter that has numpy and scipy, `python3` by default.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../../../crates/hoid/tests/common/textbook.rs"]
@@ -72,8 +72,8 @@ struct Tally {
 struct Tallies(Vec<Tally>);
 
 impl Tallies {
-    /// Adds an estimate, and the variance that the Cramer-Rao bound allows it (not a number where
-    /// that is not asked).
+    /// Adds an estimate, and its variance by the Cramer-Rao bound (not a number if it is not
+    /// requested).
     fn add(&mut self, name: &str, estimate: Estimate, truth: f64, bound: f64) {
         let at = match self.0.iter().position(|t| t.name == name) {
             Some(at) => at,
@@ -148,7 +148,7 @@ fn closed_loop(runs: u64) {
         let theta = [held.b0, held.b1, -(-0.01_f64 / 0.06).exp(), held.f1, held.f2];
         let o = state.operator;
         let bj = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(NK));
-        // No step from the truth: the covariance is the Cramer-Rao bound of this record.
+        // No step from the true parameters: the covariance is the Cramer-Rao bound of this record.
         let mut at_truth = bj.clone();
         at_truth.start = Some(theta.to_vec());
         at_truth.search.max_iterations = 0;
@@ -276,8 +276,8 @@ fn delay(runs: u64) {
     }
 }
 
-/// The Box-Jenkins fit from no start next to the same in SciPy, in one sitting on one thread; the
-/// smallest of the times of each.
+/// The Box-Jenkins fit without a start compared with the same in SciPy, in one session on one
+/// thread; the smallest of the times of each.
 fn speed(runs: u64, python: &str) {
     let record = [run(&simulator(Condition::C1, 1, 0.1), 0, 0)];
     let estimator = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(NK));

@@ -130,7 +130,7 @@ fn middle(run: &EvaluatedRun, method: usize, i: usize, span_s: (f64, f64)) -> f6
     mean(within(run, method, i, span_s).into_iter())
 }
 
-/// Standard deviation over time at the end, share of the true value.
+/// Standard deviation over time at the end, relative to the true value.
 fn fluctuation(run: &EvaluatedRun, method: usize, i: usize) -> f64 {
     let values = within(run, method, i, AFTER_S);
     let middle = mean(values.iter().copied());

@@ -1,8 +1,8 @@
-//! How often faults are found in runs that have none, and how many are found in those that have one.
+//! False alarms and detections of faults in recordings.
 //!
-//! Runs of the conditions of the thesis and of virtual people of every kind of remnant and controlled element,
-//! `--runs N` of each (default 25; 21 kinds). In each run that is clean one sample of e or of u is then moved by 3, 10
-//! or 20 of its deviations, at a place of its own.
+//! Runs of the conditions of the thesis and of virtual people with every kind of remnant and controlled element,
+//! `--runs N` of each (default 25; 21 kinds). In each run without a fault one sample of e or of u is then moved by 3,
+//! 10 or 20 standard deviations, at a random place.
 #![allow(clippy::print_stdout, clippy::unwrap_used)]
 
 use std::env;

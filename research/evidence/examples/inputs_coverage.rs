@@ -1,14 +1,15 @@
-//! Do the intervals of both responses hold the truth, of people who see a target besides the error?
+//! Coverage of the intervals of both responses, for people who see a target in addition to the error.
 //!
 //! ```sh
 //! cargo xtask slow inputs-coverage [PEOPLE] [SEED] [RUNS]
 //! ```
 //!
-//! People are virtual ([`hoid_sim::people`]) on an integrator, a lag with an integrator and two integrators, each with the
-//! form that people have there, which the fit is not told. They see a target on every second prime and a quarter of a second of its future, and
-//! correct a disturbance on the others; what they do about the target is `g s/K` or `g s (T s + 1)/K` of an element `K/s` or
-//! `K/(s (T s + 1))`, g .4 to 1, with a delay of -.1 to .2 s, behind their neuromuscular system. Every second person sees
-//! the error alone. A share of 95 % of so many has a standard error of `sqrt(.95 .05/n)`.
+//! People are virtual ([`hoid_sim::people`]) on an integrator, a lag with an integrator and two integrators, each with
+//! the form that people have there, which is not given to the fit. They see a target on every second prime and a
+//! quarter of a second of its future, and correct a disturbance on the others; their response to the target is `g s/K`
+//! or `g s (T s + 1)/K` for an element `K/s` or `K/(s (T s + 1))`, g .4 to 1, with a delay of -.1 to .2 s, in series
+//! with their neuromuscular system. Every second person sees the error only. A share of 95 % of n intervals has a
+//! standard error of `sqrt(.95 .05/n)`.
 
 #![allow(clippy::print_stdout)]
 
@@ -27,7 +28,7 @@ use hoid_sim::{
 
 const PREVIEW_S: f64 = 0.25;
 
-/// How often an interval held the truth, of those that were determined, and of all.
+/// Number of intervals that cover the truth, of determined ones, and of all.
 #[derive(Default)]
 struct Held {
     held: usize,

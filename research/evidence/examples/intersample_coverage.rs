@@ -1,15 +1,15 @@
-//! Does the interval of tau_e hold the delay, of errors that are held between their samples and of errors that were logged
-//! from a continuous one?
+//! Coverage of the interval of tau_e, for errors with a hold between samples and for errors sampled from a continuous
+//! signal.
 //!
 //! ```sh
 //! cargo xtask slow intersample-coverage [PEOPLE] [SEED]
 //! ```
 //!
-//! Each person has a gain of 1 to 3, a lead of 0.2 to 1 s, muscles of 8 to 14 rad/s and damping 0.2 to 0.5, and a delay
-//! of 0.15 to 0.35 s. The error is a sum of twelve sinusoids from 0.3 to 12 rad/s for 60 s, the noise of u an
-//! autoregression with 0.1 s and a tenth of the power. Held errors pass through the exact model of their rate;
-//! continuous ones at 2000 Hz, of which every k-th sample is logged. What is faster than 200 Hz is decimated to 100 Hz,
-//! as `hoid identify` does. A share of 95 % of a given number of people has a standard error of `sqrt(.95 .05/n)`.
+//! Each person has a gain of 1 to 3, a lead of 0.2 to 1 s, a neuromuscular system of 8 to 14 rad/s and damping 0.2 to
+//! 0.5, and a delay of 0.15 to 0.35 s. The error is a sum of twelve sinusoids from 0.3 to 12 rad/s for 60 s, the noise
+//! of u an autoregression with 0.1 s and a tenth of the power. Held errors pass through the exact model of their rate;
+//! continuous ones are simulated at 2000 Hz, of which every k-th sample is recorded. Rates above 200 Hz are decimated
+//! to 100 Hz, as by `hoid identify`. A share of 95 % of n people has a standard error of `sqrt(.95 .05/n)`.
 
 #![allow(clippy::print_stdout)]
 

@@ -1,16 +1,16 @@
-//! Random operators of all forms, simulated with little noise or none: are form, parameters and the course of the error
-//! between its samples found?
+//! Random operators of all forms, simulated with little noise or none: identification of form, parameters and
+//! intersample behaviour of the error.
 //!
 //! ```sh
 //! cargo xtask slow little-noise [PEOPLE] [SEED]
 //! ```
 //!
-//! Each is drawn with K from 0.1 to 10 (log-uniform), leads of 0.1 to 2 s, lags of 0.2 to 5 s, muscles of 6 to 20 rad/s
-//! and damping 0.1 to 0.8, delays of 0.1 to 0.4 s; sampled at 20 to 200 Hz for 60 s. The error is a sum of twelve
-//! sinusoids of random phases from 0.2 to 15 rad/s and white noise, held between its samples or, of every second person,
-//! straight. The noise of u is white, with a share of its power of 0, 1e-12, 1e-9, 1e-6 or 1e-3. Counted are forms and
-//! courses that are found, and people whose response from 0.5 to 10 rad/s is off by more than 1e-6 of it and five standard
-//! errors.
+//! Each is drawn with K from 0.1 to 10 (log-uniform), leads of 0.1 to 2 s, lags of 0.2 to 5 s, a neuromuscular system
+//! of 6 to 20 rad/s and damping 0.1 to 0.8, delays of 0.1 to 0.4 s; sampled at 20 to 200 Hz for 60 s. The error is a
+//! sum of twelve sinusoids of random phases from 0.2 to 15 rad/s and white noise, with a hold between its samples or,
+//! for every second person, linear. The noise of u is white, with a share of its power of 0, 1e-12, 1e-9, 1e-6 or 1e-3.
+//! Counted are correct forms and intersample behaviours, and people whose response from 0.5 to 10 rad/s deviates by
+//! more than 1e-6 of it and five standard errors.
 
 #![allow(clippy::print_stdout)]
 
@@ -24,10 +24,10 @@ use hoid_model::{
 
 const SHARES: [f64; 5] = [0.0, 1e-12, 1e-9, 1e-6, 1e-3];
 
-/// Frequencies at which a response is judged, rad/s.
+/// Frequencies at which a response is evaluated, rad/s.
 const OMEGA_RAD_S: [f64; 5] = [0.5, 1.0, 2.0, 5.0, 10.0];
 
-/// Uniform numbers in [0, 1) of a linear congruence.
+/// Uniform numbers in [0, 1) from a linear congruence.
 struct Uniform(u64);
 
 impl Uniform {
@@ -68,7 +68,7 @@ fn operator(form: Form, random: &mut Uniform) -> Result<FamilyOperator, Box<dyn 
     Ok(FamilyOperator::new(form, true, &coordinates)?)
 }
 
-/// The discrete model for an error that is held, or runs straight.
+/// The discrete model for a held or a linear error.
 fn discrete(operator: &FamilyOperator, course: Intersample, ts: SampleTime) -> Result<HeldFamily, Box<dyn Error>> {
     if course == Intersample::Zoh {
         return Ok(operator.zoh(ts)?);
@@ -143,7 +143,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
             courses += u64::from(fit.course_is_known && fit.intersample == course);
             let found = fit.operator(0);
-            // A quadratic numerator with real zeros is a lead with a droop.
+            // A quadratic numerator with real zeros is a product of two leads.
             let zeros = [Form::QuadraticIntegral, Form::LeadDroop];
             if fit.form != form && !(zeros.contains(&fit.form) && zeros.contains(&form)) {
                 let left = fit.noise_free.unwrap_or(f64::NAN);
@@ -155,7 +155,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 continue;
             }
             forms += 1;
-            // Where the course is not known the delay is that of a held error.
+            // If the intersample behaviour is unknown, the delay is that of a held error.
             let known = fit.course_is_known || course == Intersample::Zoh;
             let late = if known { 0.0 } else { 0.5 * ts.s() };
             let off = OMEGA_RAD_S.map(|omega| {

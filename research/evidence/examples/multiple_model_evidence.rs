@@ -19,7 +19,7 @@ const COLUMNS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
 const LEVELS: [f64; 4] = [0.01, 0.1, 0.2, 0.3];
 /// End of the search for a change, s.
 const FOUND_UNTIL_S: f64 = CHANGE_S + 5.0;
-/// Alarms of one event: further ones within this time do not count, s.
+/// Alarms of one event: further ones within this time are not counted, s.
 const ONE_EVENT_S: f64 = 4.0;
 
 fn main() {
@@ -39,7 +39,7 @@ fn simulator(condition: Condition, remnant_order: usize, level: f64) -> Simulato
     Simulator::new(&scenario(condition, remnant_order, level)).unwrap()
 }
 
-/// Seed 7000; the method was set on seed 9000, and examined on seed 5000.
+/// Seed 7000; the method was tuned on seed 9000, and examined on seed 5000.
 fn run(simulator: &Simulator, condition: Condition, order: usize, level: usize, replication: u64) -> Record {
     let run_seed = RunSeed {
         seed: 7000,
@@ -136,7 +136,7 @@ fn row(values: [f64; 5], digits: usize) -> String {
         .join(" / ")
 }
 
-/// A statistic in time, from the end of the start fit on.
+/// A statistic over time, from the end of the start fit on.
 type Statistic = Vec<(f64, f64)>;
 
 /// First crossing after the change within 5 s, and the events outside these 5 s.
@@ -159,7 +159,7 @@ fn alarms(statistic: &Statistic, threshold: f64, changes: bool) -> (Option<f64>,
     (lag, events)
 }
 
-/// Hits in C4 and C6 against false alarms in C1 and C2, of the odds and of the baseline.
+/// Detections in C4 and C6 against false alarms in C1 and C2, for the odds and for the baseline.
 fn detection(runs: usize) {
     let statistics = |record: &Record| -> [Statistic; 2] {
         let span = record.span(0.0, START_S).unwrap();
@@ -240,7 +240,7 @@ fn detection(runs: usize) {
     }
 }
 
-/// Errors over the better of RLS and RPEM on the cells on which methods are set: C3 and C5, m0 = 2
+/// Errors relative to the better of RLS and RPEM on the cells used for tuning: C3 and C5, m0 = 2
 /// and 3, seed 9000.
 fn tune(runs: usize) {
     let methods = [
@@ -289,8 +289,8 @@ fn tune(runs: usize) {
     }
 }
 
-/// Cells on which `multiple-model` is set: C3 and C5, C1 and C2, and changes of the neuromuscular system
-/// that are not those of the plan. Errors: geometric mean over the cells of the median run.
+/// Cells for tuning `multiple-model`: C3 and C5, C1 and C2, and changes of the neuromuscular system
+/// other than those of the plan. Errors: geometric mean over the cells of the median run.
 fn set(runs: usize) {
     let options = options(hoid_survey::multiple_model());
     let neuromuscular = |omega: f64, zeta: f64| {
@@ -410,8 +410,8 @@ fn recording(path: &str) -> [Vec<f64>; 2] {
     [e, control]
 }
 
-/// Changes declared around the junction of two recordings of a person: the first 30 s start it, up
-/// to 40 s nothing changes.
+/// Changes declared around the junction of two recordings of a person: the first 30 s are the start
+/// span, up to 40 s nothing changes.
 fn joined(files: &[String]) {
     let (start_s, seam_s) = (30.0, 40.0);
     let sample_time = SampleTime::new(1.0 / 60.0).unwrap();
@@ -425,7 +425,7 @@ fn joined(files: &[String]) {
         u.extend(u2);
         let record = Record::new(sample_time, Channel::new("e", "1", e), Channel::new("u", "1", u)).unwrap();
         let span = record.span(0.0, start_s).unwrap();
-        // The delay of the least innovation variance of the start fit.
+        // The delay with the smallest innovation variance of the start fit.
         let fits = (8..=26).filter_map(|nk| {
             let m = hoid_survey::multiple_model();
             let options = TrackOptions::new(m.clone(), m.default_structure(), m.default_orders(nk));
@@ -480,7 +480,7 @@ fn joined(files: &[String]) {
     }
 }
 
-/// Time of a step with its estimate, the least mean of a given number of runs, ns.
+/// Time of a step with its estimate, the smallest mean of a given number of runs, ns.
 fn cost(runs: usize) {
     let simulator = simulator(Condition::C4, 2, 0.1);
     let record = run(&simulator, Condition::C4, 2, 1, 0);

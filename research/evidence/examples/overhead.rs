@@ -1,5 +1,5 @@
-//! Times of a fit and of a step in Rust, to compare with those from Python
-//! (`python/benchmarks/overhead.py`): run one after the other on a machine at rest.
+//! Times of a fit and of a step in Rust, for comparison with those from Python
+//! (`python/benchmarks/overhead.py`): run one after the other on an idle machine.
 //!
 //! ```sh
 //! cargo run --release -p hoid-evidence --example overhead
@@ -27,7 +27,7 @@ fn main() {
     for (structure, runs) in [(Structure::Arx, 400), (Structure::BoxJenkins, 200)] {
         let estimator = Estimator::new(structure, structure.operator_orders(29));
         let fit = median(runs, || {
-            // As Python does, which hands over arrays.
+            // As in Python, which passes arrays.
             let channel = |name: &str, values: &[f64]| Channel::new(name, "deg", values.to_vec());
             let input = channel("e", record.input());
             let record = Record::new(record.sample_time(), input, channel("u", record.output())).unwrap();

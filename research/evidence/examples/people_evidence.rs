@@ -1,14 +1,12 @@
-//! How recorded people are followed: two trials of a person joined, of one controlled element or of
-//! two.
+//! Tracking of recorded people: two joined trials of a person, of one controlled element or of two.
 //!
 //! `HOID_HUMAN_DATA=DIR cargo run --release -p hoid-evidence --example people_evidence -- [METHOD...]`
 //!
-//! Error: mean of `|dH|/|H|` over seven lines of the disturbance against the describing function of
-//! the person's ten trials of that element, `mean(U/D)/mean(E/D)`. The start span of methods that
-//! have one is 5 to 30 s. No person makes the jump of a seam: the filters take the ramp before the second
-//! trial there, without an update. A seam without a change is none, but alarms within 12 s of it do not count
-//! among those without a change. Certain changes are those whose likelihood ratio, where the person before and
-//! the person after are known, is above 12 within 8 s ([`oracle`]).
+//! Error: mean of `|dH|/|H|` over seven lines of the disturbance relative to the describing function of the person's
+//! ten trials of that element, `mean(U/D)/mean(E/D)`. The start span of methods that have one is 5 to 30 s. The jump of
+//! a seam is not made by a person: the filters process the ramp before the second trial there, without an update. A
+//! seam without a change is not a change, but alarms within 12 s of it are not counted as false alarms. Certain changes
+//! are those whose likelihood ratio for known operators before and after is above 12 within 8 s ([`oracle`]).
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::{env, f64::consts::PI, fs, path::PathBuf};
@@ -22,7 +20,7 @@ const PEOPLE: [&str; 3] = ["P03", "P05", "P09"];
 const ELEMENTS: [&str; 2] = ["fo", "so"];
 /// Harmonics of 1/20 Hz in the disturbance of both elements.
 const LINES: [f64; 7] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0];
-/// Rows of a trial that are analysed: whole periods.
+/// Analysed rows of a trial: whole periods.
 const FROM: usize = 300;
 const ROWS: usize = 2400;
 const RATE_HZ: f64 = 60.0;
@@ -32,7 +30,7 @@ const SETTLING_S: f64 = 12.0;
 const WITHIN_S: f64 = 8.0;
 const CERTAIN: f64 = 12.0;
 
-/// Error, output, disturbance of a trial, and error and output of its ramp, which goes before.
+/// Error, output, disturbance of a trial, and error and output of its ramp, which precedes them.
 struct Trial {
     signals: [Vec<f64>; 3],
     ramp: [Vec<f64>; 2],
@@ -60,7 +58,7 @@ fn read(folder: &PathBuf, person: &str, element: &str) -> Vec<Trial> {
             all[1].push(u);
             all[2].push(d);
         }
-        // u of a row was read one tick before.
+        // u of a row was read one sample before.
         let later = [0, 1, 0];
         let of = |c: usize, from: usize, rows: usize| all[c][from + later[c]..from + later[c] + rows].to_vec();
         Trial {
@@ -121,7 +119,7 @@ struct Run {
     certain: bool,
 }
 
-/// Whether the change from a trial of one cell to one of another is certain to who knows both persons.
+/// True if the change from a trial of one cell to one of another is certain for known operators.
 fn is_certain(before: &[Trial], joined: usize, after: &[Trial], second: usize) -> bool {
     let rows = |trial: &Trial| {
         let of = |c: usize| [trial.ramp[c].as_slice(), &trial.signals[c]].concat();

@@ -1,5 +1,5 @@
-//! Pilots who adapt while they are recorded (P. M. T. Zaal, *J. Guidance, Control, and Dynamics* 39 (2016), doi
-//! 10.2514/1.G001592): how each method follows them.
+//! Tracking of pilots who adapt during the recording (P. M. T. Zaal, *J. Guidance, Control, and Dynamics* 39 (2016),
+//! doi 10.2514/1.G001592), by each method.
 //!
 //! `HOID_PILOT_DATA=DIR cargo run --release -p hoid-evidence --example pilots_evidence -- [RUNS|all] [METHOD...]`
 //!
@@ -19,9 +19,9 @@ use rayon::prelude::*;
 
 const AT_RAD_S: [f64; 3] = [1.0, 2.5, 4.0];
 const CHANGE_S: f64 = 50.0;
-/// Where errors are read, s.
+/// Times at which errors are evaluated, s.
 const READ_S: [f64; 3] = [45.0, 60.0, 70.0];
-/// Where bands are read, s after the change.
+/// Times at which bands are evaluated, s after the change.
 const BANDS_S: [f64; 6] = [-10.0, -5.0, 5.0, 10.0, 20.0, 39.0];
 /// Alarms of one event, s.
 const ONE_EVENT_S: f64 = 8.0;
@@ -46,7 +46,7 @@ fn turned(phase: f64) -> f64 {
     (phase + PI).rem_euclid(2.0 * PI) - PI
 }
 
-/// Logarithm of the gain and phase less those of a reference.
+/// Logarithm of the gain and phase minus those of a reference.
 fn away(h: [f64; 2], reference: [f64; 2]) -> [f64; 2] {
     [
         h[0].hypot(h[1]).ln() - reference[0],
@@ -96,16 +96,16 @@ fn kind(condition: &str, axis: &str) -> Kind {
 struct Run {
     kind: Kind,
     errors: [f64; 3],
-    /// Share of the time nearer to the person on H2, before 50 s and from 65 s on.
+    /// Share of the time nearer to the operator with H2, before 50 s and from 65 s on.
     nearer: [f64; 2],
-    /// How many of the bands of gain and of phase hold.
+    /// Number of bands of gain and of phase that cover.
     hold: [[f64; 2]; 6],
     alarms_s: Vec<f64>,
     changed_at_s: Vec<f64>,
     /// K_e, T_L, K_e_dot and tau_e before and at the end.
     operator: [[f64; 4]; 2],
     restarts: u64,
-    /// Report of the guard, by kind.
+    /// Events of the guard, by kind.
     faults: BTreeMap<&'static str, usize>,
 }
 
@@ -214,7 +214,7 @@ fn run(name: &str, folder: &Path, references: &References, method: &str) -> Run 
     run
 }
 
-/// Alarms within a span, those of one event once.
+/// Alarms within a span, those of one event counted once.
 fn alarms(run: &Run, from: f64, to: f64) -> usize {
     let mut last = f64::MIN;
     let mut count = 0;
@@ -225,7 +225,7 @@ fn alarms(run: &Run, from: f64, to: f64) -> usize {
     count
 }
 
-/// Report of the guard, by kind, and in how many recordings it reported anything.
+/// Events of the guard, by kind, and the number of recordings with events.
 fn told(all: &[Run]) -> String {
     let mut kinds = BTreeMap::<&str, usize>::new();
     for (kind, count) in all.iter().flat_map(|r| &r.faults) {

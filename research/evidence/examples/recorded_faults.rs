@@ -20,7 +20,7 @@ use hoid_evidence::pilots;
 use hoid_track::{GuardEvent, Sample, TrackOptions, Tracker};
 use rayon::prelude::*;
 
-/// Where faults are put in, s after the start, and the longest of them.
+/// Places of the inserted faults, s after the start, and the largest length of a fault.
 const PLACES_S: [f64; 2] = [33.3, 47.77];
 const LONGEST_S: f64 = 20.0;
 /// Time after a fault in which it may be reported, s.

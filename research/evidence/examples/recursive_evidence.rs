@@ -52,7 +52,7 @@ fn run(simulator: &Simulator, cell: u64, replication: u64) -> Record {
     simulator.run(run_seed, false).unwrap()
 }
 
-/// Results of the runs in their order, on all cores.
+/// Results of the runs in their order, computed on all cores.
 fn on_all_cores<T: Send>(runs: usize, one: impl Fn(u64) -> T + Sync) -> Vec<T> {
     (0..runs).into_par_iter().map(|r| one(r as u64)).collect()
 }
@@ -65,14 +65,14 @@ fn options(method: Method) -> TrackOptions {
     }
 }
 
-/// RLS or RPEM by the text's own settings.
+/// RLS or RPEM with the settings of the text.
 fn of_the_text(method: Method) -> TrackOptions {
     let mut settings = vec![("memory", "256"), ("covariance", "0.1"), ("limit", "inf")];
     settings.extend((method != Method::rls()).then_some(("stable", "noise")));
     options(method.clone()).with(&settings).unwrap()
 }
 
-/// RMS of the relative error over t in [10, 81.92], per cent, and the share of rows that convert.
+/// RMS of the relative error over t in [10, 81.92], percent, and the share of rows that can be converted.
 fn relative_errors(trace: &Trace, record: &Record) -> ([f64; 5], f64) {
     let truth = COLUMNS.map(|c| record.channel(c).unwrap());
     let (mut sums, mut rows, mut all) = ([0.0; 5], 0, 0);
@@ -206,7 +206,7 @@ fn divergence(runs: usize) {
     println!("of {total} runs diverged: {diverged:?}");
 }
 
-/// Signals that alternate: the loop, silence, constants, saturation.
+/// Alternating signals: the loop, silence, constants, saturation.
 fn alternating(k: usize, record: &Record) -> (f64, f64) {
     let (e, u) = (record.input()[k % record.len()], record.output()[k % record.len()]);
     match (k / 20_000) % 5 {
@@ -246,7 +246,7 @@ fn endurance(samples: usize) {
             }
         }
         let nanoseconds = begin.elapsed().as_secs_f64() * 1e9 / samples as f64;
-        // After all this, another run of the task.
+        // Finally, another run of the task.
         let next = run(&simulator(Condition::C1, 1, 0.1), 0, 1);
         for k in 0..next.len() {
             tracker.step(next.input()[k], next.output()[k]);

@@ -2,8 +2,8 @@
 //!
 //! `cargo run --release -p hoid-evidence --example survey_methods > survey-methods.md`
 //!
-//! or, of plans of one's own, `... --example survey_methods -- my-survey.toml my-comparators.toml`. Method by
-//! method it can be tuned on other runs by another seed in a copy of the plan.
+//! or, for custom plans, `... --example survey_methods -- my-survey.toml my-comparators.toml`. A method can be tuned on
+//! other runs by changing the seed in a copy of the plan.
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
 use hoid_thesis::{

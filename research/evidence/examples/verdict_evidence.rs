@@ -3,16 +3,16 @@
 //! `cargo run --release -p hoid-evidence --example verdict_evidence -- [--runs N] [--seed S] [--method M] [--element]
 //! [--kinds]`
 //!
-//! Lead persons on `1/s^2` and `1/(s(s+1))`, gain-like ones on `1/s`, lags on a gain, 82 s at 100 Hz, with remnants of
-//! 5 to 30 % of the variance of u (a lag, one that follows u, pulses); and, clean, the virtual people of
-//! [`hoid_sim::people`]. The loop of the attacks is integrated here, in steps of 1 ms, and shares nothing with
-//! [`hoid_sim`]. Limits were set on seeds below 1000, the default seed is 9000.
+//! Operators with a lead on `1/s^2` and `1/(s(s+1))`, gain-like ones on `1/s`, lags on a gain, 82 s at 100 Hz, with
+//! remnants of 5 to 30 % of the variance of u (a lag, one that follows u, pulses); and, without faults, the virtual
+//! people of [`hoid_sim::people`]. The loop of the attacks is integrated here, in steps of 1 ms, and shares nothing
+//! with [`hoid_sim`]. Limits were set on seeds below 1000, the default seed is 9000.
 //!
-//! `HOID_HUMAN_DATA=DIR` judges the recordings of people in a folder in place of all this: CSV with columns t, u and e,
-//! or r and y, whose u of a row was read one sample before.
+//! `HOID_HUMAN_DATA=DIR` evaluates the recordings of people in a folder instead: CSV with columns t, u and e, or r and
+//! y, whose u of a row was read one sample before.
 //!
-//! A run counts as flagged where its trace is not trustworthy, and, for what changes once, also where the change was
-//! declared; both shares are printed. `--element` names the controlled element, `--kinds` counts the findings.
+//! A run counts as flagged if its trace is not trustworthy, and, for a single change, also if the change was declared;
+//! both shares are printed. `--element` gives the controlled element, `--kinds` counts the findings.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::{collections::BTreeMap, env, f64::consts::TAU, fs, time::Instant};
@@ -34,7 +34,8 @@ const RATE: usize = 100;
 const INNER: usize = 10;
 const PRIMES: [f64; 11] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0];
 
-/// The simulated person, as `K (T_L s + 1)/(T_I s + 1) e^{-tau s}` after the neuromuscular system; T_I = 0 for none.
+/// The simulated operator, `K (T_L s + 1)/(T_I s + 1) e^{-tau s}` in series with the neuromuscular system; T_I = 0 for
+/// none.
 #[derive(Debug, Clone, Copy)]
 struct Operator {
     k: f64,
@@ -84,7 +85,7 @@ enum Kind {
     Lag,
 }
 
-/// A person with their remnant.
+/// An operator with its remnant.
 #[derive(Debug, Clone, Copy)]
 struct Somebody {
     operator: Operator,
@@ -119,7 +120,7 @@ fn somebody(kind: Kind, numbers: &[f64]) -> Somebody {
     }
 }
 
-/// Sines at primes of .05 Hz, those above 2 rad/s smaller.
+/// Sines at primes of .05 Hz, with smaller amplitudes above 2 rad/s.
 struct Forcing(Vec<[f64; 3]>);
 
 impl Forcing {
@@ -137,7 +138,7 @@ impl Forcing {
     }
 }
 
-/// e and u; `None` if the loop does not stay bounded.
+/// e and u; `None` if the loop is unbounded.
 fn simulate(
     who: &Somebody,
     forcing: &Forcing,
@@ -159,9 +160,9 @@ fn simulate(
     for k in 0..count {
         let w = normals[k];
         n = match who.remnant {
-            // Follows the rms of u over a second.
+            // Running rms of u over a second.
             1 => pole * n + drive * w * (0.45 + 0.89 * running.sqrt().min(3.0)),
-            // Two pulses a second.
+            // Two pulses per second.
             2 => {
                 let pulse = if normals[count + k].abs() > 2.326 { w * 7.0 } else { 0.0 };
                 pole * n + drive * (0.45 * w + 0.89 * pulse)
@@ -237,7 +238,7 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// Treatment of a run.
+/// Modification of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Attack {
     Clean,
@@ -283,7 +284,7 @@ impl Attack {
     }
 }
 
-/// A run of a kind of person under an attack.
+/// A run of a kind of operator with a modification.
 fn run(kind: Kind, attack: Attack, seed: u64, number: u64) -> Option<(Record, Element)> {
     let stream = |of: u64, n: usize| uniform([seed, kind as u64, number, of], n);
     let numbers = stream(0, 4000);
@@ -298,7 +299,7 @@ fn run(kind: Kind, attack: Attack, seed: u64, number: u64) -> Option<(Record, El
         let mut second = somebody(kind, &[&draw[..1], &draw[21..40]].concat());
         second.element = who.element;
         let (one, two) = (who.operator, second.operator);
-        // Two who are alike are one.
+        // Two similar operators count as one.
         if attack == Attack::TwoPeople && (one.response(2.0) / two.response(2.0) - 1.0).norm() < 0.25 {
             continue;
         }
@@ -334,7 +335,7 @@ fn run(kind: Kind, attack: Attack, seed: u64, number: u64) -> Option<(Record, El
         let Some([e, mut u]) = simulate(&who, &forcing, &normals(1), level, &at) else {
             continue;
         };
-        // A loop that rings at its border is no one's.
+        // A loop at its stability limit is not realistic.
         if rms(&u) * who.share.sqrt() > 1.8 * level {
             continue;
         }
@@ -354,7 +355,7 @@ fn run(kind: Kind, attack: Attack, seed: u64, number: u64) -> Option<(Record, El
     None
 }
 
-/// Report about a run.
+/// Verdict on a run.
 struct RunVerdict {
     what: String,
     level: VerdictLevel,
@@ -460,7 +461,7 @@ fn main() {
     if let Some(folder) = &folder {
         let all_of = recordings(folder);
         let of_people = all_of.par_iter().map(|(name, record)| {
-            // Persons apart, and the controlled element.
+            // Separate persons, and the controlled element.
             let group: Vec<&str> = name
                 .split('_')
                 .skip(1)

@@ -1,5 +1,5 @@
-//! Common parts of the studies of this crate. A study is a file in `examples/`; its head states
-//! what it counts and what its arguments are.
+//! Common parts of the studies of this crate. A study is a file in `examples/`, whose head
+//! describes its results and arguments.
 //!
 //! | module | contents |
 //! |---|---|

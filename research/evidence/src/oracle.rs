@@ -1,13 +1,13 @@
-//! Upper bound of the available information: the likelihood ratio of the person after a change against the person
-//! before it, where both are known.
+//! Upper bound of the available information: the likelihood ratio of the operator after a change against that before
+//! it, if both are known.
 //!
-//! The gains s of each are those of all trials of that element (but the one that is examined), in the basis of the
-//! default person; after the whitening filter of the first trial's remnant, with its variance,
+//! The gains s of each are those of all trials of that element (except the examined one), in the basis of the default
+//! operator; after the whitening filter of the first trial's remnant, with its variance,
 //!
 //! `log Lambda = sum (limited (y - x' s_0))^2 - (limited (y - x' s_1))^2) / 2 sigma^2`
 //!
-//! over the first seconds after the change, each without its mean. It needs about 12 where once an hour may
-//! be wrong; without knowing both persons, more.
+//! over the first seconds after the change, each without its mean. A value of about 12 is needed for one false alarm
+//! per hour, and more if the operators are not known.
 use hoid_core::adaptive::{basis::Basis, defaults::DefaultOperator};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
@@ -15,7 +15,7 @@ const ORDER: usize = 16;
 const DELAY_S: f64 = 0.2;
 const LIMIT: f64 = 3.5;
 
-/// Regressors and output of a trial, and the rows that are analysed.
+/// Regressors and output of a trial, and the analysed rows.
 pub struct Rows {
     x: Vec<Vector3<f64>>,
     u: Vec<f64>,
@@ -23,7 +23,7 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Of error and output with a ramp of `from` rows before.
+    /// Computes the rows from error and output, with a ramp of `from` rows before.
     pub fn new(e: &[f64], u: &[f64], from: usize, ts: f64) -> Self {
         let point = DefaultOperator::with_delay(DELAY_S + 0.5 * ts).point;
         let mut basis = Basis::new(point, ts).unwrap();
@@ -77,7 +77,7 @@ fn gains(trials: &[&Rows], d: &[f64]) -> Vector3<f64> {
     products.lu().solve(&with_output).unwrap()
 }
 
-/// The autoregression that leaves least of v.
+/// The autoregression with the smallest residuals of v.
 fn autoregression(v: &[f64]) -> Vec<f64> {
     let before = DMatrix::from_fn(v.len() - ORDER, ORDER, |k, j| v[k + ORDER - 1 - j]);
     let mut now = DVector::from_column_slice(&v[ORDER..]);
@@ -87,8 +87,8 @@ fn autoregression(v: &[f64]) -> Vec<f64> {
     core::iter::once(1.0).chain(d.iter().map(|d| -d)).collect()
 }
 
-/// `log Lambda` over the first `samples` of the second trial: `before` are the first person's trials, the one that is
-/// joined first at `joined`; `after` those of the second without the one that is examined.
+/// `log Lambda` over the first `samples` of the second trial: `before` are the first operator's trials, with the joined
+/// one at `joined`; `after` those of the second without the examined one.
 pub fn log_ratio(before: &[&Rows], joined: usize, after: &[&Rows], second: &Rows, samples: usize) -> f64 {
     let first = before[joined];
     let mut d: Vec<f64> = (0..=ORDER).map(|j| f64::from(j == 0)).collect();

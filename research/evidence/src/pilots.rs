@@ -7,10 +7,10 @@ use std::{
 
 use hoid::{io::ReadOptions, model::Record};
 
-/// Start of the recordings, s: what is before is run-in.
+/// Start of the recordings, s: earlier data are the run-in.
 pub const FROM_S: f64 = 8.08;
 
-/// The folder, where `HOID_PILOT_DATA` names it; else that is reported.
+/// The folder given by `HOID_PILOT_DATA`; a message is printed if it is not set.
 pub fn folder() -> Option<PathBuf> {
     let folder = env::var_os("HOID_PILOT_DATA").map(PathBuf::from);
     if folder.is_none() {

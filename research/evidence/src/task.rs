@@ -23,7 +23,7 @@ pub fn scenario(condition: Condition, remnant_order: usize, level: f64) -> Scena
     scenario
 }
 
-/// Results of the runs in their order, on all cores.
+/// Results of the runs in their order, computed on all cores.
 pub fn on_all_cores<T: Send>(runs: usize, one: impl Fn(u64) -> T + Sync) -> Vec<T> {
     (0..runs).into_par_iter().map(|r| one(r as u64)).collect()
 }

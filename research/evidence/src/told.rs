@@ -1,13 +1,13 @@
-//! Methods that are given the delay, for the examples that compare them.
+//! Methods with a given delay, for the examples that compare them.
 
 use hoid_track::{Method, StartAt, TrackOptions};
 
 use crate::task::START_S;
 
-/// Delay of the textbook's operator, samples.
+/// Delay of the operator of the thesis, samples.
 const NK: usize = 29;
 
-/// A method that is given the delay and starts from a fit of the first 30.72 s.
+/// A method with a given delay and a start fit of the first 30.72 s.
 pub fn options(method: Method) -> TrackOptions {
     TrackOptions {
         start: StartAt::Span(Some((0.0, START_S))),
@@ -15,7 +15,7 @@ pub fn options(method: Method) -> TrackOptions {
     }
 }
 
-/// RLS or RPEM by the text's own settings.
+/// RLS or RPEM with the settings of the text.
 pub fn of_the_text(method: Method) -> TrackOptions {
     let mut settings = vec![("memory", "256"), ("covariance", "0.1"), ("limit", "inf")];
     settings.extend((method != Method::rls()).then_some(("stable", "noise")));

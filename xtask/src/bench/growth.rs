@@ -1,4 +1,4 @@
-//! How time and memory grow with samples, parameters, replications and threads.
+//! Growth of time and memory with samples, parameters, replications and threads.
 //!
 //! Each point is a process of its own. Our example reports itself what its peak was; of the command
 //! line the largest resident memory is read from `/proc` while it runs (Linux; elsewhere the column
@@ -19,16 +19,16 @@ use serde_json::Value;
 use super::table::{plain, time};
 use crate::process::output;
 
-/// One measured point.
+/// A measured point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Point {
     n: usize,
     seconds: f64,
-    /// Additional memory, bytes; none if the system does not report.
+    /// Additional memory, bytes; none if the system does not report it.
     memory: Option<u64>,
 }
 
-/// Between two looks at the memory of a child.
+/// Interval of the measurements of a child's memory.
 const LOOK: Duration = Duration::from_millis(2);
 
 const PLAN: &str = "name = \"growth\"
@@ -54,7 +54,7 @@ orders.nd = 1
 orders.nk = 29
 ";
 
-/// All tables as Markdown; `quick` leaves out the largest points.
+/// All tables as Markdown; `quick` omits the largest points.
 ///
 /// # Errors
 /// A point that cannot be measured.
@@ -165,7 +165,7 @@ fn identify(tasks: &Path, hoid: &Path, work: &Path, n: usize) -> Result<String, 
         .args(["--growth", "arx", &n.to_string()])
         .arg(&file);
     output(&mut write)?;
-    // The file holds t, e and u; the record that is made of it e and u, 8 bytes each.
+    // The file contains t, e and u; its record contains e and u, 8 bytes each.
     let data = 16 * n as u64;
     let mut text = format!(
         "\n`hoid identify` on a Parquet file of {n} samples (e and u: {}):\n\n| fit | time | peak memory | times e and u |\n|---|---:|---:|---:|\n",
@@ -194,7 +194,7 @@ fn identify(tasks: &Path, hoid: &Path, work: &Path, n: usize) -> Result<String, 
     Ok(text)
 }
 
-/// Runs a command and gives its time and the largest resident memory that was seen.
+/// Runs a command and returns its time and the largest resident memory that was measured.
 fn watched(command: &mut Command) -> Result<(f64, Option<u64>), String> {
     let shown = format!("{command:?}");
     let begun = Instant::now();

@@ -1,4 +1,4 @@
-//! A gate on the instructions that a task takes.
+//! Limit of the number of instructions of a task.
 //!
 //! Times of a shared machine carry little information; the number of instructions of a program is
 //! the same to a few in a thousand whatever else runs. Callgrind (Valgrind) counts those of one run
@@ -16,17 +16,17 @@ use std::{
 use serde_json::{Value, json};
 
 const KEPT: &str = "crates/hoid/benches/instructions.json";
-/// Share above the kept number that is allowed.
+/// Permitted increase relative to the stored number.
 const ALLOWED: f64 = 0.05;
-/// Tasks on one thread and one record. Valgrind has AVX2 where the processor has it and no AVX-512:
-/// the sums of `arx` and `bj` take the same registers on all but old processors, which need more
+/// Tasks on one thread and one record. Valgrind uses AVX2 if the processor has it and no AVX-512:
+/// the sums of `arx` and `bj` use the same registers on all but old processors, which need more
 /// instructions.
 const TASKS: [&str; 6] = ["arx", "bj", "rls", "rpem", "loop", "loop with noise"];
 
-/// Counts, compares, and with `keep` writes the numbers down.
+/// Counts, compares, and with `keep` stores the numbers.
 ///
 /// # Errors
-/// When a task takes more instructions than allowed, or Valgrind does not run as it should.
+/// If a task takes more instructions than permitted, or Valgrind fails.
 pub fn gate(program: &Path, data: &Path, keep: bool) -> Result<(), String> {
     if Command::new("valgrind")
         .arg("--version")
@@ -83,7 +83,7 @@ fn read() -> Option<Kept> {
     })
 }
 
-/// A line for each task, and whether one is over.
+/// A line for each task, and whether one exceeds the limit.
 fn compare(found: &BTreeMap<String, u64>, kept: &BTreeMap<String, u64>) -> (String, bool) {
     let mut over = false;
     let mut lines = vec![format!(
@@ -116,7 +116,7 @@ fn count(program: &Path, data: &Path, task: &str, times: usize) -> Result<u64, S
     collected(&said).ok_or_else(|| format!("valgrind did not count {task}:\n{said}"))
 }
 
-/// The number behind `Collected :`.
+/// The number after `Collected :`.
 fn collected(said: &str) -> Option<u64> {
     let line = said.lines().find(|line| line.contains("Collected :"))?;
     line.rsplit(' ').next()?.parse().ok()

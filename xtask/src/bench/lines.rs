@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-/// Report of one peer on one task.
+/// Result of one peer for one task.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
     pub task: String,
@@ -15,10 +15,10 @@ pub enum Outcome {
     Measured {
         seconds: f64,
         answer: Vec<f64>,
-        /// Why the answer is another by design.
+        /// Reason why the result differs by design.
         differs: Option<String>,
     },
-    /// Not installed, or failed: why.
+    /// Not installed, or failed: the reason.
     Skipped(String),
 }
 
@@ -52,12 +52,12 @@ impl Line {
     }
 }
 
-/// The lines among the printed data; libraries print much else.
+/// The lines in the printed output; libraries print other text as well.
 pub fn of(printed: &str) -> Vec<Line> {
     printed.lines().filter_map(Line::read).collect()
 }
 
-/// One line for each task and peer, the fastest of the rounds, in the order in which they came.
+/// One line for each task and peer, the fastest of the rounds, in the order of appearance.
 pub fn best(lines: Vec<Line>) -> Vec<Line> {
     let mut kept: Vec<Line> = Vec::new();
     for line in lines {
@@ -76,7 +76,7 @@ pub fn best(lines: Vec<Line>) -> Vec<Line> {
     kept
 }
 
-/// Largest relative difference of two answers; none if they cannot be compared.
+/// Largest relative difference of two results; none if they cannot be compared.
 pub fn difference(a: &[f64], b: &[f64]) -> Option<f64> {
     let comparable = !a.is_empty() && a.len() == b.len();
     let relative = |(x, y): (&f64, &f64)| (x - y).abs() / x.abs().max(y.abs()).max(f64::MIN_POSITIVE);

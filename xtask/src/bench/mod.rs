@@ -1,4 +1,4 @@
-//! `cargo xtask bench`: our tasks and those of the peers in one sitting, and how cost grows.
+//! `cargo xtask bench`: our tasks and those of the peers in one session, and the growth of cost.
 //!
 //! Ours are the example `tasks` of the crate `hoid`, the peers the scripts in
 //! `crates/hoid/benches/peers`. Both print one line of JSON a task ([`lines`]). They take turns,

@@ -2,7 +2,7 @@
 
 pub const USAGE: &str = "cargo xtask bench [--only TASK,...] [--peers none|installed|install] [--rounds N] [--reproduce M] [--growth [--quick]] [--instructions [--keep]] [--dry]";
 
-/// Which peers take part.
+/// Peers to run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Peers {
     None,
@@ -10,7 +10,7 @@ pub enum Peers {
     Install,
 }
 
-/// The measured quantity, and how.
+/// The quantities to measure.
 #[derive(Debug, PartialEq)]
 pub struct Options {
     pub only: Vec<String>,
@@ -67,7 +67,7 @@ impl Options {
         Ok(options)
     }
 
-    /// True for a task that takes part.
+    /// True for a selected task.
     pub fn chooses(&self, task: &str) -> bool {
         self.only.is_empty() || self.only.iter().any(|name| name == task)
     }

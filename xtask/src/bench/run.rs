@@ -24,15 +24,15 @@ const PEERS: &str = "crates/hoid/benches/peers";
 const OF_EVIDENCE: &str = "scipy_bj.py";
 const WORK: &str = "target/bench";
 
-/// Runs it.
+/// Runs the benchmark.
 ///
 /// # Errors
-/// What cannot be run or written, as text.
+/// Build, run and write errors, as text.
 pub fn bench(arguments: &[String]) -> Result<(), String> {
     let options = Options::read(arguments)?;
     if options.instructions {
-        // For the whole workspace, as the tests: with other features the same crates would be built
-        // twice.
+        // For the whole workspace, as for the tests: with other features the same crates would be
+        // built twice.
         let ours = build(&["--workspace", "--example", "tasks"], "examples/tasks", Profile::Tests)?;
         return instructions::gate(&ours, &data(), options.keep);
     }
@@ -61,19 +61,19 @@ pub fn bench(arguments: &[String]) -> Result<(), String> {
     lines.retain(|line| options.chooses(&line.task));
     let text = table::ratios(&lines::best(lines), &machine());
     println!("\n{text}");
-    // A part of the tasks is for the eye, not for the page.
+    // Some of the tasks are only shown, not written to the page.
     page::write(PAGE, "ratios", &text, options.dry || !options.only.is_empty())
 }
 
-/// How a program is built.
+/// Build profile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Profile {
     Release,
-    /// As the tests are, which have compiled all of it before.
+    /// That of the tests, which have already been compiled.
     Tests,
 }
 
-/// Builds a program and reports where it is.
+/// Builds a program and returns its path.
 fn build(arguments: &[&str], program: &str, profile: Profile) -> Result<PathBuf, String> {
     let mut command = cargo_command();
     command.args(["build", "--quiet"]).args(arguments);
@@ -98,7 +98,7 @@ fn run_ours(program: &Path, options: &Options, first: bool) -> Result<Vec<Line>,
         command.args(["--task", &options.only.join(",")]);
     }
     let mut lines = lines::of(&output(&mut command)?);
-    // On all cores, and once: it takes minutes.
+    // On all cores, and only once: it takes minutes.
     if let (true, Some(replications)) = (first, options.reproduce) {
         let mut command = Command::new(program);
         command
@@ -112,7 +112,7 @@ fn run_ours(program: &Path, options: &Options, first: bool) -> Result<Vec<Line>,
     Ok(lines)
 }
 
-/// A peer that does not run is a line that reports it.
+/// Runs a peer; a failure is a line that reports it.
 fn run_peer(script: &Path, python: &str, options: &Options) -> Vec<Line> {
     let record = data().join("record.csv");
     let (program, before, behind): (&str, &[&str], &[&str]) = match script.extension().and_then(|e| e.to_str()) {
@@ -160,7 +160,7 @@ fn scripts() -> Result<Vec<PathBuf>, String> {
 }
 
 /// The interpreter for the peers: that of the environment in `target/bench`, which
-/// `--peers install` makes, else `python3`.
+/// `--peers install` creates, otherwise `python3`.
 fn interpreter(peers: Peers) -> Result<String, String> {
     let environment = Path::new(WORK).join("venv");
     let folder = if cfg!(windows) { "Scripts" } else { "bin" };

@@ -4,11 +4,10 @@ use std::fmt::Write;
 
 use super::lines::{Line, Outcome, difference};
 
-/// Answers closer than this are the same.
+/// Results closer than this are equal.
 const SAME: f64 = 1e-6;
 
-/// Limits on the speed of the project: the ratio to a peer whose name contains all the words, at
-/// least.
+/// Limits on the speed of the project: smallest ratio to a peer whose name contains all the words.
 const LIMITS: [(&str, &str, f64); 16] = [
     ("arx", "normal equations", 10.0),
     ("arx", "numba", 2.0),
@@ -28,7 +27,7 @@ const LIMITS: [(&str, &str, f64); 16] = [
     ("reproduce, M = 100", "", 0.0),
 ];
 
-/// One row a task and peer, ours first, with versions and machine below.
+/// One row per task and peer, ours first, with versions and machine below.
 pub fn ratios(lines: &[Line], machine: &str) -> String {
     let mut text = String::from(
         "| task | hoid | peer | its time | ratio | at least | answers |\n|---|---:|---|---:|---:|---:|---|\n",
@@ -108,7 +107,7 @@ pub fn time(seconds: f64) -> String {
     format!("{} {unit}", plain(value))
 }
 
-/// About three digits.
+/// Formats about three digits.
 pub fn plain(value: f64) -> String {
     match value.abs() {
         v if v >= 100.0 => format!("{value:.0}"),

@@ -109,7 +109,7 @@ fn differences(found: &Comparison) -> Rows {
         .iter()
         .filter_map(|d| Some(d.effect_size.as_ref()?.name.as_str()))
         .collect();
-    // One size for all is in the head.
+    // If the sizes are equal, the header gives them.
     let size = sizes.first().filter(|name| sizes.iter().all(|other| other == *name));
     let mut header = vec!["quantity"];
     header.extend(several.then_some("factor"));

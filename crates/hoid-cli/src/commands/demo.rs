@@ -1,5 +1,5 @@
-//! `hoid demo`: the whole path on a simulated run of condition C4, in which the controlled element
-//! changes at 40.96 s and the operator with it.
+//! `hoid demo`: the complete analysis of a simulated run of condition C4, in which the controlled
+//! element and the operator change at 40.96 s.
 
 use std::path::PathBuf;
 
@@ -17,7 +17,7 @@ use hoid::track::{Method, OPERATOR_COLUMNS, StartAt, Trace, TrackOptions, track}
 
 use crate::{args::DemoArgs, commands::output_paths, error::CliError, output, text};
 
-/// The spans of the thesis (V.B) that lie wholly before and wholly after the change, s.
+/// Spans of the thesis (V.B) completely before and after the change, s.
 const SPANS: [(&str, f64, f64); 2] = [("before", 0.0, 30.72), ("after", 51.2, 81.92)];
 
 struct Stage {
@@ -63,8 +63,8 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Traces of the whole run: the default, which gets no information, and the two methods of the text, from the batch fit
-/// before the change on.
+/// Traces of the whole run: the default method, without prior information, and the two methods of the text, starting
+/// from the batch fit before the change.
 fn tracked(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, CliError> {
     let (_, from, to) = SPANS[0];
     let nk = stages[0].choice.fit.orders().nk;
@@ -87,7 +87,7 @@ fn tracked(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, Cl
         .collect()
 }
 
-/// RMS relative error of each trace from the first step of the estimate on.
+/// RMS relative error of each trace from the first update of the estimate on.
 fn errors_over_time(record: &Record, traces: &[(String, Trace)]) -> String {
     let mut rows = text::table(&[
         "tracked by",
@@ -162,7 +162,7 @@ fn report_of_traces(
     Ok(write_report(&args.out.join("tracking"), &report.to_html()?)?)
 }
 
-/// Box-Jenkins with nk and nd searched as `hoid identify` does by default, and ARX with the same
+/// Box-Jenkins with nk and nd selected as by `hoid identify` by default, and ARX with the same
 /// delay.
 fn identify(name: &'static str, record: Record) -> Result<Stage, CliError> {
     let structure = Structure::BoxJenkins;

@@ -1,5 +1,4 @@
-//! `hoid design`: the forcing function that is most informative about a person, and the errors to
-//! be expected.
+//! `hoid design`: the most informative forcing function for an operator, and the expected errors.
 
 use std::path::Path;
 
@@ -16,10 +15,10 @@ use serde_json::{Map, Value, json};
 use super::{output_paths, paper_table};
 use crate::{args::DesignArgs, error::CliError, json, output, text};
 
-/// `--against` of the ten sines of the text.
+/// `--against` the ten sines of the text.
 const REFERENCE: &str = "reference";
 
-/// A forcing function that is judged next to the design, over the same time.
+/// A forcing function for comparison with the design, over the same time.
 struct Other {
     name: String,
     expected: Expected,
@@ -269,7 +268,7 @@ fn write_all(
     Ok(())
 }
 
-/// A scenario that runs it.
+/// A scenario with the designed forcing function.
 fn scenario(args: &DesignArgs, task: &Task, designed: &Designed) -> String {
     let numbers = |all: &[f64]| all.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
     let element = &task.state.controlled_element;
@@ -284,7 +283,7 @@ fn scenario(args: &DesignArgs, task: &Task, designed: &Designed) -> String {
             )
         })
         .collect();
-    // A run is a whole number of samples: of 1/100 s where that is so.
+    // A run is a whole number of samples: of 1/100 s if possible.
     let hundredths = 100.0 * args.length;
     let ts = match (hundredths - hundredths.round()).abs() < 1e-6 {
         true => 0.01,

@@ -1,4 +1,4 @@
-//! Figures as files: which formats there are, and how one is written.
+//! Figures as files: formats and writing.
 
 use std::path::Path;
 
@@ -7,8 +7,7 @@ use hoid::report::figures::{FigureFormat, with_width_mm};
 
 use crate::{error::CliError, output};
 
-/// Whether a figure can be written in the format that its name states: known before anything is
-/// read.
+/// Checks that a figure can be written in the format given by its name, before anything is read.
 ///
 /// # Errors
 /// [`CliError::Usage`].
@@ -29,10 +28,10 @@ fn format_of(path: &Path) -> Result<FigureFormat, CliError> {
     Ok(format)
 }
 
-/// Writes a figure, with a width on paper where one was given.
+/// Writes a figure, with a width on paper if one was given.
 ///
 /// # Errors
-/// The errors of the format and of writing.
+/// Errors of the format and of writing.
 pub fn write(path: &Path, svg: &str, width_mm: Option<f64>) -> Result<(), CliError> {
     let sized = width_mm.map(|mm| with_width_mm(svg, mm));
     let bytes = format_of(path)?.bytes(sized.as_deref().unwrap_or(svg))?;

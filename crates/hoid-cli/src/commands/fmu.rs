@@ -1,4 +1,4 @@
-//! `hoid fmu`: a unit for simulators, of the library that is here.
+//! `hoid fmu`: a unit for simulators, with the installed library.
 
 use std::{
     env,
@@ -51,7 +51,7 @@ pub fn run(args: &FmuArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Settings of a unit, the files that were read for it, its sample time in s.
+/// Settings of a unit, the files read for it, its sample time in s.
 type Unit = (FmuSettings, Vec<PathBuf>, f64);
 
 fn of_tracker(args: &FmuArgs) -> Result<Unit, CliError> {
@@ -66,7 +66,7 @@ fn of_tracker(args: &FmuArgs) -> Result<Unit, CliError> {
         None => {}
         Some(file) if is_fit_file(file) => {
             let text = read_settings(Path::new(file))?;
-            // What could not start with it is reported here, not in a simulator.
+            // A unit that cannot start is reported here, not in a simulator.
             let fit = parse_fit(&text, file)?.operator()?;
             method.start_from(fit).map_err(|error| wrong(file, &error))?;
             settings = (settings.with_fit(text)).with("prior", FmuStart::Text("fit".to_owned()));
@@ -92,7 +92,7 @@ fn of_operator(operator: &OperatorChoice, seed: i32) -> Result<Unit, CliError> {
         ),
         OperatorChoice::File(file) => (read_settings(file)?, file.display().to_string(), vec![file.clone()]),
     };
-    // What could not start is reported here, not in a simulator.
+    // A unit that cannot start is reported here, not in a simulator.
     let step_s = match parse_any_scenario(&text, &source, &source)? {
         AnyScenario::Reference(scenario) => {
             Simulator::new(&scenario)?;

@@ -34,7 +34,7 @@ pub fn run(args: &InfoArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// The faults of error and control, where the file has them and they make a record.
+/// The faults of error and control, if the file has both and they form a record.
 fn faults_of(look: &Look) -> Vec<Fault> {
     let seen = look.seen.as_ref().ok();
     let repaired = seen.and_then(|seen| repair(&seen.record, FaultHandling::Report).ok());
@@ -45,7 +45,7 @@ fn faults_of(look: &Look) -> Vec<Fault> {
 fn looks_like(look: &Look, file: &str) -> String {
     let role = |role: &Role| format!("{} ({})", role.column, role.why);
     let mut rows = vec![("input", role(&look.roles.input)), ("output", role(&look.roles.output))];
-    // The table above has the others.
+    // The others are in the table above.
     let beside = |path: &str| look.survey.columns.iter().any(|c| c.path == path && !c.unit.is_empty());
     let units: Vec<String> = look
         .units()
@@ -88,7 +88,7 @@ fn looks_like(look: &Look, file: &str) -> String {
     text
 }
 
-/// The same for programs.
+/// The survey as JSON.
 fn looked(look: &Look, file: &str) -> Value {
     let role = |role: &Role| json!({"column": role.column, "why": role.why, "certain": role.certain});
     let seen = look.seen.as_ref().ok();
@@ -125,7 +125,7 @@ fn words(file: &str, found: &FileSurvey) -> String {
     for sampling in &found.samplings {
         text.push_str(&sampled(sampling));
     }
-    // Most files state no units, and an empty column makes a table too wide for a screen.
+    // Most files give no units, and an empty column makes a table too wide for a screen.
     let has_units = found.columns.iter().any(|column| !column.unit.is_empty());
     let mut headings = vec!["column", "unit", "type", "rows", "min", "max", "mean", "deviation"];
     headings.retain(|heading| has_units || *heading != "unit");

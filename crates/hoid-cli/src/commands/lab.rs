@@ -44,7 +44,7 @@ pub fn run(args: &LabArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Opens an address as the system does.
+/// Opens an address with the default program of the system.
 #[cfg(feature = "lab")]
 fn open(address: &str) -> std::io::Result<()> {
     use std::process::{Command, Stdio};

@@ -17,7 +17,7 @@ use crate::{
     json, output, text,
 };
 
-/// K_n for one order and level, or why there is none.
+/// K_n for one order and level, or the reason why there is none.
 struct Gain {
     order: usize,
     level: f64,
@@ -47,7 +47,7 @@ pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
             k_n: scenario.remnant_gain_for(&state, order, level, definition),
         })
         .collect();
-    // A level that cannot be reached is a row of the table; anything else is wrong for all of them.
+    // A level that cannot be reached is a row of the table; any other error concerns all of them.
     for g in &gains {
         if let Err(error) = &g.k_n
             && !matches!(error, ModelError::UnreachableNoiseLevel { .. })

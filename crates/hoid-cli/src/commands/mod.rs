@@ -1,4 +1,4 @@
-//! One command a file. A command resolves the text as typed once, calls the library, and prints.
+//! One file per command. A command parses its arguments once, calls the library, and prints.
 
 pub mod compare;
 pub mod convert;

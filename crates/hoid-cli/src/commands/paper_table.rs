@@ -6,7 +6,7 @@ use serde_json::{Map, Value};
 
 use crate::{args::ShowArgs, error::CliError, output};
 
-/// Whether it can be written: known before anything is read.
+/// Checks that the table can be written, before anything is read.
 ///
 /// # Errors
 /// [`CliError::Usage`] for a name that does not correspond to any format.
@@ -21,10 +21,10 @@ pub fn check(show: &ShowArgs) -> Result<(), CliError> {
     })
 }
 
-/// Writes it where it is requested, from the object of the result.
+/// Writes the table if requested, from the JSON object of the result.
 ///
 /// # Errors
-/// The errors of the object and of writing.
+/// Errors of the object and of writing.
 pub fn write(show: &ShowArgs, object: impl FnOnce() -> Result<Map<String, Value>, CliError>) -> Result<(), CliError> {
     let Some(path) = &show.table else { return Ok(()) };
     match PaperTable::of(&object()?) {

@@ -1,4 +1,4 @@
-//! From the options of reading to recordings, and what a user should know of the files.
+//! From the reading options to recordings, and notes for the user about the files.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -11,7 +11,7 @@ use crate::{
     output,
 };
 
-/// How files are read, as was typed.
+/// Reading options of the arguments.
 pub fn of(args: &ReadArgs, mask: Option<&MaskArgs>, with_input: bool) -> Result<Reading, CliError> {
     let default = Reading::default();
     Ok(Reading {
@@ -22,7 +22,7 @@ pub fn of(args: &ReadArgs, mask: Option<&MaskArgs>, with_input: bool) -> Result<
     })
 }
 
-/// Reports what was left out of a file and the problems of it.
+/// Reports the omitted parts of a file and its problems.
 pub fn told(path: &Path, read: &ReadRecord) {
     let file = path.display().to_string();
     for note in &read.notes {
@@ -33,7 +33,7 @@ pub fn told(path: &Path, read: &ReadRecord) {
     }
 }
 
-/// Reports that a high rate was kept, where it was.
+/// Reports that a high rate was kept, if it was.
 pub fn say_kept(words: Option<String>) {
     if let Some(words) = words {
         output::notice("", words);
@@ -70,7 +70,7 @@ fn preparation(args: &ReadArgs) -> Result<Preparation, CliError> {
         units: by_channel("--unit", &prepare.unit)?,
         scale: by_channel("--scale", &prepare.scale)?,
         offset: by_channel("--offset", &prepare.offset)?,
-        // Decimation comes after the search for faults, which a filter would hide.
+        // Decimation follows the search for faults, which a filter would hide.
         rate: prepare.new_fs.map_or(NewRate::Kept, NewRate::Hz),
         run_in_s: prepare.run_in.unwrap_or(0.0),
         detrend: args.detrend,
@@ -78,7 +78,7 @@ fn preparation(args: &ReadArgs) -> Result<Preparation, CliError> {
     })
 }
 
-/// The text typed for each channel; one that is named twice contradicts itself.
+/// The argument for each channel; a duplicate channel is an error.
 pub fn by_channel<T: Clone>(option: &str, typed: &[(String, T)]) -> Result<BTreeMap<String, T>, CliError> {
     let mut all = BTreeMap::new();
     for (name, value) in typed {

@@ -5,7 +5,7 @@ use hoid::model::scenario::Scenario;
 
 use crate::{args::ScenarioChoice, error::CliError};
 
-/// The scenario of the options; clap has made sure that it is one of the two.
+/// The scenario of the options; clap ensures that exactly one of the two is given.
 pub fn chosen_scenario(choice: &ScenarioChoice) -> Result<AnyScenario, CliError> {
     match (&choice.condition, &choice.scenario) {
         (Some(condition), _) => Ok(AnyScenario::Reference(Box::new(Scenario::condition(*condition)))),

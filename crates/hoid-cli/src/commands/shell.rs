@@ -1,5 +1,5 @@
-//! `hoid completions` and `hoid man`: what a shell and a manual need, made from the definitions that
-//! parse the command line.
+//! `hoid completions` and `hoid man`: shell completions and manual pages, generated from the
+//! definitions of the arguments.
 
 use clap::Command;
 use clap_complete::generate;
@@ -19,7 +19,7 @@ pub fn completions(args: &CompletionsArgs) -> Result<(), CliError> {
     output::print(&String::from_utf8_lossy(&text))
 }
 
-/// Writes a page for the program and one for each command.
+/// Writes one page for the program and one for each command.
 pub fn man(args: &ManArgs) -> Result<(), CliError> {
     make_directory(&args.directory)?;
     let mut program = args::command();

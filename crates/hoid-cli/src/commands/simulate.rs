@@ -1,4 +1,4 @@
-//! `hoid simulate`: one closed-loop run into a file.
+//! `hoid simulate`: one closed-loop run, written to a file.
 
 use std::path::Path;
 
@@ -90,7 +90,7 @@ fn with_changes(mut scenario: Scenario, args: &SimulateArgs) -> Result<Scenario,
     Ok(scenario)
 }
 
-/// The remnant of an operator of the family is what its file states.
+/// The remnant of an operator of the family is defined in its file.
 fn of_family(mut scenario: FamilyScenario, args: &SimulateArgs) -> Result<FamilyScenario, CliError> {
     let remnant = [
         ("--remnant-order", args.remnant_order.is_some()),

@@ -35,7 +35,7 @@ pub fn run_command(command: &StudyCommand) -> Result<(), CliError> {
     }
 }
 
-/// A plan by its file, or else by its name.
+/// A plan from its file, otherwise by its name.
 fn plan_of(path: &Path) -> Result<Plan, CliError> {
     if !path.exists()
         && let Some(named) = path.to_str().and_then(find_plan)
@@ -81,8 +81,8 @@ fn run_plan(args: &StudyRunArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Runs a plan or a group, by its name, into a directory with a progress bar of a given number of
-/// units; an interrupt stops it so that it can be resumed.
+/// Runs a named plan or group in a directory with a progress bar of the given number of units; an
+/// interrupt stops it so that it can be resumed.
 pub fn with_progress(
     name: &str,
     directory: &Path,
@@ -111,15 +111,15 @@ pub fn with_progress(
     }
 }
 
-/// Warnings about a directory, as warnings.
+/// Reports the notes on a directory as warnings.
 fn say(directory: &Path, notes: &[String]) {
     for note in notes {
         output::warning(&directory.display().to_string(), note);
     }
 }
 
-/// A flag that an interrupt sets; a second interrupt ends the program at once, with nothing lost
-/// but the blocks on their way.
+/// A flag set by an interrupt; a second interrupt ends the program at once, and only the blocks in
+/// progress are lost.
 pub fn stop_at_interrupt() -> Arc<AtomicBool> {
     let stopped = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stopped);

@@ -1,8 +1,8 @@
-//! Report of a study on the operator's parameters: their relative bias, as a table of one screen.
+//! Summary of a study: relative bias of the operator's parameters, as a table that fits on one screen.
 //!
-//! A row is an estimator in a cell: how many of its estimates are an operator, and for each parameter the
-//! median of `100 (estimate - true) / true` with its Monte Carlo error. The median, since single
-//! estimates of a poor model may be as wrong as they like.
+//! Each row is an estimator in a cell: the share of estimates that are an operator, and for each parameter the median
+//! of `100 (estimate - true) / true` with its Monte Carlo error. The median is used because single estimates of a poor
+//! model may have arbitrary errors.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use hoid::report::numbers;
 
 use crate::{error::CliError, text};
 
-/// Parameters that are shown, the first that the table has.
+/// Parameters in order of preference; the first that the table has are shown.
 const PARAMETERS: [&str; 10] = [
     "K_e",
     "K_over_T_I",
@@ -24,12 +24,12 @@ const PARAMETERS: [&str; 10] = [
     "T_L2",
     "t_M",
 ];
-/// Columns of a screen that is 80 wide.
+/// Number of parameter columns on a screen of 80 columns.
 const MOST_PARAMETERS: usize = 3;
-/// Rows of one screen.
+/// Maximum number of rows on a screen.
 const MOST_ROWS: usize = 24;
 
-/// The answer of the tables of a study; empty if they have no bias of a parameter.
+/// The summary of the tables of a study; empty if they have no bias of a parameter.
 pub fn answer(tables: &[PathBuf]) -> Result<String, CliError> {
     let is_summary = |path: &&PathBuf| path.file_stem().is_some_and(|stem| stem == "summary");
     let Some(summary) = tables.iter().find(is_summary) else {
@@ -43,14 +43,14 @@ pub fn answer(tables: &[PathBuf]) -> Result<String, CliError> {
 struct Row {
     cell: String,
     estimator: String,
-    /// All estimates.
+    /// Number of all estimates.
     all: f64,
-    /// Rates of those that are not an operator.
+    /// Share of estimates that are not an operator.
     failed: f64,
     not_convertible: f64,
-    /// Rate of those whose verdict is trustworthy, where there are verdicts.
+    /// Share of estimates with a trustworthy verdict, if there are verdicts.
     trustworthy: Option<f64>,
-    /// One a parameter, empty if there is none.
+    /// One for each parameter, empty if there is none.
     biases: Vec<String>,
 }
 

@@ -1,5 +1,5 @@
-//! Numbers that look like chance, of a seed: SplitMix64 (G. L. Steele, D. Lea, C. H. Flood, *Fast splittable
-//! pseudorandom number generators*, 2014). For tests of the program at work and for the studies that run it.
+//! Pseudo-random numbers from a seed: SplitMix64 (G. L. Steele, D. Lea, C. H. Flood, *Fast splittable pseudorandom
+//! number generators*, 2014). For tests that run the program and for the studies with it.
 
 pub struct Draw(pub u64);
 
@@ -13,7 +13,7 @@ impl Draw {
         z ^ (z >> 31)
     }
 
-    /// A whole number below `n`; 0 where there is none.
+    /// An integer below `n`; 0 if `n` is 0.
     pub fn below(&mut self, n: usize) -> usize {
         (self.bits() % (n.max(1) as u64)) as usize
     }

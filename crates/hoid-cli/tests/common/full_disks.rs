@@ -1,7 +1,7 @@
-//! `study`, `group` and `track` on disks that are full before all is written: what is there is whole, the blocks before
-//! the fault are not lost, and on another disk the command goes on to the files of a run that nothing befell.
+//! `study`, `group` and `track` on disks that fill before the output is complete: existing files are complete, the
+//! blocks before the fault are kept, and on another disk the command resumes and gives the files of an undisturbed run.
 //!
-//! A disk of a size drawn between a page and what a whole run takes at most is full at a write drawn alike.
+//! A disk of random size between a page and the largest size of a whole run fills at a random write.
 
 use std::fs;
 
@@ -14,24 +14,24 @@ use crate::{
 /// A page of a disk, kB.
 const PAGE_KB: usize = 4;
 
-/// How it went.
+/// Result of the rounds.
 #[derive(Debug, Default)]
 pub struct Outcome {
-    /// Rounds whose disk was full.
+    /// Number of rounds whose disk was full.
     pub full: usize,
-    /// Whole blocks that was there.
+    /// Number of complete blocks that existed.
     pub blocks: usize,
     pub failures: Vec<String>,
 }
 
-/// A given number of rounds of a work; none if no disk of its own can be mounted.
+/// Runs a number of rounds of a work; none if no separate disk can be mounted.
 pub fn rounds(bench: &Bench, work: &Work, count: usize, draw: &mut Draw) -> Option<Outcome> {
     let whole = bench.place(work, "whole");
     fs::create_dir_all(&whole).unwrap();
     bench.whole(work, "whole");
     let expected = files(&whole);
     let bytes = |all: &std::collections::BTreeMap<_, Vec<u8>>| all.values().map(Vec::len).sum::<usize>();
-    // Blocks are next to the tables that are made of them.
+    // Blocks are next to the tables made from them.
     let largest_kb = PAGE_KB * (expected.len() + 2) + (1 + usize::from(work.has_parts)) * bytes(&expected) / 1024;
     let at = bench.at.join("disk");
     fs::create_dir_all(&at).unwrap();
@@ -61,7 +61,7 @@ pub fn rounds(bench: &Bench, work: &Work, count: usize, draw: &mut Draw) -> Opti
             if name.starts_with('.') {
                 fail(format!("{name} is left"));
             } else if name == "study.json" || name == "group.json" {
-                // How far it is.
+                // Progress.
                 if serde_json::from_slice::<serde_json::Value>(bytes).is_err() {
                     fail(format!("{name} is not whole"));
                 }

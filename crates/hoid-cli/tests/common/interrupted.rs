@@ -1,6 +1,6 @@
-//! Commands that end before they are done, and what they leave: their works, the program in a directory, the files
-//! of one run against those of another.
-// Each study uses its own part of this.
+//! Commands that are interrupted, and their remaining files: the works, the program in a directory, comparison of the
+//! files of two runs.
+// Each study uses a part of this module.
 #![allow(dead_code, clippy::unwrap_used)]
 
 use std::{
@@ -27,20 +27,20 @@ structure = "bj"
 orders.nd = [1]
 "#;
 
-/// What is interrupted.
+/// A work to be interrupted.
 pub struct Work {
     pub name: &'static str,
-    /// Before `--out`.
+    /// Arguments before `--out`.
     pub arguments: &'static [&'static str],
-    /// What lets it continue.
+    /// Arguments that resume it.
     pub resume: &'static [&'static str],
-    /// Whether its blocks are in `parts/` of the directory itself.
+    /// True if its blocks are in `parts/` of the directory itself.
     pub has_parts: bool,
-    /// What of its place is given to `--out`.
+    /// Path given to `--out`, relative to its place.
     pub out: &'static str,
 }
 
-/// Blocks that are in `parts/`.
+/// A study, with blocks in `parts/`.
 pub const STUDY: Work = Work {
     name: "study",
     arguments: &["study", "run", "plan.toml", "--jobs", "1"],
@@ -49,7 +49,7 @@ pub const STUDY: Work = Work {
     out: "",
 };
 
-/// The same.
+/// A group, likewise.
 pub const GROUP: Work = Work {
     name: "group",
     arguments: &["group", "people", "--jobs", "1"],
@@ -91,7 +91,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// With a plan, the recordings of a group and one of C1.
+    /// Creates it with a plan, the recordings of a group and one of C1.
     pub fn new(program: PathBuf, at: &Path) -> Self {
         let bench = Self {
             program,
@@ -112,7 +112,7 @@ impl Bench {
         self.at.join(format!("{}-{name}", work.name))
     }
 
-    /// The command that has its results at a place.
+    /// The command whose results are written to a place.
     pub fn command(&self, work: &Work, place: &Path) -> Command {
         let mut command = Command::new(&self.program);
         command.args(work.arguments).args(work.resume).arg("--out");
@@ -130,15 +130,15 @@ impl Bench {
         command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
     }
 
-    /// Runs to the end.
+    /// Runs to completion.
     pub fn whole(&self, work: &Work, name: &str) {
         let status = self.start(work, name).wait().unwrap();
         assert!(status.success(), "{} {name}: {status}", work.name);
     }
 }
 
-/// All files below a directory, by their paths. The page of a reproduction reports how long its
-/// studies took, which is the one thing that differs.
+/// All files below a directory, by their paths. The page of a reproduction contains the duration of
+/// its studies, the only difference between runs.
 pub fn files(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut open = vec![directory.to_owned()];
@@ -161,7 +161,7 @@ pub fn files(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
-/// In what the files below a directory are not those expected.
+/// The differences between the files below a directory and the expected ones.
 pub fn compare(expected: &BTreeMap<PathBuf, Vec<u8>>, directory: &Path, what: &str) -> Vec<String> {
     let found = files(directory);
     let differs = |path: &PathBuf| {
@@ -176,7 +176,7 @@ pub fn compare(expected: &BTreeMap<PathBuf, Vec<u8>>, directory: &Path, what: &s
     all.into_iter().filter_map(differs).collect()
 }
 
-/// The program that is built next to this example.
+/// The program built with this example.
 pub fn beside_this() -> PathBuf {
     let mut path = std::env::current_exe().unwrap();
     path.pop();

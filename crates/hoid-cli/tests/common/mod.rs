@@ -1,5 +1,5 @@
 //! Running the program as a user does.
-// Each file of tests uses its own part of this.
+// Each test file uses a part of this module.
 #![allow(dead_code, clippy::unwrap_used)]
 
 use std::{
@@ -34,8 +34,8 @@ pub fn json(directory: &Path, arguments: &[&str]) -> Value {
     serde_json::from_str(&good(directory, arguments)).unwrap()
 }
 
-/// The result of a fit whatever it is worth: one that is not determined is printed too, and ends
-/// with 1.
+/// The result of a fit with any verdict: one that is not determined is printed too, with exit code
+/// 1.
 pub fn json_of_any_worth(directory: &Path, arguments: &[&str]) -> Value {
     let output = hoid(directory, arguments);
     let found: Value = serde_json::from_slice(&output.stdout)
@@ -46,7 +46,7 @@ pub fn json_of_any_worth(directory: &Path, arguments: &[&str]) -> Value {
 }
 
 /// Exit code and message of a command that fails, which must print nothing on standard output and
-/// leave no file behind.
+/// leave no file.
 pub fn bad(directory: &Path, arguments: &[&str]) -> (i32, String) {
     let files = |d: &Path| fs::read_dir(d).unwrap().count();
     let before = files(directory);
@@ -62,7 +62,7 @@ pub fn bad(directory: &Path, arguments: &[&str]) -> (i32, String) {
     (output.status.code().unwrap(), message)
 }
 
-/// A folder with a run of C1.
+/// A folder with a simulated run of C1.
 pub fn simulated() -> TempDir {
     let directory = TempDir::new().unwrap();
     good(
@@ -72,7 +72,7 @@ pub fn simulated() -> TempDir {
     directory
 }
 
-/// A file of `rows` samples at 100 Hz, each line made by `row` from its number.
+/// A file of `rows` samples at 100 Hz, each line made by `row` from its index.
 pub fn write(directory: &Path, name: &str, header: &str, rows: usize, row: impl Fn(usize) -> String) {
     let lines: Vec<String> = std::iter::once(header.to_owned()).chain((0..rows).map(row)).collect();
     fs::write(directory.join(name), lines.join("\n") + "\n").unwrap();
@@ -94,8 +94,8 @@ pub fn row(k: usize) -> String {
     format!("{t},{e},{u}")
 }
 
-/// Arguments of `track` or `stream` with the method in physical parameters, which starts with a fit,
-/// where none is named.
+/// Arguments of `track` or `stream` with the physical method, which starts with a fit, unless a
+/// method is given.
 pub fn physical<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
     let mut all = arguments.to_vec();
     if !all.contains(&"--method") {

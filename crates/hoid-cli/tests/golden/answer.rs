@@ -1,4 +1,4 @@
-//! What a call answers, without what differs from machine to machine or from version to version.
+//! The answer of a call, without parts that depend on the machine or the version.
 
 use std::{
     fs,
@@ -10,11 +10,11 @@ use serde_json::{Map, Value, json};
 
 use super::manifest::Call;
 
-/// Keys without an answer.
+/// Keys that are omitted.
 const VOLATILE: [&str; 4] = ["hoid", "seconds", "state", "threads"];
-/// Lists that are longer are kept in part.
+/// Longest list that is kept completely.
 const LONG: usize = 24;
-/// Rows of a table that are kept, about.
+/// Approximate number of rows of a table that are kept.
 const ROWS: usize = 12;
 
 pub fn run(at: &Path, command: &str, stdin: Option<&str>) -> Output {
@@ -28,7 +28,7 @@ pub fn run(at: &Path, command: &str, stdin: Option<&str>) -> Output {
         .unwrap()
 }
 
-/// Exit code, the printed data, and rows of the tables that were written.
+/// Exit code, standard output, and rows of the written tables.
 pub fn of(at: &Path, call: &Call) -> Value {
     let out = |text: &str| text.replace("{out}", &call.name);
     let done = run(at, &out(&call.command), call.stdin.as_deref());
@@ -48,7 +48,7 @@ fn lines(text: &[u8]) -> Value {
     json!(text.lines().map(|line| line.trim_end()).collect::<Vec<_>>())
 }
 
-/// One JSON object, one a line, or text.
+/// One JSON object, one per line, or text.
 fn printed(bytes: &[u8]) -> Value {
     if let Ok(one) = serde_json::from_slice(bytes) {
         return one;
@@ -73,8 +73,8 @@ fn rows(text: &str) -> Value {
     json!({"header": header, "rows": all.len(), "kept": kept})
 }
 
-/// Without volatile keys, numbers to twelve digits, and of long lists about eight entries; pages are
-/// whole.
+/// Removes volatile keys, rounds numbers to twelve digits, and keeps about eight entries of long
+/// lists; pages are kept completely.
 fn shorter(value: Value) -> Value {
     match value {
         Value::Object(map) => map

@@ -1,4 +1,4 @@
-//! Files that calls read. A change of a table is a word with its numbers; `test_golden.py` has the same.
+//! Input files of the calls. A modification of a table is a word with its numbers; `test_golden.py` has the same ones.
 
 use std::{fs, path::Path};
 
@@ -32,7 +32,7 @@ fn good(at: &Path, command: &str) -> Vec<u8> {
     done.stdout
 }
 
-/// Columns and rows of a table, changed one change after the other.
+/// Columns and rows of a table, with the modifications applied in order.
 fn changed(text: &str, input: &Input) -> String {
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();

@@ -1,8 +1,8 @@
-//! The golden set: recorded answers of the program. They show what changed when something was moved.
+//! The golden set: recorded answers of the program, which show the effect of a modification.
 //!
-//! `fixtures/golden/calls.toml` lists the inputs and the calls, `fixtures/golden/command-line/` holds an
-//! answer each. Inputs are simulated here, in a folder that is thrown away. `python/tests/test_golden.py`
-//! reads the same list. `HOID_UPDATE_GOLDEN=1 cargo test -p hoid-cli --test golden` renews the answers.
+//! `fixtures/golden/calls.toml` lists the inputs and the calls, `fixtures/golden/command-line/` contains their answers.
+//! Inputs are simulated in a temporary folder. `python/tests/test_golden.py` reads the same list.
+//! `HOID_UPDATE_GOLDEN=1 cargo test -p hoid-cli --test golden` updates the answers.
 #![allow(clippy::unwrap_used)]
 
 mod answer;

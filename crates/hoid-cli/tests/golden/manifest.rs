@@ -1,4 +1,4 @@
-//! The list of inputs and calls, as it is written.
+//! The list of inputs and calls, as written.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ pub struct Manifest {
     pub calls: Vec<Call>,
 }
 
-/// A file that calls read: made by the program, of another one, or written unchanged.
+/// An input file of calls: made by the program, derived from another one, or written unchanged.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Input {
@@ -24,7 +24,7 @@ pub struct Input {
     pub simulate: Option<String>,
     /// A call whose standard output is the file, or which writes it.
     pub command: Option<String>,
-    /// Columns of another file, with changes.
+    /// Columns of another file, with modifications.
     pub of: Option<String>,
     pub columns: Vec<String>,
     pub rows: Option<[usize; 2]>,
@@ -37,15 +37,15 @@ pub struct Input {
 pub struct Call {
     pub name: String,
     pub command: String,
-    /// A file of lines on standard input.
+    /// A file of lines for standard input.
     pub stdin: Option<String>,
-    /// Tables that it writes, of which some rows are kept.
+    /// Written tables, of which some rows are kept.
     #[serde(default)]
     pub tables: Vec<String>,
     pub tolerance: Option<f64>,
-    /// Why its tolerance is larger.
+    /// Reason for a larger tolerance.
     #[allow(dead_code)]
     pub reason: Option<String>,
-    /// The same in Python: function, records and keywords.
+    /// The call in Python: function, records and keywords.
     pub python: Option<BTreeMap<String, toml::Value>>,
 }

@@ -91,7 +91,7 @@ pub fn run(program: &Path, arguments: &[&str], input: &str) -> Output {
         .unwrap();
     let mut to = child.stdin.take().unwrap();
     let input = input.to_owned();
-    // A pipe that no one reads any more is not a fault of ours.
+    // A pipe closed by its reader is not an error of this library.
     let writer = std::thread::spawn(move || drop(to.write_all(input.as_bytes())));
     let output = child.wait_with_output().unwrap();
     writer.join().unwrap();

@@ -1,35 +1,35 @@
-//! The even grid after a recorded time, and how the time differs from it.
+//! The even grid fitted to a recorded time, and the deviation of the time from it.
 //!
-//! Row i is at `t_i = t_0 + k_i Ts + jitter`, with whole k that grow by one from row to row, and by
-//! more where rows are missing. The k are found by a phase that follows the times,
-//! `k_i - k_{i-1} = round((t_i - g) / Ts)` with `g` pulled a small share of the way to each time:
-//! jitter of nearly half a sample is then no gap. A row taken too far is given back when the next
-//! seems to stand. Ts is the slope of least squares, found twice.
+//! Row i is at `t_i = t_0 + k_i Ts + jitter`, with whole k that increase by one from row to row,
+//! and by more where rows are missing. The k are found by a phase that follows the times,
+//! `k_i - k_{i-1} = round((t_i - g) / Ts)`, with `g` pulled by a small share towards each time:
+//! jitter of nearly half a sample is then not a gap. A step too many is given back if the next row
+//! seems not to advance. Ts is the least-squares slope, computed twice.
 //!
-//! The jitter is the deviation from straight lines over parts of 256 rows without a gap, so that a
-//! slow drift is none.
+//! The jitter is the deviation from straight lines over parts of 256 rows without a gap, so that
+//! slow drift does not count as jitter.
 
-/// Rows of a part, and the fewest that make one.
+/// Rows of a part, and the fewest rows of one.
 const PART: usize = 256;
 const LEAST_PART: usize = 5;
-/// A gap of a given number of rows is a pause, after which the grid starts again.
+/// A gap of at least this many rows is a pause, after which the grid restarts.
 const PAUSE: f64 = 10.0;
-/// Rows within which a step that was taken too far is set right.
+/// Rows within which an excess step is corrected.
 const NEAR: usize = 4;
-/// Times that report where a grid starts.
+/// Number of times used to locate the start of a grid.
 const BEGIN: usize = 8;
 
-/// Where the rows are on an even grid.
+/// Position of the rows on an even grid.
 pub(crate) struct Grid {
-    /// Rows whose time is later than that of all before.
+    /// Rows whose time is later than that of all rows before.
     pub(crate) rows: Vec<usize>,
-    /// Steps of the grid from each of them to the one before; 1 where no row is missing.
+    /// Grid steps from each of these rows to the one before; 1 where no row is missing.
     pub(crate) steps: Vec<f64>,
     /// Sample time, s; NaN if fewer than two rows advance.
     pub(crate) sample_time_s: f64,
     /// Rows whose time stays constant.
     pub(super) standing: Vec<usize>,
-    /// Rows whose time lies before that of an earlier row.
+    /// Rows whose time is earlier than that of a previous row.
     pub(super) back: Vec<usize>,
 }
 
@@ -48,8 +48,8 @@ impl Grid {
             }
         }
         let times: Vec<f64> = rows.iter().map(|row| t[*row]).collect();
-        // The median of single steps is exact without jitter; that of sixteen at once sees through
-        // it, where few rows are missing.
+        // The median of single steps is exact without jitter; that of sixteen steps together
+        // averages jitter out, where few rows are missing.
         let median = |length: usize| {
             let mut spans: Vec<f64> = times
                 .windows(length + 1)
@@ -83,15 +83,15 @@ impl Grid {
         }
     }
 
-    /// Gaps: position of the row before among the rows that advance, and rows missing.
+    /// Gaps: index of the preceding row among the rows that advance, and number of missing rows.
     pub(crate) fn gaps(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         (1..self.steps.len())
             .filter(|i| self.steps[*i] > 1.5)
             .map(|i| (i - 1, self.steps[i] - 1.0))
     }
 
-    /// Deviation from lines over parts without a gap: RMS, and the largest with its row; none if no
-    /// part is long enough.
+    /// Deviation from lines over parts without a gap: RMS, largest deviation and its row; none if
+    /// no part is long enough.
     pub(crate) fn jitter(&self, t: &[f64]) -> Option<(f64, f64, usize)> {
         let (mut squares, mut freedom) = (0.0, 0);
         let mut worst = (0.0, 0);
@@ -124,12 +124,12 @@ impl Grid {
     }
 }
 
-/// Steps of the grid from row to row, one of each time.
+/// Computes the grid steps from row to row, one for each time.
 fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
     steps.fill(1.0);
     let mut owed: Option<usize> = None;
-    // Where a grid starts, the first times together report where it lies: one alone is off by its
-    // jitter.
+    // Where a grid starts, its position is estimated from the first times together: a single one is
+    // off by its jitter.
     let begin = |i: usize| {
         let ahead = times[i..]
             .iter()
@@ -152,8 +152,8 @@ fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
         }
         known += 1.0;
         steps[i] = step.max(1.0);
-        // What seems to stand gives back what an early time took, or is owed what the next one
-        // takes.
+        // A row that seems not to advance gives back the step that an early time took, or borrows
+        // from the next one.
         if step < 1.0 {
             match (i.saturating_sub(NEAR)..i).rev().find(|j| steps[*j] > 1.5) {
                 Some(taken) => steps[taken] -= 1.0,
@@ -165,9 +165,9 @@ fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
     }
 }
 
-/// Slope of least squares of the times over the grid.
+/// Least-squares slope of the times over the grid.
 pub(super) fn slope(times: &[f64], steps: &[f64]) -> f64 {
-    // Counted again for each sum: a record of hours has no room for its indices.
+    // Recomputed for each sum: the indices of a record of hours would take too much memory.
     let indexed = || {
         let mut index = 0.0;
         times.iter().zip(steps).enumerate().map(move |(i, (time, step))| {
@@ -178,7 +178,7 @@ pub(super) fn slope(times: &[f64], steps: &[f64]) -> f64 {
         })
     };
     let n = times.len() as f64;
-    // Scaled by n before they are summed, so that nothing overflows that has a meaning.
+    // Scaled by n before summation, so that meaningful values do not overflow.
     let x = indexed().map(|(index, _)| index / n).sum::<f64>();
     let y = times.iter().map(|t| t / n).sum::<f64>();
     let covariance: f64 = indexed().map(|(index, time)| (index - x) * (time - y)).sum();

@@ -1,13 +1,12 @@
-//! Rows that are duplicated, and stalls: channels that all hold their values while the time
-//! continues.
+//! Duplicated rows, and stalls: all channels hold their values while the time continues.
 //!
-//! One channel may hold because a hand rests, and two in coarse steps may do so together. A stall
-//! is reported by the channel that naturally holds shortest: all hold for longer than `min_c L_c`.
-//! For a channel in steps L is ten times the length that nine of ten of its holds do not exceed;
-//! for one in full precision twice its longest hold while another channel moves, which is 0 unless
-//! it is printed with few decimals: then each hold of all channels is reported, unless one of them
-//! is in steps and the hold is of one row. A channel that is alone must be in full precision to be
-//! judged.
+//! One channel may hold because the hand rests, and two in coarse steps may do so together. A stall
+//! is judged by the channel whose natural holds are shortest: all channels hold for longer than
+//! `min_c L_c`. For a quantised channel L is ten times the length that nine of ten of its holds do
+//! not exceed; for one in full precision it is twice the longest hold while another channel moves,
+//! which is 0 unless the channel is printed with few decimals: then each hold of all channels is
+//! reported, unless one of them is quantised and the hold is of one row. A single channel must be
+//! in full precision to be judged.
 
 use std::ops::Range;
 
@@ -17,7 +16,7 @@ use super::signals::{Signal, Signals};
 use super::values::Levels;
 use crate::wording::{counted, short};
 
-/// Rows whose time does not advance: those that repeat the row before, and the others.
+/// Rows whose time does not advance: duplicates of the row before, and the others.
 pub(super) fn standing(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
     let same = |row: &usize| {
         *row > 0
@@ -27,7 +26,7 @@ pub(super) fn standing(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<Quali
                 .all(|signal| signal.values[*row] == signal.values[row - 1] || signal.values[*row].is_nan())
     };
     let (repeated, others): (Vec<usize>, Vec<usize>) = grid.standing.iter().copied().partition(same);
-    // For rows after a time that was set back the first alone is earlier than the row before.
+    // Of the rows after a time that was set back, only the first is earlier than the row before.
     let falls = |row: &usize| {
         signals
             .time
@@ -67,7 +66,7 @@ pub(super) fn standing(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<Quali
     }
 }
 
-/// Longest run of true, and all runs.
+/// All runs of true.
 fn runs(holds: impl Iterator<Item = bool>) -> Vec<Range<usize>> {
     let mut runs: Vec<Range<usize>> = Vec::new();
     for (row, hold) in holds.enumerate() {
@@ -92,7 +91,7 @@ pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Gri
     if moving.is_empty() || rows < 3 {
         return;
     }
-    // Whether each row holds the row before; rows that are duplicated are another matter.
+    // Whether each row holds the values of the row before; duplicated rows are reported separately.
     let advances = |row: usize| grid.is_none_or(|grid| grid.standing.binary_search(&row).is_err());
     let holds: Vec<Vec<bool>> = moving
         .iter()
@@ -119,8 +118,8 @@ pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Gri
                 2 * alone.iter().map(Range::len).max().unwrap_or(0)
             }
         };
-        // Next to a channel in steps, which holds often, one printed with few digits meets it at a
-        // peak by chance.
+        // Next to a quantised channel, which holds often, one printed with few digits holds at a
+        // peak at the same time by chance.
         let by_chance = usize::from(moving.iter().any(|(_, levels)| levels.is_coarse()));
         moving.iter().zip(&holds).map(natural).min().unwrap_or(0).max(by_chance)
     };

@@ -1,4 +1,4 @@
-//! Problems with the columns of a table that a record is made of.
+//! Problems with the table columns from which a record is made.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use crate::IoError;
 use crate::record::ReadOptions;
 use crate::table::{Table, column_expression};
 
-/// Problems with the columns that are requested, within the span.
+/// Problems with the requested columns, within the span.
 ///
 /// # Errors
 /// [`IoError::NoSuchColumn`] and [`IoError::Expression`].
@@ -41,10 +41,10 @@ pub(crate) fn issues_of_signals(
         .collect();
     used.sort_unstable();
     used.dedup();
-    // A frequency to resample to carries no information about the clock of the file.
+    // A resampling frequency carries no information about the clock of the file.
     let nominal_hz = options.sampling_hz.filter(|_| !options.repair.resample);
     let mut found = of_columns(table, &used, time, nominal_hz, span_rows(table, time, options));
-    // A difference may rightly have one constant term, such as a reference of zero.
+    // A difference may have one constant term, such as a zero reference.
     let names = |one: &QualityIssue, column: usize| table.columns[column].name == one.channel;
     let constant: Vec<QualityIssue> = found
         .iter()
@@ -66,7 +66,7 @@ pub(crate) fn issues_of_signals(
     found
 }
 
-/// The rows of the span, as far as the time of the file shows.
+/// Rows of the span, as far as the time of the file determines them.
 fn span_rows(table: &Table<'_>, time: Option<usize>, options: &ReadOptions) -> Range<usize> {
     let at = |row: usize| match (time, options.sampling_hz) {
         (Some(time), _) => table.columns[time].values[row],

@@ -1,4 +1,4 @@
-//! A finding: kind, place, size, and what can be done about it.
+//! A finding: kind, place, size and remedy.
 
 use std::fmt;
 
@@ -6,43 +6,43 @@ use serde::{Deserialize, Serialize};
 
 use crate::wording::decimal;
 
-/// Places of a finding that are written as JSON; all of them are counted.
+/// Maximum number of places of a finding written as JSON; all of them are counted.
 const PLACES_WRITTEN: usize = 100;
 
-/// The problem.
+/// Kind of a problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum QualityIssueKind {
-    /// Values that are missing or not finite.
+    /// Missing or non-finite values.
     Missing,
-    /// Time that stays constant or runs back.
+    /// Time that is constant or runs backwards.
     Unordered,
-    /// Rows that are duplicated, time included.
+    /// Duplicated rows, including the time.
     Repeated,
-    /// Rows that do not exist.
+    /// Missing rows.
     Gap,
-    /// Times off an even grid.
+    /// Times that deviate from an even grid.
     Jitter,
-    /// A clock that is off another, or off a typical rate.
+    /// A clock that differs from another, or from a typical rate.
     Clock,
     /// A clock whose rate changes.
     Drift,
-    /// All channels hold their values while the time continues.
+    /// All channels hold their values while time continues.
     Stalled,
-    /// A channel that stays at its end.
+    /// A channel that stays at its limit.
     Saturated,
-    /// A channel in coarse steps.
+    /// A channel quantised in coarse steps.
     Quantised,
-    /// A channel with one value.
+    /// A channel with a single value.
     Constant,
 }
 
 impl QualityIssueKind {
-    /// Kinds that are places in a record and can be left out of it; a clock or a constant is none.
+    /// Kinds that are places in a record and can be excluded from it; a clock error or a constant channel is not.
     pub const MASKABLE: [Self; 4] = [Self::Missing, Self::Gap, Self::Stalled, Self::Saturated];
 
-    /// Remedy.
+    /// Returns the remedy.
     pub fn remedy(self) -> &'static str {
         match self {
             Self::Missing => "bridge empty cells with --fill, or leave out with --from and --to or --mask missing",
@@ -74,14 +74,14 @@ hoid_model::named_choice!(QualityIssueKind, "kind of fault", 11, {
     Constant => "constant",
 });
 
-/// Rows that follow each other.
+/// Consecutive rows.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RowSpan {
-    /// The first row, counted from 1 without header and comments; of a gap the row before it.
+    /// The first row, counted from 1 without header and comments; for a gap, the row before it.
     pub row: usize,
-    /// How many rows; of a gap those that are missing.
+    /// Number of rows; for a gap, of missing rows.
     pub rows: usize,
-    /// Time of the first row, s; none without a time.
+    /// Time of the first row, s; none without a time column.
     pub from_s: Option<f64>,
     /// Time of the row after the last, s.
     pub to_s: Option<f64>,
@@ -90,21 +90,20 @@ pub struct RowSpan {
 /// One finding.
 #[derive(Debug, Clone, PartialEq)]
 pub struct QualityIssue {
-    /// Its definition.
+    /// Kind of the problem.
     pub kind: QualityIssueKind,
-    /// The channel; empty for the time and for all channels.
+    /// Channel; empty for the time and for all channels.
     pub channel: String,
-    /// Rows concerned.
+    /// Number of rows concerned.
     pub rows: usize,
     /// Their share of the rows examined.
     pub share: f64,
-    /// How much, in `unit`: jitter RMS in s; a gap, a stall or a saturation its longest time in s;
-    /// a clock and a drift the relative deviation; the step of what is quantised; else the number
-    /// of rows.
+    /// Size, in `unit`: RMS jitter in s; longest duration of a gap, stall or saturation in s;
+    /// relative deviation of a clock or drift; quantisation step; otherwise the number of rows.
     pub size: f64,
     /// Unit of the size.
     pub unit: String,
-    /// Where.
+    /// Places.
     pub places: Vec<RowSpan>,
     /// A sentence without a full stop.
     pub text: String,

@@ -1,5 +1,5 @@
-//! The quality of recorded data: the problems of the sampling and the values, where and how much; nothing is repaired
-//! unasked.
+//! Quality of recorded data: problems of the sampling and the values, their places and sizes; data are changed only on
+//! request.
 //!
 //! | module | contents |
 //! |---|---|
@@ -12,8 +12,8 @@
 //! | `search` | all of these, for columns that belong together, and for the channels of a record |
 //! | `in_table` | the same for the columns that a record is made of |
 //!
-//! An operator's channel may be smooth, quiet or constant for good reasons: the rules are made so that simulated
-//! operators without faults give no finding (tested), and report about what they find what it is and not what it means.
+//! An operator's channel may legitimately be smooth, quiet or constant: the rules are designed so that simulated
+//! operators without faults give no finding (tested), and a finding describes the problem without interpreting it.
 
 mod grid;
 mod holds;

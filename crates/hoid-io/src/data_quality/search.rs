@@ -1,4 +1,4 @@
-//! Everything that is wrong with columns that belong together, and with the channels of a record.
+//! All problems of columns that belong together, and of the channels of a record.
 
 use hoid_model::Record;
 
@@ -8,7 +8,7 @@ use super::signals::{Signal, Signals};
 use super::values::Levels;
 use super::{holds, timing, values};
 
-/// Everything that is wrong with columns that belong together.
+/// All problems of columns that belong together.
 pub(crate) fn issues_of(signals: &Signals<'_>) -> Vec<QualityIssue> {
     let mut found = Vec::new();
     if signals.rows() == 0 {
@@ -28,8 +28,8 @@ pub(crate) fn issues_of(signals: &Signals<'_>) -> Vec<QualityIssue> {
     found
 }
 
-/// Problems with the values of e and u: saturation, quantisation, constants. Of its time nothing is known but that it
-/// is even.
+/// Problems with the values of e and u: saturation, quantisation, constants. The time of a record is known only to be
+/// even.
 pub fn quality_of_record(record: &Record) -> Vec<QualityIssue> {
     let channels = record.input_channel().into_iter().chain([record.output_channel()]);
     let columns = channels
@@ -45,7 +45,7 @@ pub fn quality_of_record(record: &Record) -> Vec<QualityIssue> {
     })
 }
 
-/// Whether a name states that a column counts time.
+/// True if a name denotes a column of times.
 pub(crate) fn names_a_clock(name: &str) -> bool {
     let name = name.to_ascii_lowercase();
     ["time", "clock", "stamp"].iter().any(|word| name.contains(word))

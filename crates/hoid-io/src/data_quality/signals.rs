@@ -1,27 +1,27 @@
-//! Columns as they are examined, and the prior knowledge of their time.
+//! The columns to examine, and the prior knowledge of their time.
 
 use std::ops::Range;
 
 use super::issue::RowSpan;
 use crate::table::Precision;
 
-/// A column as it is examined.
+/// A column to examine.
 #[derive(Clone, Copy)]
 pub(crate) struct Signal<'a> {
     pub(crate) name: &'a str,
     pub(crate) values: &'a [f64],
 }
 
-/// Columns of one length, and the prior knowledge of their time.
+/// Columns of equal length, and the prior knowledge of their time.
 #[derive(Default)]
 pub(crate) struct Signals<'a> {
     pub(crate) columns: Vec<Signal<'a>>,
     pub(crate) time: Option<Signal<'a>>,
-    /// How exactly the time is printed.
+    /// Precision with which the time is printed.
     pub(crate) precision: Precision,
-    /// Sampling frequency that was given or stated, Hz.
+    /// Given or stated sampling frequency, Hz.
     pub(crate) nominal_hz: Option<f64>,
-    /// Other columns that count time.
+    /// Other columns of times.
     pub(crate) clocks: Vec<Signal<'a>>,
     /// Rows before the first one examined.
     pub(crate) before: usize,

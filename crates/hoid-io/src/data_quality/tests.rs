@@ -1,7 +1,7 @@
 use super::*;
 use crate::table::Precision;
 
-/// Numbers between -1 and 1 that look arbitrary, the same in every run.
+/// Pseudo-random numbers between -1 and 1, the same in every run.
 struct Arbitrary(u64);
 
 impl Arbitrary {
@@ -48,7 +48,7 @@ fn kinds(found: &[QualityIssue]) -> Vec<QualityIssueKind> {
 fn smooth_and_quiet_channels_have_no_faults() {
     let [e, u] = smooth();
     assert_eq!(look(&even(), &e, &u), []);
-    // Printed with few decimals, slow as they are, and far from zero.
+    // Printed with few decimals, slow, and far from zero.
     let printed = |values: &[f64]| {
         values
             .iter()
@@ -56,7 +56,7 @@ fn smooth_and_quiet_channels_have_no_faults() {
             .collect::<Vec<_>>()
     };
     assert_eq!(look(&even(), &printed(&e), &printed(&u)), []);
-    // A hand that rests for a third of the time.
+    // The hand rests for a third of the time.
     let mut resting = u.clone();
     let at = resting[1000];
     resting[1000..2300].fill(at);
@@ -83,7 +83,7 @@ fn gaps_are_found_under_jitter_of_nearly_half_a_sample() {
     let mut any = Arbitrary(3);
     let mut t: Vec<f64> = even().iter().map(|t| t + 0.45 * TS * any.next()).collect();
     let [mut e, mut u] = smooth();
-    // In the order of rows that are still there.
+    // In the order of the remaining rows.
     for (row, missing) in [(3000, 1), (2000, 7), (1000, 1), (500, 150)] {
         for column in [&mut t, &mut e, &mut u] {
             column.drain(row..row + missing);
@@ -94,7 +94,7 @@ fn gaps_are_found_under_jitter_of_nearly_half_a_sample() {
     let places: Vec<(usize, usize)> = found[0].places.iter().map(|place| (place.row, place.rows)).collect();
     assert_eq!(places, [(500, 150), (850, 1), (1849, 7), (2842, 1)]);
     assert_eq!(found[0].rows, 159);
-    // Uniform within 0.45 of a sample: 0.45 / sqrt 3 of one RMS.
+    // Uniform within 0.45 of a sample: an RMS of 0.45 / sqrt 3 samples.
     assert!(
         (found[1].size / (0.45 * TS / 3_f64.sqrt()) - 1.0).abs() < 0.05,
         "{}",
@@ -113,7 +113,7 @@ fn stalls_and_rows_there_twice() {
     let place = found[0].places[0];
     assert_eq!((found[0].places.len(), place.row, place.rows), (1, 702, 91));
     assert!((found[0].size - 0.91).abs() < 1e-9);
-    // In steps the channels hold too, and a stall is what is longer.
+    // Quantised channels hold too; a stall is a longer hold.
     let steps = |values: &[f64]| values.iter().map(|v| (v * 20.0).round() / 20.0).collect::<Vec<_>>();
     let coarse = look(&even(), &steps(&e), &steps(&u));
     let stalls: Vec<&QualityIssue> = coarse
@@ -155,7 +155,7 @@ fn rails_and_steps() {
     for (one, value) in found.iter().zip([-0.9, 1.0]) {
         assert_eq!(one.rows, clipped.iter().filter(|v| **v == value).count());
     }
-    // Steps alone are not a rail, at any coarseness and with any phase of the steps.
+    // Quantisation alone is not saturation, at any step size and phase.
     for levels in [8.0, 16.0, 31.0, 64.0, 256.0] {
         for phase in [0.0, 0.2, 0.5, 0.77] {
             let steps: Vec<f64> = u

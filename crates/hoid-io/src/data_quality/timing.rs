@@ -1,4 +1,4 @@
-//! The time against the even grid after it: jitter, missing rows, a clock that is off or drifts.
+//! The time compared with its even grid: jitter, missing rows, a clock offset or drift.
 
 use super::grid::{Grid, slope};
 use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
@@ -6,20 +6,21 @@ use super::signals::Signals;
 use crate::table::Precision;
 use crate::wording::{counted, decimal, short};
 
-/// Deviation from the grid that is not jitter, sample times; that of `sampling`.
+/// Deviation from the grid above which jitter is reported, sample times; the same limit as in `sampling`.
 const JITTER: f64 = 1e-3;
-/// Relative deviation of a clock from a given rate that is reported; crystals are within 1e-4.
+/// Relative deviation of a clock from a given rate above which it is reported; crystals are within 1e-4.
 const OFF: f64 = 2e-4;
-/// The same from a typical rate that no one gave, and the farthest that still looks like it.
+/// The same for a typical rate that was not given, and the largest deviation at which the rate still counts as that
+/// one.
 const OFF_COMMON: (f64, f64) = (5e-4, 1e-2);
-/// Common rates of recorders, Hz.
+/// Common sampling rates of recorders, Hz.
 const COMMON_HZ: [f64; 42] = [
     1.0, 2.0, 4.0, 5.0, 8.0, 10.0, 12.5, 15.0, 16.0, 20.0, 24.0, 25.0, 29.97, 30.0, 32.0, 40.0, 50.0, 59.94, 60.0,
     64.0, 75.0, 80.0, 90.0, 100.0, 119.88, 120.0, 125.0, 128.0, 144.0, 150.0, 200.0, 240.0, 250.0, 256.0, 300.0, 400.0,
     500.0, 512.0, 600.0, 1000.0, 1024.0, 2000.0,
 ];
 
-/// How far rounding may move a time: one unit of the last printed digit, or of single precision.
+/// Largest rounding error of a time: one unit of the last printed digit, or of single precision.
 fn rounding(t: &[f64], precision: Precision) -> f64 {
     let largest = t
         .iter()
@@ -101,10 +102,10 @@ fn gaps(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
     });
 }
 
-/// The rate against the one that was given, or the default one that it nearly is.
+/// Compares the rate with the given one, or with the nearest common rate.
 fn rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec<QualityIssue>) {
     let (ts, n) = (grid.sample_time_s, grid.rows.len() as f64);
-    // Standard error of a slope, and what rounding of the ends can do.
+    // Standard error of the slope, and the effect of rounding at the ends.
     let uncertain = 5.0 * (rms * 12_f64.sqrt() / n.powf(1.5)).max(unit / n / 5.0) / ts;
     let hz = 1.0 / ts;
     let typical = || {
@@ -151,7 +152,7 @@ fn rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec
     });
 }
 
-/// The rate of the first third against that of the last.
+/// Compares the rate of the first third with that of the last.
 fn drift(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec<QualityIssue>) {
     let Some(time) = signals.time else { return };
     let third = grid.rows.len() / 3;
@@ -189,7 +190,7 @@ fn drift(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Ve
     });
 }
 
-/// Other columns that count time, in s, ms, us or ns.
+/// Other columns of times, in s, ms, us or ns.
 fn second_clocks(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
     let Some(time) = signals.time else { return };
     for clock in &signals.clocks {
@@ -210,7 +211,7 @@ fn second_clocks(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssu
         else {
             continue;
         };
-        // The ends represent the rate as far as a row of jitter allows.
+        // The ends determine the rate up to the jitter of one row.
         let uncertain = 2.0 / pairs.len() as f64;
         if off.abs() <= OFF.max(uncertain) {
             continue;

@@ -1,15 +1,15 @@
 //! Saturation, quantisation, constants and missing values of one channel.
 //!
-//! A channel is quantised where its values, fewer than half as many as its rows, lie on a grid
-//! within `1e-3 q`, q being the smallest step between two of them; the smallest and the largest may
-//! lie off it, as the rails of a stick do.
+//! A channel is quantised if its values, fewer than half as many as its rows, lie on a grid within
+//! `1e-3 q`, where q is the smallest step between two of them; the smallest and the largest may lie
+//! off the grid, as the end stops of a stick do.
 //!
-//! It is saturated at an end where it stays there as no peak does. In full precision no two values
-//! in a row are equal by chance: three rows at the extreme value are a rail. In steps a peak stays
-//! longest at its top: of a parabola with its top at the far edge of the last step, 3 times as long
-//! there as on average at the next three steps. A rail is reported where the rows at the extreme
-//! are at least 6 times as many as that average, with a stay of 5 rows at least, and where the
-//! channel came there and stayed more than once.
+//! It is saturated at a limit if it stays there as no peak does. In full precision no two
+//! consecutive values are equal by chance: three rows at the extreme value are saturation. In a
+//! quantised channel a peak stays longest at its top: a parabola with its top at the far edge of
+//! the last step stays 3 times as long there as on average at the next three steps. Saturation is
+//! reported if the rows at the extreme are at least 6 times as many as that average, with one stay
+//! of at least 5 rows, and if the channel reached the extreme and stayed there more than once.
 
 use std::ops::Range;
 
@@ -17,42 +17,42 @@ use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
 use super::signals::{Signal, Signals};
 use crate::wording::{counted, short};
 
-/// A quantised channel is distinguished from this step on, as a share of its deviation: its noise
-/// has 1e-5 of its power there.
+/// Smallest quantisation step that is reported, relative to the standard deviation: its noise has
+/// 1e-5 of the power.
 const COARSE: f64 = 1e-2;
-/// Rows in a row at the extreme that are a rail, for values in full precision and in steps.
+/// Consecutive rows at the extreme that count as saturation, for values in full precision and quantised values.
 const STAY: (usize, usize) = (3, 5);
-/// Rows at a rail against the average of the next steps.
+/// Ratio of the rows at the limit to the average of the next steps.
 const PEAK: usize = 6;
 
-/// Definition of a rail of a channel.
+/// A saturation limit of a channel.
 pub(crate) struct Rail {
-    /// The value at which it stays.
+    /// The value at the limit.
     pub(crate) value: f64,
     pub(crate) is_upper: bool,
-    /// Stays, as rows.
+    /// Stays at the limit, as rows.
     pub(crate) stays: Vec<Range<usize>>,
 }
 
 impl Rail {
-    /// Rows at the rail.
+    /// Number of rows at the limit.
     pub(crate) fn rows(&self) -> usize {
         self.stays.iter().map(Range::len).sum()
     }
 }
 
-/// Distinct finite values of a channel; those within rounding of the range are one.
+/// Distinct finite values of a channel; values that differ by rounding only are one.
 pub(crate) struct Levels {
     count: usize,
-    /// Rows of the channel, and those with a finite value.
+    /// Number of rows of the channel, and of rows with a finite value.
     rows: usize,
     finite: usize,
-    /// In increasing order: all of a coarse channel, else those at both ends.
+    /// In increasing order: all levels of a coarse channel, otherwise those at both ends.
     kept: Vec<f64>,
 }
 
 impl Levels {
-    /// Levels at each end that a channel in full precision keeps.
+    /// Number of levels kept at each end for a channel in full precision.
     const END: usize = 4;
 
     pub(crate) fn of(values: &[f64]) -> Self {
@@ -84,12 +84,12 @@ impl Levels {
         }
     }
 
-    /// Whether they are fewer than half as many as the rows.
+    /// True if there are fewer than half as many levels as rows.
     pub(super) fn is_coarse(&self) -> bool {
         2 * self.count <= self.rows
     }
 
-    /// The step of a grid on which all values lie, and the number of levels.
+    /// Step of the grid on which all values lie, and the number of levels.
     pub(crate) fn quantum(&self) -> Option<(f64, usize)> {
         if self.count < 2 || 2 * self.count > self.finite {
             return None;
@@ -111,10 +111,10 @@ impl Levels {
     }
 }
 
-/// The rails of a channel, lower and upper.
+/// Lower and upper saturation limits of a channel.
 pub(crate) fn rails(values: &[f64], levels: &Levels) -> Vec<Rail> {
     if levels.count < 4 {
-        // A switch or a constant stays at its ends by its nature.
+        // A switch or a constant stays at its ends by nature.
         return Vec::new();
     }
     let (coarse, levels) = (levels.is_coarse(), &levels.kept);
@@ -134,7 +134,7 @@ pub(crate) fn rails(values: &[f64], levels: &Levels) -> Vec<Rail> {
         }
         let rows: usize = stays.iter().map(Range::len).sum();
         let beside: usize = next.iter().map(|level| count(*level)).sum();
-        // What starts or ends the record may be a value that settles.
+        // A stay at the start or end of the record may be a settled value.
         let inner = || {
             stays
                 .iter()

@@ -1,4 +1,4 @@
-//! The archive of a unit: its description, a library for each platform, its resources.
+//! The archive of a unit: its description, a library for each platform, and its resources.
 
 use std::{
     io::{Cursor, Write as _},
@@ -19,7 +19,7 @@ pub struct Library {
     platform: Platform,
 }
 
-/// Platform of a shared library: names of the folders, ending.
+/// Platform of a shared library: folder names and file extension.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Platform {
     in_two: &'static str,
@@ -27,7 +27,7 @@ struct Platform {
     ending: &'static str,
 }
 
-/// First bytes of ELF, place and values of the machine.
+/// First bytes of ELF, offset and values of the machine field.
 const ELF: &[u8] = b"\x7fELF\x02\x01";
 const LINUX: [(u16, Platform); 2] = [
     (
@@ -53,7 +53,7 @@ const WINDOWS: Platform = Platform {
     ending: "dll",
 };
 const MACHINE_OF_WINDOWS: u16 = 0x8664;
-/// Mach-O of 64 bits and its machines.
+/// Magic number of 64-bit Mach-O and its machines.
 const MACH_O: &[u8] = b"\xcf\xfa\xed\xfe";
 const MAC: [(u32, Platform); 2] = [
     (
@@ -74,8 +74,8 @@ const MAC: [(u32, Platform); 2] = [
     ),
 ];
 
-/// Functions that the library of a unit hands out: that of hoid, of FMI 2 and of FMI 3. Their names are in its table of
-/// symbols, each ended by a 0, whatever the system.
+/// Functions that the library of a unit exports: of hoid, of FMI 2 and of FMI 3. Their names are in its symbol table,
+/// each terminated by a 0, on every system.
 const FUNCTIONS: [&str; 3] = ["hoid_abi_version", "fmi2Instantiate", "fmi3InstantiateCoSimulation"];
 
 fn hands_out(bytes: &[u8], function: &str) -> bool {
@@ -96,7 +96,7 @@ fn four_bytes(bytes: &[u8], at: usize) -> Option<u32> {
 }
 
 impl Platform {
-    /// By the head of a shared library: ELF, PE or Mach-O.
+    /// Determines the platform from the header of a shared library: ELF, PE or Mach-O.
     fn of(bytes: &[u8]) -> Option<Self> {
         if bytes.starts_with(ELF) {
             let machine = two_bytes(bytes, 18)?;
@@ -113,11 +113,11 @@ impl Platform {
 }
 
 impl Library {
-    /// Reads a library; its platform is that of its head.
+    /// Reads a library and determines its platform from its header.
     ///
     /// # Errors
-    /// [`IoError::Unreadable`]; [`IoError::NoLibrary`] for what is not a shared library of a known platform;
-    /// [`IoError::OtherLibrary`] for one of something else.
+    /// [`IoError::Unreadable`]; [`IoError::NoLibrary`] for a file that is not a shared library of a known platform;
+    /// [`IoError::OtherLibrary`] for another library.
     pub fn read(path: &Path) -> Result<Self, IoError> {
         let bytes = read_bytes(path)?;
         let platform = Platform::of(&bytes).ok_or_else(|| IoError::NoLibrary {
@@ -133,11 +133,10 @@ impl Library {
     }
 }
 
-/// Writes a unit whose sample time is `step_s`. The same parts give the same bytes.
+/// Writes a unit with sample time `step_s`. The same parts give the same bytes.
 ///
 /// # Errors
-/// The errors of files; [`IoError::NoLibrary`] for settings that contradict themselves, or two libraries of one
-/// platform.
+/// File errors; [`IoError::NoLibrary`] for contradictory settings, or two libraries of one platform.
 pub fn write_fmu(
     path: &Path,
     version: FmiVersion,
@@ -199,7 +198,7 @@ mod tests {
     use super::*;
     use crate::fmu::FmuKind;
 
-    /// Heads as the systems write them, with the names of the functions.
+    /// Headers as the systems write them, with the names of the functions.
     fn heads() -> [(Vec<u8>, &'static str, &'static str); 5] {
         let elf = |machine: u16| {
             let mut bytes = vec![0; 64];
@@ -287,7 +286,7 @@ mod tests {
             assert!(refused.contains("cargo xtask ffi"), "{refused}");
         }
         assert!(Library::read(&folder.path().join("nowhere")).is_err());
-        // For one name a part is not the name.
+        // Part of a name is not the name.
         for (bytes, ..) in heads() {
             let text = String::from_utf8_lossy(FUNCTIONS[1].as_bytes()).into_owned();
             let place = bytes.windows(text.len()).position(|w| w == text.as_bytes()).unwrap();

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::variables::{FmuKind, FmuStart, FmuVariable, Role};
 
-/// The version of the interface that a unit describes; the library has both.
+/// FMI version that a unit describes; the library implements both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FmiVersion {
     /// 2.0.
@@ -20,7 +20,7 @@ hoid_model::named_choice!(FmiVersion, "version of FMI", 2, {
 
 /// Name of the library in a unit.
 pub(super) const MODEL: &str = "hoid";
-/// Units by their exponents of kg, m, s, A, K, mol, cd, rad, and their factor.
+/// Units with their exponents of kg, m, s, A, K, mol, cd, rad, and their factor.
 const UNITS: [(&str, &str); 3] = [
     ("s", r#"s="1""#),
     ("rad/s", r#"s="-1" rad="1""#),
@@ -28,7 +28,7 @@ const UNITS: [(&str, &str); 3] = [
 ];
 
 impl FmuKind {
-    /// Token that description and library share: version and kind.
+    /// Token shared by description and library: version and kind.
     pub fn token(self) -> String {
         format!("hoid-{}-{}", env!("CARGO_PKG_VERSION"), self.name())
     }
@@ -41,7 +41,7 @@ impl FmuKind {
     }
 }
 
-/// The description of a unit whose sample time is `step_s`.
+/// Returns the description of a unit with sample time `step_s`.
 pub(super) fn description(version: FmiVersion, kind: FmuKind, variables: &[FmuVariable], step_s: f64) -> String {
     let mut xml = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
     let (token, help, hoid) = (kind.token(), kind.help(), env!("CARGO_PKG_VERSION"));
@@ -182,7 +182,7 @@ fn typed_variable(xml: &mut String, reference: usize, variable: &FmuVariable) {
     };
 }
 
-/// A text within an attribute.
+/// Escapes a text for use in an attribute.
 fn escaped(text: &str) -> String {
     let mut all = String::with_capacity(text.len());
     for character in text.chars() {

@@ -1,10 +1,11 @@
-//! Functional mock-up units: an archive with a description in XML, a shared library and what it
-//! reads when it starts.
+//! Functional mock-up units: an archive with a description in XML, a shared library and the
+//! settings that it reads at start.
 //!
 //! *Functional Mock-up Interface for Model Exchange and Co-Simulation*, version 2.0.4 (Modelica
 //! Association, 2022), and *Functional Mock-up Interface Specification*, version 3.0.1 (2023). The
-//! library is that of `hoid-ffi`; what it and the description have to agree on is here, the
-//! variables ([`FmuKind::variables`]), whose value references are their places, and the token.
+//! library is that of `hoid-ffi`; this module defines what the library and the description share:
+//! the variables ([`FmuKind::variables`]), whose value references are their positions, and the
+//! token.
 //!
 //! | file | contents |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! Settings in the resources of a unit, which its library reads at start.
+//! Settings in the resources of a unit, read by its library at start.
 
 use std::collections::BTreeMap;
 
@@ -10,17 +10,17 @@ use super::variables::{FmuKind, FmuStart, FmuVariable, Role};
 /// Name of the file among the resources.
 pub const FMU_SETTINGS: &str = "hoid.json";
 
-/// Definition of a unit.
+/// Settings of a unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FmuSettings {
     kind: String,
-    /// Parameters that start with other values than typical.
+    /// Parameters whose start values differ from the defaults.
     #[serde(default)]
     parameters: BTreeMap<String, SettingValue>,
     /// Text of the scenario file of an operator.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scenario: Option<String>,
-    /// A fit as `hoid identify --json` prints it, which a tracker starts with.
+    /// A fit as printed by `hoid identify --json`, used as the initial state of a tracker.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fit: Option<String>,
 }
@@ -35,7 +35,7 @@ enum SettingValue {
 }
 
 impl FmuSettings {
-    /// A unit with its default parameters.
+    /// Creates a unit with default parameters.
     pub fn new(kind: FmuKind) -> Self {
         Self {
             kind: kind.name().to_owned(),
@@ -45,7 +45,7 @@ impl FmuSettings {
         }
     }
 
-    /// With the text of the scenario file of an operator.
+    /// Sets the text of the scenario file of an operator.
     pub fn with_scenario(self, text: String) -> Self {
         Self {
             scenario: Some(text),
@@ -53,7 +53,7 @@ impl FmuSettings {
         }
     }
 
-    /// With the text of a fit, which a tracker starts with.
+    /// Sets the text of the fit with which a tracker starts.
     pub fn with_fit(self, text: String) -> Self {
         Self {
             fit: Some(text),
@@ -61,7 +61,7 @@ impl FmuSettings {
         }
     }
 
-    /// With another start of a parameter.
+    /// Sets the start value of a parameter.
     pub fn with(mut self, parameter: &str, start: FmuStart) -> Self {
         let given = match start {
             FmuStart::Real(value) => SettingValue::Real(value),
@@ -73,35 +73,35 @@ impl FmuSettings {
         self
     }
 
-    /// From the text of the file.
+    /// Parses the text of the file.
     ///
     /// # Errors
-    /// Problems with it, as text.
+    /// Returns the problems of the text.
     pub fn parse(text: &str) -> Result<Self, String> {
         let settings: Self = serde_json::from_str(text).map_err(|error| format!("{FMU_SETTINGS}: {error}"))?;
         settings.kind()?;
         Ok(settings)
     }
 
-    /// The text of the file.
+    /// Returns the text of the file.
     pub fn text(&self) -> String {
         let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
         text.push('\n');
         text
     }
 
-    /// Behaviour of the unit.
+    /// Returns the kind of the unit.
     ///
     /// # Errors
-    /// For a kind that is invalid.
+    /// For an invalid kind.
     pub fn kind(&self) -> Result<FmuKind, String> {
         FmuKind::of_name(&self.kind).map_err(|error| format!("{FMU_SETTINGS}: {error}"))
     }
 
-    /// The variables, with the starts of this unit.
+    /// Returns the variables with the start values of this unit.
     ///
     /// # Errors
-    /// For a parameter that the unit does not have, or one of another type.
+    /// For a parameter that the unit does not have, or a value of another type.
     pub fn variables(&self) -> Result<Vec<FmuVariable>, String> {
         let mut all = self.kind()?.variables();
         for (name, given) in &self.parameters {
@@ -135,7 +135,7 @@ mod tests {
         let back = FmuSettings::parse(&settings.text()).unwrap();
         assert_eq!(back.variables().unwrap()[0].start, FmuStart::Real(0.02));
         assert_eq!(back, settings);
-        // A whole number of seconds is a number too.
+        // A whole number of seconds is also a valid number.
         let whole = settings.clone().with("sample_time", FmuStart::Integer(1));
         assert_eq!(whole.variables().unwrap()[0].start, FmuStart::Real(1.0));
         for wrong in [

@@ -1,6 +1,6 @@
 //! The variables of a unit.
 
-/// Whether the data determine a parameter of the operator, in the order of its parameters.
+/// Variables that state whether the data determine a parameter of the operator, in the order of the parameters.
 pub const DETERMINED: [&str; 6] = [
     "K_e_determined",
     "T_L_determined",
@@ -10,12 +10,12 @@ pub const DETERMINED: [&str; 6] = [
     "tau_e_determined",
 ];
 
-/// Behaviour of a unit.
+/// Kind of a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FmuKind {
-    /// Estimates a person from e and u.
+    /// Identifies an operator from e and u.
     Tracker,
-    /// Controls as the operator of a scenario does.
+    /// Controls like the operator of a scenario.
     Operator,
 }
 
@@ -24,7 +24,7 @@ hoid_model::named_choice!(FmuKind, "kind of unit", 2, {
     Operator => "operator",
 });
 
-/// Purpose of a variable.
+/// Role of a variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// Set before the start.
@@ -35,32 +35,31 @@ pub enum Role {
     Output,
 }
 
-/// Type of a variable, with its value at the start; that of an output is what it is before the first
-/// sample.
+/// Type and start value of a variable; for an output, the value before the first sample.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FmuStart {
     /// A number.
     Real(f64),
-    /// A count or a choice.
+    /// An integer or a choice.
     Integer(i32),
-    /// Yes or no.
+    /// A truth value.
     Boolean(bool),
     /// A text.
     Text(String),
 }
 
-/// A variable; its value reference is its place in the list.
+/// A variable; its value reference is its position in the list.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FmuVariable {
     /// Its name.
     pub name: &'static str,
     /// Its unit, empty for none.
     pub unit: &'static str,
-    /// Its purpose.
+    /// Its role.
     pub role: Role,
-    /// Type and start.
+    /// Type and start value.
     pub start: FmuStart,
-    /// One line.
+    /// Description of one line.
     pub help: &'static str,
 }
 

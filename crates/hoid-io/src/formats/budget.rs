@@ -1,26 +1,26 @@
-//! How much memory a file may take, whatever its format: a few bytes can be made to unpack to any length.
+//! Memory limit of a file of any format: a few bytes can be made to unpack to any length.
 //!
-//! A file of n bytes may unpack to `48 MB + 64 n`, at most 16 GB. [`UNPACKED`], a number of megabytes in the
-//! environment, raises both for files that are meant to be so. Settings are held many times their length while
-//! they are read, TOML up to a hundred times, JSON some: they have at most 2 and 10 MB, or a share of what is raised.
+//! A file of n bytes may unpack to `48 MB + 64 n`, at most 16 GB. The environment variable [`UNPACKED`], in megabytes,
+//! raises both limits for files that need more. Settings take many times their length while they are parsed (TOML up to
+//! a hundred times, JSON less): they may have at most 2 and 10 MB, or a share of the raised limit.
 
 use crate::IoError;
 
-/// Limit of what each file may unpack to, bytes. Readers hold values up to four times on their way (as they are in the
-/// file, as numbers, as columns, in a survey): a file of a few bytes stays below 300 MB.
+/// Unpacked bytes allowed for every file. Readers hold values up to four times during conversion (as stored, as
+/// numbers, as columns, in a survey): a file of a few bytes stays below 300 MB.
 const AT_LEAST: u64 = 48 << 20;
-/// And so many times its own length.
+/// Additional unpacked bytes per byte of the file.
 const FACTOR: u64 = 64;
-/// No file unpacks to more.
+/// Upper limit for every file.
 const CEILING: u64 = 16 << 30;
-/// The variable of the environment that raises what a file may unpack to, MB.
+/// Environment variable that raises the limit, MB.
 const UNPACKED: &str = "HOID_MAX_UNPACKED_MB";
 /// Overhead of a text in addition to its characters, bytes.
 const TEXT: u64 = 64;
-/// Structures inside of structures, at most.
+/// Maximum nesting of structures.
 pub(super) const MOST_NESTED: usize = 32;
 
-/// The remainder of the memory that a file may take.
+/// Remaining memory of a file.
 #[derive(Debug)]
 pub(super) struct Budget {
     left: u64,
@@ -28,7 +28,7 @@ pub(super) struct Budget {
 }
 
 impl Budget {
-    /// The value for a file of a given number of bytes.
+    /// Returns the budget of a file of the given size in bytes.
     pub(super) fn of(file_bytes: usize) -> Self {
         let by_size = AT_LEAST.saturating_add(FACTOR.saturating_mul(file_bytes as u64));
         Self::up_to(by_size.min(CEILING).max(raised().unwrap_or(0)))
@@ -38,7 +38,7 @@ impl Budget {
         Self { left: all, all }
     }
 
-    /// Takes memory before it is filled.
+    /// Reserves memory before it is filled.
     pub(super) fn take(&mut self, bytes: u64, file: &str) -> Result<(), IoError> {
         match self.left.checked_sub(bytes) {
             Some(left) => {
@@ -54,13 +54,13 @@ impl Budget {
         }
     }
 
-    /// Takes what so many numbers take as [`f64`] next to the bytes each that they are in.
+    /// Reserves the memory of `count` numbers as [`f64`] and of their `bytes_each` stored bytes.
     pub(super) fn take_numbers(&mut self, count: usize, bytes_each: usize, file: &str) -> Result<(), IoError> {
         let more = (size_of::<f64>() as u64).saturating_sub(bytes_each as u64);
         self.take(more.saturating_mul(count as u64), file)
     }
 
-    /// Takes what so many texts of a given number of bytes in all are held in, before they are.
+    /// Reserves the memory of `count` texts of `bytes` bytes in all.
     pub(super) fn take_texts(&mut self, count: usize, bytes: usize, file: &str) -> Result<(), IoError> {
         self.take(TEXT.saturating_mul(count as u64).saturating_add(bytes as u64), file)
     }
@@ -80,7 +80,7 @@ pub(crate) enum Settings {
 }
 
 impl Settings {
-    /// Of how many bytes of what is raised such a text may have one.
+    /// Divisor of the raised limit for such a text.
     pub(crate) fn share(self) -> u64 {
         match self {
             Self::Json => 32,
@@ -88,7 +88,7 @@ impl Settings {
         }
     }
 
-    /// Its greatest length, bytes.
+    /// Maximum length, bytes.
     pub(crate) fn longest(self) -> u64 {
         let typical = match self {
             Self::Json => 10 << 20,
@@ -109,9 +109,9 @@ mod tests {
         assert!(budget.take(1 << 27, "a.mat").is_err());
         budget.take(1 << 25, "a.mat").unwrap();
         assert!(budget.take(1 << 25, "a.mat").is_err());
-        // A million texts of a character.
+        // A million texts of one character.
         assert!(Budget::of(1000).take_texts(1_000_000, 1_000_000, "a.mat").is_err());
-        // What is large itself may unpack to more.
+        // A large file may unpack to more.
         Budget::of(10 << 20).take(1 << 29, "a.mat").unwrap();
         assert!(Budget::of(usize::MAX).take(CEILING + 1, "a.mat").is_err());
         let said = Budget::up_to(1).take(2, "a.mat").unwrap_err().to_string();

@@ -1,7 +1,7 @@
 //! Interface of a file format: its name, its endings, how it is read and how it is written.
 //!
-//! A format states all of this in one [`Format`], in its own module of `formats`; reading, writing,
-//! the survey of a file and all messages go through it.
+//! Each [`Format`] in its own module of `formats` defines all of this; reading, writing, the survey
+//! of a file and all messages use it.
 
 use std::io::{self, Write};
 
@@ -16,23 +16,23 @@ use crate::time::with_time;
 
 /// A file format.
 pub(crate) struct Format {
-    /// Its name for a person.
+    /// Name for display.
     pub(crate) name: &'static str,
-    /// The extensions in lower case that represent it, the default one first.
+    /// The extensions in lower case, the default one first.
     pub(super) endings: &'static [&'static str],
-    /// How its bytes are read.
+    /// Reader of the format.
     pub(crate) reading: Reading,
-    /// How a table of results is written.
+    /// Writer of a table of results.
     pub(crate) writing: Writing,
-    /// How a record is written, where that is not as a table of its channels.
+    /// Writer of a record, if it is not written as a table of its channels.
     pub(crate) record: Option<RecordWriter>,
 }
 
-/// The columns that a record is made of; the reader may take the bytes or borrow from them.
+/// Reads the columns of a record; the reader may take the bytes or borrow from them.
 type TableReader = for<'a> fn(&'a mut Vec<u8>, &'a str) -> Result<Table<'a>, IoError>;
-/// The columns of a table of results with their kinds.
+/// Reads the columns of a table of results with their kinds.
 type ResultsReader = fn(Vec<u8>, &str) -> Result<OutputTable, IoError>;
-/// All arrays with their paths.
+/// Reads all arrays with their paths.
 type ArraysReader = fn(Vec<u8>, &str) -> Result<Contents, IoError>;
 /// Starts a file of rows.
 type RowsStart = fn(&mut dyn Write, &TableSchema) -> io::Result<Box<dyn RowWriter>>;
@@ -40,44 +40,44 @@ type RowsStart = fn(&mut dyn Write, &TableSchema) -> io::Result<Box<dyn RowWrite
 pub(crate) type ColumnsWriter = fn(&mut dyn Write, &TableSchema, &[Values<'_>]) -> io::Result<()>;
 type RecordWriter = fn(&mut dyn Write, &Record) -> io::Result<()>;
 
-/// Definition of a file of the format.
+/// Content of a file of the format.
 pub(crate) enum Reading {
     /// One flat table.
     Table {
-        /// As columns of numbers, for a record.
+        /// Numeric columns, for a record.
         record: TableReader,
-        /// As it was written, for results.
+        /// Columns as written, for results.
         results: ResultsReader,
     },
-    /// Named arrays, among which the columns are chosen.
+    /// Named arrays, from which the columns are selected.
     Arrays(ArraysReader),
 }
 
-/// How the format takes columns.
+/// Kind of writer of the format.
 pub(crate) enum Writing {
     /// Row by row, in bounded memory.
     Rows(RowsStart),
-    /// Each column as one array, which reports its length first: all rows have to be there.
+    /// Each column as one array whose length precedes it: all rows must be known.
     Columns(ColumnsWriter),
-    /// Not at all; what the extension represents, as in "the format of a recorder".
+    /// Not written; the text describes the format, as in "the format of a recorder".
     ReadOnly(&'static str),
 }
 
-/// A file between its groups of rows. The file is lent for one call at a time.
+/// Writer of a file by groups of rows. The file is borrowed for one call at a time.
 pub(crate) trait RowWriter {
     /// Writes columns of one length.
     fn rows(&mut self, file: &mut dyn Write, columns: &[Values<'_>]) -> io::Result<()>;
-    /// Ends the file.
+    /// Completes the file.
     fn finish(self: Box<Self>, file: &mut dyn Write) -> io::Result<()>;
 }
 
 impl Format {
-    /// Whether tables and records can be written.
+    /// True if tables and records can be written.
     pub(super) fn is_written(&self) -> bool {
         !matches!(self.writing, Writing::ReadOnly(_))
     }
 
-    /// The columns that a record is made of.
+    /// Reads the columns of a record.
     pub(crate) fn table<'a>(
         &self,
         bytes: &'a mut Vec<u8>,
@@ -93,7 +93,7 @@ impl Format {
             }
         };
         let table = with_time(table, options.time.as_ref())?;
-        // Samples that are counted need no time, and one that starts again is none of them.
+        // Samples that are counted need no time column, and a restarting one is ignored.
         let by_itself = options.trial.is_none() && options.sampling_hz.is_some();
         if is_trial || by_itself {
             return Ok(table);
@@ -101,7 +101,7 @@ impl Format {
         trials::of_table(table, options.trial.as_ref())
     }
 
-    /// A table of results.
+    /// Reads a table of results.
     pub(crate) fn results(&self, bytes: Vec<u8>, file: &str) -> Result<OutputTable, IoError> {
         match self.reading {
             Reading::Table { results, .. } => results(bytes, file),

@@ -1,8 +1,8 @@
-//! Crates that read untrusted bytes, kept from ending a study.
+//! Isolation of crates that read untrusted bytes, so that they cannot abort a study.
 //!
-//! They answer most damage by an error, but some by a panic: an index or a sum out of range. This
-//! is the one place where a panic is caught. What it may leave half done is the crate's and is
-//! dropped here. With `panic = "abort"` nothing can be caught.
+//! They report most damage as an error, but some by a panic: an index or a sum out of range. This
+//! is the only place where a panic is caught. Partial results belong to the crate and are dropped
+//! here. With `panic = "abort"` no panic can be caught.
 
 use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};
@@ -16,7 +16,7 @@ thread_local! {
     static READING: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Result of a foreign reader, its panic as [`IoError::Damaged`].
+/// Returns the result of a foreign reader, with a panic as [`IoError::Damaged`].
 pub(super) fn guarded<T>(file: &str, read: impl FnOnce() -> Result<T, IoError>) -> Result<T, IoError> {
     without_panic(read).unwrap_or_else(|what| {
         Err(IoError::Damaged {
@@ -28,11 +28,11 @@ pub(super) fn guarded<T>(file: &str, read: impl FnOnce() -> Result<T, IoError>) 
 
 /// The result, or the message of a panic.
 ///
-/// The hook is passed through, once for the process, and keeps silent on a thread that is reading;
-/// any other panic is reported as before.
+/// The panic hook is replaced once per process; it is silent on a thread that is reading, and
+/// reports any other panic as before.
 fn without_panic<T>(read: impl FnOnce() -> T) -> Result<T, String> {
     static HOOK: Once = Once::new();
-    // A hook cannot be set while the thread is falling.
+    // A hook cannot be set during a panic.
     if !thread::panicking() {
         HOOK.call_once(|| {
             let before = panic::take_hook();

@@ -1,4 +1,4 @@
-//! The format of a file by its extension, and the endings that are known.
+//! The format of a file by its extension, and the known extensions.
 
 use std::fs;
 use std::path::Path;
@@ -7,21 +7,21 @@ use super::format::{Format, Writing};
 use super::{ALL, csv, packed};
 use crate::IoError;
 
-/// The endings of the files that can be read, for help texts and messages:
+/// The extensions of the files that can be read, for help texts and messages:
 /// `.csv (also as .txt), .tsv, ... or .xdf`.
 #[must_use]
 pub fn readable_endings() -> String {
     endings(ALL)
 }
 
-/// The endings of the files that can be written, for help texts and messages.
+/// The extensions of the files that can be written, for help texts and messages.
 #[must_use]
 pub fn writable_endings() -> String {
     let written: Vec<&Format> = ALL.iter().copied().filter(|format| format.is_written()).collect();
     endings(&written)
 }
 
-/// The endings of some formats as text.
+/// The extensions of some formats as text.
 fn endings(formats: &[&Format]) -> String {
     let of_one = |format: &&Format| {
         let dotted: Vec<String> = format.endings.iter().map(|ending| format!(".{ending}")).collect();
@@ -37,7 +37,7 @@ fn endings(formats: &[&Format]) -> String {
     }
 }
 
-/// How to handle files that others read, by their ending. pyhoid reads those of `PYTHON` itself.
+/// Remedies for files of other programs, by extension. pyhoid reads those of `PYTHON` itself.
 const ELSEWHERE: [(&[&str], &str); 12] = [
     (&["gz", "zip", "bz2", "xz", "zst"], "unpack it first"),
     (&["arrow", "feather", "ipc", "xlsx", "xls", "ods"], PYTHON),
@@ -76,15 +76,15 @@ const ELSEWHERE: [(&[&str], &str); 12] = [
     (&["rds", "rda"], "write it as CSV or Parquet in R"),
     (&["mlx", "slx"], "save the variables in MATLAB: save run1.mat e u t"),
 ];
-/// The remedy for what pyhoid reads.
+/// The remedy for files that pyhoid reads.
 const PYTHON: &str = "save it as CSV or Parquet, or read it in Python by pyhoid.read";
 
-/// The ending of a file, in small letters.
+/// The extension of a file, in lower case.
 fn ending_of(path: &Path) -> Option<String> {
     path.extension().map(|ending| ending.to_string_lossy().to_lowercase())
 }
 
-/// The format that the ending of a file represents.
+/// The format that corresponds to the extension of a file.
 fn format_of(path: &Path) -> Option<&'static Format> {
     let ending = ending_of(path)?;
     ALL.iter()
@@ -92,8 +92,8 @@ fn format_of(path: &Path) -> Option<&'static Format> {
         .find(|format| format.endings.contains(&ending.as_str()))
 }
 
-/// That an ending does not correspond to any format, with what is `expected` and the remedy, if
-/// there is one.
+/// Error for an extension that corresponds to no format, with the `expected` ones and the remedy,
+/// if there is one.
 fn unknown(path: &Path, expected: String, remedy: Option<&str>) -> IoError {
     IoError::UnknownFormat {
         file: path.display().to_string(),
@@ -105,7 +105,7 @@ fn unknown(path: &Path, expected: String, remedy: Option<&str>) -> IoError {
     }
 }
 
-/// The format of a file to read.
+/// The format of a file to be read.
 fn format_to_read(path: &Path) -> Result<&'static Format, IoError> {
     format_of(path).ok_or_else(|| {
         let ending = ending_of(path).unwrap_or_default();
@@ -114,8 +114,8 @@ fn format_to_read(path: &Path) -> Result<&'static Format, IoError> {
     })
 }
 
-/// The format of a file to write, which is not a directory. A pipe or a device takes CSV under any
-/// other name.
+/// The format of a file to be written, which must not be a directory. A pipe or a device of any
+/// other name takes CSV.
 pub(crate) fn format_to_write(path: &Path) -> Result<&'static Format, IoError> {
     let known = fs::metadata(path).ok();
     let format = match known {
@@ -136,13 +136,13 @@ pub(crate) fn format_to_write(path: &Path) -> Result<&'static Format, IoError> {
     })
 }
 
-/// The format of a file, and what is in it.
+/// The format of a file, and its bytes.
 pub(crate) fn bytes_of(path: &Path) -> Result<(&'static Format, Vec<u8>), IoError> {
     let file = || path.display().to_string();
     if path.is_dir() {
         return Err(IoError::Directory { file: file() });
     }
-    // Text alone is packed: binary formats pack their columns themselves.
+    // Only text is packed: binary formats compress their columns themselves.
     let inner = packed::inner(path).filter(|inner| format_of(inner).is_some_and(|format| format.name == csv::CSV.name));
     let plain = inner.as_deref().unwrap_or(path);
     let format = format_to_read(plain)?;

@@ -1,6 +1,6 @@
 //! The file formats, one module each, and what they share.
 //!
-//! To add one: a module with a [`Format`], here its `mod` line and its line in [`ALL`].
+//! To add a format: a module with a [`Format`], its `mod` line here and its line in [`ALL`].
 //!
 //! | module | contents |
 //! |---|---|
@@ -34,7 +34,7 @@ pub(crate) use format::{ColumnsWriter, Format, Reading, RowWriter, Writing};
 pub(crate) use lookup::{bytes_of, format_to_write};
 pub use lookup::{readable_endings, writable_endings};
 
-/// All formats, in the order in which messages name them. No two have an ending in common.
+/// All formats, in the order in which messages name them. No two share an extension.
 const ALL: &[&Format] = &[
     &csv::CSV,
     &csv::TSV,

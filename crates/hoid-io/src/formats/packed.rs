@@ -1,5 +1,5 @@
-//! Text packed by gzip, and recordings of the Brain Imaging Data Structure: a table without a header
-//! whose columns and rate are in a file of JSON next to it (BIDS specification, *Physiological
+//! Text packed by gzip, and recordings of the Brain Imaging Data Structure: a table without a
+//! header whose columns and rate are in a JSON file next to it (BIDS specification, *Physiological
 //! recordings*).
 
 use std::fmt::Write as _;
@@ -14,16 +14,16 @@ use super::budget::Budget;
 use crate::IoError;
 use crate::table::Cell;
 
-/// Bytes that are unpacked together.
+/// Bytes unpacked at a time.
 const PART: usize = 1 << 16;
 
-/// The name without `.gz`; `None` if it has no such end.
+/// The name without `.gz`; `None` if it has no such extension.
 pub(super) fn inner(path: &Path) -> Option<PathBuf> {
     let packed = path.extension()?.eq_ignore_ascii_case("gz");
     packed.then(|| path.with_extension(""))
 }
 
-/// The bytes that were packed.
+/// Unpacks the bytes.
 pub(super) fn unpacked(bytes: &[u8], file: &str) -> Result<Vec<u8>, IoError> {
     let mut budget = Budget::of(bytes.len());
     let mut reader = MultiGzDecoder::new(bytes);
@@ -42,7 +42,7 @@ pub(super) fn unpacked(bytes: &[u8], file: &str) -> Result<Vec<u8>, IoError> {
     }
 }
 
-/// Statement of the file next to a table without a header about it.
+/// Content of the JSON file next to a table without a header.
 #[derive(Deserialize)]
 struct Sidecar {
     #[serde(rename = "SamplingFrequency")]
@@ -53,7 +53,7 @@ struct Sidecar {
     columns: Vec<String>,
 }
 
-/// The table with a header and a column t, where a file of JSON next to it reports both.
+/// Adds a header and a column t to the table, if the JSON file next to it gives both.
 pub(super) fn with_sidecar(bytes: Vec<u8>, path: &Path) -> Vec<u8> {
     let said = fs::read(path.with_extension("json")).ok();
     let Some(sidecar) = said.and_then(|json| serde_json::from_slice::<Sidecar>(&json).ok()) else {

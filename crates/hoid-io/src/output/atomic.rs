@@ -1,4 +1,4 @@
-//! Files that are whole or not there: written next to their place, then renamed into it.
+//! Atomic files: written next to their place, then renamed.
 
 use std::fs;
 use std::io::{self, BufWriter, Write};
@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 use super::part_file::Part;
 use crate::IoError;
 
-/// Writes a file through `write`. A file that exists is replaced only when everything is written
-/// and on the disk; on an error it stays as it was and nothing else is left behind. A pipe or a
-/// device is written into directly.
+/// Writes a file through `write`. An existing file is replaced only when everything is written and
+/// on the disk; on an error it is unchanged and no other file remains. A pipe or a device is
+/// written to directly.
 ///
 /// # Errors
-/// [`IoError::Directory`], [`IoError::Unwritable`] for what the system or `write` states.
+/// [`IoError::Directory`], [`IoError::Unwritable`] for an error of the system or of `write`.
 ///
 /// ```
 /// let path = std::env::temp_dir().join("hoid-example.txt");
@@ -27,7 +27,7 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::R
     file.finish()
 }
 
-/// Makes a directory for results, and those above it, where they are not available yet.
+/// Creates a directory for results, and its parents, unless they exist.
 ///
 /// # Errors
 /// [`IoError::Unwritable`] for errors that the operating system reports.
@@ -38,12 +38,12 @@ pub fn make_directory(path: &Path) -> Result<(), IoError> {
     })
 }
 
-/// A file on its way: dropped before it is finished, it leaves everything as it was.
+/// A file in progress: dropped before it is finished, it leaves everything unchanged.
 pub(crate) struct WholeFile {
     buffer: BufWriter<fs::File>,
-    /// As the user named it.
+    /// Name as the user gave it.
     name: String,
-    /// Where the file is to be, and what it is until then; none for a pipe or a device.
+    /// The final path and the temporary file; none for a pipe or a device.
     part_file: Option<PartFile>,
 }
 
@@ -56,7 +56,7 @@ struct PartFile {
 impl WholeFile {
     pub(crate) fn create(path: &Path) -> Result<Self, IoError> {
         let name = path.display().to_string();
-        // A link stays a link: the file that it names is replaced.
+        // A link is kept: the file that it refers to is replaced.
         let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
         let known = fs::metadata(&place).ok();
         let opened = match known {
@@ -85,7 +85,7 @@ impl WholeFile {
         })
     }
 
-    /// Puts the file in its place, when everything is on the disk.
+    /// Moves the file to its place once everything is on the disk.
     pub(crate) fn finish(self) -> Result<(), IoError> {
         let Self {
             buffer,
@@ -119,7 +119,7 @@ fn part(place: PathBuf, permissions: Option<fs::Permissions>) -> io::Result<(fs:
     ))
 }
 
-/// The directory in which a file is to be.
+/// The directory of a file to be written.
 pub(super) fn directory_of(place: &Path) -> io::Result<PathBuf> {
     if place.file_name().is_none() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "the path names no file"));

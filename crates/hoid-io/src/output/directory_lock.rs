@@ -1,23 +1,23 @@
-//! One process a directory of results.
+//! Exclusive use of a directory of results by one process.
 //!
-//! The lock is that of the system on the directory itself (on a file `.hoid-lock` in it where
-//! directories cannot be opened), so that nothing is left of a process that was killed. A file
-//! system without locks has none here either.
+//! The lock is that of the operating system on the directory itself (on a file `.hoid-lock` in it
+//! where directories cannot be opened), so that a killed process leaves no lock. On a file system
+//! without locks there is none here either.
 
 use std::fs::{File, TryLockError};
 use std::path::Path;
 
 use crate::IoError;
 
-/// A directory that no other process works on, until this is dropped.
+/// A directory that is locked against other processes until this is dropped.
 #[derive(Debug)]
 pub struct DirectoryLock(#[allow(dead_code)] Option<File>);
 
 impl DirectoryLock {
-    /// Locks a directory that exists.
+    /// Locks an existing directory.
     ///
     /// # Errors
-    /// [`IoError::InUse`] where another process, or another run in this one, has it.
+    /// [`IoError::InUse`] if another process, or another run in this one, has locked it.
     pub fn take(directory: &Path) -> Result<Self, IoError> {
         #[cfg(unix)]
         let opened = File::open(directory);

@@ -1,4 +1,4 @@
-//! Rules for each file and directory that is written.
+//! Rules for all files and directories that are written.
 //!
 //! | module | contents |
 //! |---|---|

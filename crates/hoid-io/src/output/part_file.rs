@@ -1,10 +1,10 @@
-//! Files on their way: `.hoid-*.part` next to the place where they are to be.
+//! Files in progress: `.hoid-*.part` next to their final place.
 //!
-//! A part is locked for as long as its writer lives; the system drops the locks of a process that is
-//! gone, however it ended. A part that can be locked therefore belongs to no person, and is removed
-//! by the next process that writes into its directory. A writer looks after locking whether its part
-//! is still there, so that a part is never swept between its making and its lock. Where a file
-//! system has no locks, parts are left alone.
+//! A part is locked during the life of its writer; the system releases the locks of a process that
+//! ended, for any reason. A part that can be locked therefore has no owner, and the next process
+//! that writes to its directory removes it. After locking, a writer checks that its part still
+//! exists, so that a part is never removed between its creation and its lock. On a file system
+//! without locks, parts are left alone.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -17,7 +17,7 @@ use tempfile::{NamedTempFile, TempPath};
 const PREFIX: &str = ".hoid-";
 const SUFFIX: &str = ".part";
 
-/// Attempts to make a part that another process sweeps before it is locked; one is the rule.
+/// Attempts to create a part that another process removes before it is locked; normally one suffices.
 const ATTEMPTS: usize = 16;
 
 /// Files in progress of this process, and the directories that it has cleaned.
@@ -35,27 +35,27 @@ fn known() -> MutexGuard<'static, PartFiles> {
     KNOWN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes the partial output of this process, for the end at an interrupt: a process that exits
-/// drops nothing.
+/// Removes the partial output of this process when it is interrupted: an exiting process drops
+/// nothing.
 pub fn remove_unfinished_files() {
     for part in std::mem::take(&mut known().parts) {
-        // Contents of its place already, or cannot be removed, is swept later.
+        // A part that was already renamed, or cannot be removed now, is removed later.
         let _ = fs::remove_file(part);
     }
 }
 
-/// A file on its way, removed when it is dropped.
+/// A file in progress, removed when it is dropped.
 pub(super) struct Part {
     path: Option<TempPath>,
 }
 
 impl Part {
-    /// A new, locked part in a directory, from which the parts of dead processes are removed.
+    /// Creates a locked part in a directory, after removing the parts of ended processes.
     pub(super) fn create_in(directory: &Path) -> io::Result<(File, Self)> {
         sweep_once(directory);
         let mut made = make(directory)?;
         for _ in 1..ATTEMPTS {
-            // Without locks there is nothing that could sweep it.
+            // Without locks no process removes it.
             if made.as_file().lock().is_err() || made.path().exists() {
                 break;
             }
@@ -88,8 +88,8 @@ impl Drop for Part {
     }
 }
 
-/// A file of the default permissions (those of the umask), where temporary files are otherwise
-/// closed to all others.
+/// Creates a file with default permissions (those of the umask); temporary files are otherwise
+/// private to their owner.
 fn make(directory: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(PREFIX).suffix(SUFFIX);
@@ -101,8 +101,8 @@ fn make(directory: &Path) -> io::Result<NamedTempFile> {
     builder.tempfile_in(directory).map_err(without_path)
 }
 
-/// The error of the system without the name of the part, which belongs to no person business: the
-/// message names the place that was requested.
+/// The error of the system without the name of the part, which is of no interest to the user: the
+/// message names the requested place.
 fn without_path(error: io::Error) -> io::Error {
     let text = error.to_string();
     match text.split_once(" at path ") {
@@ -111,7 +111,7 @@ fn without_path(error: io::Error) -> io::Error {
     }
 }
 
-/// Sweeps a directory the first time that this process writes into it.
+/// Cleans a directory the first time that this process writes to it.
 fn sweep_once(directory: &Path) {
     let directory = fs::canonicalize(directory).unwrap_or_else(|_| directory.to_owned());
     if known().swept.insert(directory.clone()) {
@@ -119,7 +119,7 @@ fn sweep_once(directory: &Path) {
     }
 }
 
-/// Removes the parts of processes that are gone. A part that cannot be examined stays.
+/// Removes the parts of ended processes. A part that cannot be examined is left.
 fn sweep(directory: &Path) {
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();
     for entry in entries {
@@ -130,7 +130,7 @@ fn sweep(directory: &Path) {
             continue;
         }
         let path = entry.path();
-        // The lock is held while it is removed: its maker waits for it, and makes another.
+        // The lock is held during the removal: the owner of the part waits for it, and creates another.
         if let Ok(file) = File::options().read(true).write(true).open(&path)
             && file.try_lock().is_ok()
         {
@@ -174,7 +174,7 @@ mod tests {
     fn an_interrupt_leaves_nothing_on_its_way() {
         let dir = tempfile::tempdir().unwrap();
         let (_file, part) = Part::create_in(dir.path()).unwrap();
-        // For this directory alone: other tests have parts on their way.
+        // For this directory only: other tests have parts in progress.
         let own = part.path.as_ref().unwrap().to_path_buf();
         assert!(known().parts.contains(&own) && own.exists());
         drop(part);

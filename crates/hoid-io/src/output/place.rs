@@ -1,8 +1,8 @@
-//! Whether a result may be written to a place, asked before the work starts: a result never takes
-//! the place of what it is made of, and a directory that takes nothing is known at once.
+//! Checks before the work starts whether a result can be written to a place: a result never
+//! replaces its own input, and an unwritable directory is detected at once.
 //!
-//! Two paths name one file when the system gives them the same device and number (so that symbolic
-//! and hard links count), elsewhere when their full paths agree.
+//! Two paths denote the same file if the system gives them the same device and number (so that
+//! symbolic and hard links count), on other systems if their full paths agree.
 
 use std::fs;
 use std::io;
@@ -12,7 +12,7 @@ use super::atomic::directory_of;
 use super::part_file::Part;
 use crate::IoError;
 
-/// Whether two paths name one file that exists, by a link too.
+/// True if two paths denote the same existing file, also through a link.
 #[must_use]
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     let (Ok(known_a), Ok(known_b)) = (fs::metadata(a), fs::metadata(b)) else {
@@ -30,7 +30,7 @@ pub fn is_same_file(a: &Path, b: &Path) -> bool {
     }
 }
 
-/// Whether a file can be written at a place without replacing one of `inputs`. Nothing is left
+/// Checks that a file can be written at a place without replacing one of `inputs`. No file is left
 /// there; pipes and devices are not opened.
 ///
 /// # Errors
@@ -53,7 +53,7 @@ pub fn check_output(output: &Path, inputs: &[&Path]) -> Result<(), IoError> {
     tried.map_err(|source| IoError::Unwritable { file: file(), source })
 }
 
-/// Whether files can be written into a directory, which may have to be made first, without replacing
+/// Checks that files can be written to a directory, which may have to be created, without replacing
 /// one of `inputs`: none may lie in it.
 ///
 /// # Errors
@@ -71,7 +71,7 @@ pub fn check_output_directory(directory: &Path, inputs: &[&Path]) -> Result<(), 
     tried.map_err(|source| IoError::Unwritable { file: file(), source })
 }
 
-/// The directory, or the one above it that exists already.
+/// The directory, or its nearest existing parent.
 fn nearest(directory: &Path) -> io::Result<PathBuf> {
     let mut at = directory;
     loop {

@@ -1,6 +1,6 @@
-//! Treatment of a record between the file and the estimator, and the account of it.
+//! Treatment of a record between the file and the estimator, and the list of the steps.
 //!
-//! The steps are taken in one order, whatever the order in which they were requested:
+//! The steps are applied in a fixed order, independent of the order in which they were requested:
 //!
 //! | step | module | what it does |
 //! |---|---|---|
@@ -11,10 +11,10 @@
 //! | run-in | `run_in` | the first seconds are dropped |
 //! | detrend | [`Record::detrended`](hoid_model::Record::detrended) | mean or straight line out of input and output |
 //!
-//! [`Preparation`] in `pipeline` takes them, on the channels of a record that `record_parts` has taken apart. The
-//! filter of the two steps that need one, and decimation itself, are those of [`hoid_model::resampling`]. For an offset
-//! and of a new frequency, samples whose filter would reach beyond the record are cut, never invented; decimation keeps
-//! them all. Each step that was taken is a [`Step`], with its numbers; reading adds those of its repairs before.
+//! [`Preparation`] in `pipeline` applies them to the channels of a record, separated by `record_parts`. The filter of
+//! the two steps that need one, and the decimation, are those of [`hoid_model::resampling`]. For an offset and for a
+//! new frequency, samples whose filter would reach beyond the record are cut, never invented; decimation keeps all
+//! samples. Each applied step is a [`Step`] with its numbers; reading adds its repairs before them.
 
 mod offset;
 mod pipeline;

@@ -1,11 +1,11 @@
-//! Channels that were recorded late are put next to the others.
+//! Alignment of channels that were recorded late.
 //!
-//! A channel with the offset d was recorded d samples later than it happened: its sample k + d goes
-//! next to sample k of the others, `x'(k) = x(k + d)`. An offset of whole samples moves rows and
-//! changes no number. Between samples the band-limited signal is taken by the windowed sinc of
-//! [`Kernel`]: up to 0.8 of the Nyquist frequency its error is below 1e-4 of the amplitude (80 dB);
-//! above, the channel is not what it was. Rows for which a channel has no sample, or not all that
-//! the filter needs, are cut.
+//! A channel with the offset d was recorded d samples late: its sample k + d belongs to sample k of
+//! the others, `x'(k) = x(k + d)`. An offset of whole samples moves rows and changes no number.
+//! Between samples the band-limited signal is interpolated by the windowed sinc of [`Kernel`]: up
+//! to 0.8 of the Nyquist frequency its error is below 1e-4 of the amplitude (80 dB); above, the
+//! channel is distorted. Rows for which a channel lacks a sample, or samples that the filter needs,
+//! are cut.
 
 use std::str::FromStr;
 
@@ -19,10 +19,10 @@ use crate::wording::decimal;
 /// Distance from a whole number of samples that counts as zero.
 const WHOLE: f64 = 1e-6;
 
-/// Amount by which a channel was recorded later than it happened; negative when earlier.
+/// Recording delay of a channel; negative if it was recorded early.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Offset {
-    /// In samples of the record as it was read.
+    /// In samples of the record as read.
     Samples(f64),
     /// In s.
     Seconds(f64),
@@ -45,7 +45,7 @@ impl FromStr for Offset {
     }
 }
 
-/// An offset as whole samples and a rest.
+/// An offset as whole samples and a remainder.
 #[derive(Clone, Copy)]
 struct Shift {
     samples: f64,
@@ -81,8 +81,8 @@ impl RecordParts {
         let kernel = Kernel::interpolating();
         let half = |shift: Shift| if shift.interpolated { kernel.half() as f64 } else { 0.0 };
         let last = self.len() as f64 - 1.0;
-        // The rows for which every channel has what it needs; in floating point, since an offset
-        // may be of any size.
+        // The rows for which every channel has the samples it needs; in floating point, since an
+        // offset may be of any size.
         let (mut from, mut to) = (0.0_f64, last);
         for (_, shift) in &shifts {
             from = from.max((half(*shift) - shift.samples).ceil());

@@ -1,4 +1,4 @@
-//! The steps in their order.
+//! The preparation steps in their order.
 
 use std::collections::BTreeMap;
 
@@ -11,35 +11,35 @@ use super::scaling::Scaling;
 use super::step::Step;
 use crate::IoError;
 
-/// Repairs that are applied to a record. By default nothing is.
+/// Preparation steps of a record. By default there are none.
 ///
-/// A channel is meant by its name; `e` and `u` are the input and the output, whatever their columns
-/// are called.
+/// A channel is given by its name; `e` and `u` are the input and the output, regardless of their
+/// column names.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Preparation {
-    /// Units by channel that the file does not report.
+    /// Units by channel, where the file gives none.
     pub units: BTreeMap<String, String>,
     /// Factors and units by channel.
     pub scale: BTreeMap<String, Scaling>,
-    /// Amount by which channels were recorded later than they happened.
+    /// Recording delay by channel.
     pub offset: BTreeMap<String, Offset>,
-    /// Another sampling rate.
+    /// New sampling rate.
     pub rate: NewRate,
-    /// Time from the first sample that is dropped, s. What the filters cut lies within it.
+    /// Time from the first sample that is dropped, s. The samples cut by the filters are part of it.
     pub run_in_s: f64,
-    /// Trend removed from input and output, last.
+    /// Trend removed from input and output, as the last step.
     pub detrend: Detrend,
-    /// Whether rows that are duplicated, time included, are dropped before anything is read.
+    /// True if duplicated rows, including the time, are dropped before anything is read.
     pub drop_repeated: bool,
 }
 
 impl Preparation {
-    /// The record as it goes to the estimator, and the actions taken.
-    /// [`Preparation::drop_repeated`] belongs to reading and is not examined.
+    /// Returns the prepared record and the applied steps. [`Preparation::drop_repeated`] belongs to
+    /// reading and is ignored.
     ///
     /// # Errors
-    /// [`IoError::Preparation`] naming the step, what was found, and the expected value;
-    /// [`IoError::Model`] where the numbers leave the range of floating point.
+    /// [`IoError::Preparation`] with the step, the value found and the expected value;
+    /// [`IoError::Model`] if the numbers leave the range of floating point.
     pub fn apply(&self, record: Record) -> Result<(Record, Vec<Step>), IoError> {
         let begin_s = record.time_s(0);
         let mut parts = RecordParts::new(record);

@@ -1,19 +1,19 @@
-//! Another sampling rate, with a low-pass filter against aliasing; all channels alike.
+//! A new sampling rate, with a low-pass filter against aliasing; the same for all channels.
 //!
-//! **Every M-th sample** is the decimation of [`hoid_model::resampling`]: no sample is lost, and the
-//! input is taken in the middle of its longer hold, so that the delay of a model stays.
+//! **Every M-th sample** is the decimation of [`hoid_model::resampling`]: no sample is lost, and
+//! the input is taken in the middle of its longer hold, so that the delay of a model is unchanged.
 //!
-//! **A new sampling frequency** is taken from the record by the windowed sinc of [`Kernel`]. Its pass band ends at 0.8
-//! of the lower one of the old and the new Nyquist frequency, where the ripple is below 1e-4 (0.001 dB). When the
-//! frequency falls, its stop band starts at the new Nyquist frequency: what would fold down is 80 dB below. The filter
-//! has linear phase, its delay is compensated, and it is the same for all channels, so that anything between e and u
-//! stays between them. New samples lie on the grid that starts with the first sample of the record; those whose filter
+//! **A new sampling frequency** is interpolated from the record by the windowed sinc of [`Kernel`]. Its pass band ends
+//! at 0.8 of the lower one of the old and the new Nyquist frequency, where the ripple is below 1e-4 (0.001 dB). If the
+//! frequency decreases, its stop band starts at the new Nyquist frequency: aliases are attenuated by 80 dB. The filter
+//! has linear phase, its delay is compensated, and it is the same for all channels, so that the relation between e and
+//! u is preserved. New samples lie on the grid that starts with the first sample of the record; those whose filter
 //! would reach beyond the record are cut.
 //!
-//! A model with a hold (all of this project) sees an input that is held over the new sample time T,
-//! while the person saw one that was held over the old Ts, if any. A hold of T delays by T/2: to
-//! agree with the data, the delay of the model is shorter by `(T - Ts) / 2` than the one that is
-//! found at the old rate.
+//! A model with a hold (all models of this project) has an input that is held over the new sample
+//! time T, while the input of the operator was held over the old Ts, if at all. A hold of T delays
+//! by T/2: to agree with the data, the delay of the model is shorter by `(T - Ts) / 2` than the one
+//! identified at the old rate.
 
 use hoid_model::{
     Detrend, SampleTime,
@@ -25,13 +25,13 @@ use super::step::Step;
 use crate::IoError;
 use crate::wording::decimal;
 
-/// A new rate makes at most this many samples out of one.
+/// Largest ratio of the number of new samples to old ones.
 const LARGEST_FACTOR: f64 = 100.0;
 
-/// Another sampling rate.
+/// New sampling rate.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum NewRate {
-    /// The value for the record.
+    /// The rate of the record.
     #[default]
     Kept,
     /// Every M-th sample.
@@ -100,8 +100,8 @@ impl RecordParts {
             Kernel::interpolating()
         };
         let half = kernel.half() as f64;
-        // On the grid that starts with the first sample of the record; a bound on a sample, up to
-        // rounding, takes that sample.
+        // On the grid that starts with the first sample of the record; a bound that falls on a
+        // sample, up to rounding, includes it.
         let first = ((half - 1e-10) / factor).ceil();
         let end = ((last - half + 1e-10) / factor).floor();
         if first > end {

@@ -1,4 +1,4 @@
-//! A record taken apart, for the steps of a preparation.
+//! A record separated into its channels, for the steps of a preparation.
 
 use hoid_model::{Channel, Detrend, ModelError, Record, SampleTime};
 
@@ -6,13 +6,13 @@ use super::step::Step;
 use crate::IoError;
 use crate::wording::list;
 
-/// A record taken apart, and the processing of it.
+/// A record separated into its channels, and the steps applied to it.
 pub(super) struct RecordParts {
     label: String,
     pub(super) start_s: f64,
     pub(super) sample_time: SampleTime,
     pub(super) channels: Vec<Channel>,
-    /// Whether the first channel is an input; then the second is the output, else the first.
+    /// True if the first channel is an input; then the second is the output, otherwise the first.
     has_input: bool,
     pub(super) steps: Vec<Step>,
 }
@@ -31,7 +31,7 @@ impl RecordParts {
         }
     }
 
-    /// Samples of each channel.
+    /// Number of samples of each channel.
     pub(super) fn len(&self) -> usize {
         self.channels[0].values.len()
     }
@@ -45,7 +45,7 @@ impl RecordParts {
         }
     }
 
-    /// The channels that are meant by the names of a step.
+    /// The channels that the names of a step denote.
     pub(super) fn find<T: Copy>(
         &self,
         step: &'static str,
@@ -85,7 +85,7 @@ impl RecordParts {
         }
     }
 
-    /// Puts the record together, mean or line taken out.
+    /// Assembles the record after removing the mean or the linear trend.
     pub(super) fn detrended(self, how: Detrend) -> Result<(Record, Vec<Step>), IoError> {
         let Self {
             label,

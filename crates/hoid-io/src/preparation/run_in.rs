@@ -1,4 +1,4 @@
-//! The first seconds are dropped.
+//! Removal of the first seconds.
 
 use super::record_parts::RecordParts;
 use super::step::Step;
@@ -16,7 +16,7 @@ impl RecordParts {
             return Err(self.error(STEP, format!("{run_in_s} s"), "a positive time in s"));
         }
         let ts = self.sample_time.s();
-        // A bound that falls on a sample, up to rounding, takes that sample.
+        // A bound that falls on a sample, up to rounding, includes it.
         let first = ((begin_s + run_in_s - self.start_s) / ts - 1e-6).ceil().max(0.0);
         if first >= self.len() as f64 {
             return Err(self.error(

@@ -1,9 +1,8 @@
 //! Factors and units of channels: `u=12.5`, `u=12.5:deg`, `e=rad:deg`.
 //!
-//! A factor reports by what the numbers of the file are multiplied; after a colon comes the unit
-//! that they then have. Two known units of one kind give the factor themselves, exactly: `rad:deg`
-//! is 180 / pi. Parameters of the operator are ratios of u and e: with e in deg and u in V the gain
-//! K_e is in V/deg.
+//! The factor multiplies the numbers of the file; the new unit follows after a colon. Two known
+//! units of the same kind define the factor exactly: `rad:deg` is 180 / pi. Parameters of the
+//! operator are ratios of u and e: with e in deg and u in V the gain K_e is in V/deg.
 
 use std::f64::consts::PI;
 use std::str::FromStr;
@@ -13,7 +12,7 @@ use super::step::Step;
 use crate::IoError;
 use crate::wording::decimal;
 
-/// Known units: name, kind, and size in the first unit of its kind.
+/// Known units: name, kind, and size in the first unit of their kind.
 const UNITS: [(&str, &str, f64); 18] = [
     ("rad", "angle", 1.0),
     ("mrad", "angle", 1e-3),
@@ -35,7 +34,7 @@ const UNITS: [(&str, &str, f64); 18] = [
     ("mNm", "torque", 1e-3),
 ];
 
-/// Other names of known units, as people type them.
+/// Other spellings of known units.
 const OTHER_NAMES: [(&[&str], &str); 9] = [
     (&["degree", "degrees", "degs", "°"], "deg"),
     (&["radian", "radians", "rads"], "rad"),
@@ -48,7 +47,7 @@ const OTHER_NAMES: [(&[&str], &str); 9] = [
     (&["newton", "newtons"], "N"),
 ];
 
-/// A unit by its default name; one that is not known as it is.
+/// A unit by its default name; an unknown one unchanged.
 fn canonical(unit: &str) -> &str {
     let small = unit.to_lowercase();
     let other = OTHER_NAMES
@@ -57,14 +56,14 @@ fn canonical(unit: &str) -> &str {
     other.map_or(unit, |(_, canonical)| canonical)
 }
 
-/// Factor of a channel, and the unit that it has then.
+/// Factor of a channel, and its new unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scaling {
     /// The factor, finite and not 0.
     factor: f64,
-    /// The unit that the file must not contradict.
+    /// Unit that the file must not contradict.
     from: Option<&'static str>,
-    /// The unit after it; `None` keeps none, because the old one is no longer true.
+    /// New unit; `None` if it is unknown, since the old one no longer applies.
     to: Option<String>,
 }
 
@@ -87,12 +86,12 @@ impl Scaling {
         })
     }
 
-    /// The factor.
+    /// Returns the factor.
     pub fn factor(&self) -> f64 {
         self.factor
     }
 
-    /// The unit that the channel has then, where it is known.
+    /// Returns the new unit of the channel, if known.
     pub fn unit(&self) -> Option<&str> {
         self.to.as_deref()
     }
@@ -110,7 +109,7 @@ impl FromStr for Scaling {
             None => (text.trim(), None),
         };
         let known = |name: &str| UNITS.into_iter().find(|(unit, ..)| *unit == canonical(name));
-        // A number is a number: "1:deg" names a unit and changes no value.
+        // A number comes first: "1:deg" sets the unit and changes no value.
         if let Ok(factor) = left.parse::<f64>() {
             if right == Some("") {
                 return Err(refused(text, "a unit after the colon, as 12.5:deg"));
@@ -157,7 +156,7 @@ fn refused(found: &str, expected: &str) -> IoError {
 }
 
 impl RecordParts {
-    /// Units that are declared next to the file; what the file states is not overruled.
+    /// Sets the units given for the file; a unit in the file takes precedence.
     pub(super) fn declare_units(&mut self, units: &std::collections::BTreeMap<String, String>) -> Result<(), IoError> {
         const STEP: &str = "unit";
         let named = units.iter().map(|(name, unit)| (name.clone(), unit.as_str()));

@@ -1,5 +1,4 @@
-//! The account of the processing applied to a record: for people as text, for programs with its
-//! numbers.
+//! The list of the steps applied to a record: as text, and as JSON with its numbers.
 
 use std::fmt;
 
@@ -8,41 +7,41 @@ use serde::Serialize;
 
 use crate::wording::decimal;
 
-/// One step, in the order in which it was taken.
+/// A step; steps are listed in the order of application.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "step", rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Step {
-    /// Rows that were duplicated, time included, were dropped.
+    /// Duplicated rows, including the time, were dropped.
     DropRepeated {
         /// Rows dropped.
         rows: usize,
         /// The first of them, from 1.
         first_row: usize,
     },
-    /// Only a segment between faults was taken.
+    /// Only a segment between faults was used.
     Mask {
-        /// Kinds of faults that are cut out.
+        /// Kinds of faults that are excluded.
         what: Vec<&'static str>,
-        /// Time of the first sample of the part, s.
+        /// Time of the first sample of the segment, s.
         from_s: f64,
         /// Time after its last sample, s.
         to_s: f64,
     },
-    /// Missing values were bridged by straight lines.
+    /// Missing values were interpolated linearly.
     Fill {
         /// The column.
         channel: String,
-        /// Values bridged.
+        /// Number of interpolated values.
         values: usize,
-        /// Longest run of them.
+        /// Longest run of missing values.
         longest: usize,
     },
-    /// An uneven time was brought onto an even grid by straight lines.
+    /// Samples with uneven times were interpolated linearly to an even grid.
     Interpolate {
-        /// Samples before.
+        /// Number of samples before.
         from_samples: usize,
-        /// Samples behind.
+        /// Number of samples after.
         to_samples: usize,
         /// Sampling frequency of the grid, Hz.
         to_hz: f64,
@@ -55,18 +54,18 @@ pub enum Step {
         channel: String,
         /// The factor.
         factor: f64,
-        /// The unit after it, where it is known.
+        /// The new unit, if known.
         unit: Option<String>,
     },
-    /// A channel that was recorded late was put next to the others.
+    /// A channel that was recorded late was aligned with the others.
     Offset {
         /// The channel.
         channel: String,
-        /// Amount by which it was late, samples.
+        /// Delay, samples.
         samples: f64,
-        /// The same in s.
+        /// Delay, s.
         seconds: f64,
-        /// Whether values between samples were taken, by a band-limited interpolation.
+        /// True if values between samples were obtained by band-limited interpolation.
         interpolated: bool,
         /// End of the band in which the interpolation is exact to 1e-4, Hz.
         pass_hz: Option<f64>,
@@ -75,7 +74,7 @@ pub enum Step {
     },
     /// Another sampling rate.
     Rate {
-        /// New sample time by the old one.
+        /// Ratio of the new sample time to the old one.
         factor: f64,
         /// Old sampling frequency, Hz.
         from_hz: f64,
@@ -83,28 +82,28 @@ pub enum Step {
         to_hz: f64,
         /// End of the pass band, Hz.
         pass_hz: f64,
-        /// Start of the stop band, Hz; none if the frequency rises.
+        /// Start of the stop band, Hz; none if the frequency increases.
         stop_hz: Option<f64>,
         /// Attenuation in the stop band, dB.
         stop_db: f64,
         /// Length of the filter, samples of the old rate.
         taps: usize,
-        /// Time without samples at the start and at the end, s.
+        /// Time cut at the start and at the end, s.
         cut_s: (f64, f64),
-        /// Amount by which the delay of a model with a hold is shorter than at the old rate, s.
+        /// Reduction of the delay of a model with a hold compared with the old rate, s.
         delay_s: f64,
-        /// Amount by which a sample of the input is taken later than that of the output next to it, so that the delay
-        /// is the same at both rates, s.
+        /// Time by which a sample of the input is later than that of the output in the same row, so that the delay is
+        /// the same at both rates, s.
         input_lead_s: f64,
     },
     /// The first seconds were dropped.
     RunIn {
         /// Length of the run-in, s.
         seconds: f64,
-        /// Samples dropped, next to those that a filter had cut.
+        /// Samples dropped, in addition to those cut by a filter.
         samples: usize,
     },
-    /// The mean or the straight line of input and output was taken out.
+    /// The mean or the linear trend of input and output was removed.
     Detrend {
         /// "mean" or "linear".
         how: &'static str,
@@ -112,7 +111,7 @@ pub enum Step {
 }
 
 impl Step {
-    /// The processing step of the removed trend; none for nothing.
+    /// The step for a removed trend; none if none was removed.
     pub(super) fn of_detrend(how: Detrend) -> Option<Self> {
         match how {
             Detrend::None => None,
@@ -120,7 +119,7 @@ impl Step {
         }
     }
 
-    /// The name of the step, as in JSON.
+    /// Returns the name of the step, as in JSON.
     pub fn name(&self) -> &'static str {
         match self {
             Self::DropRepeated { .. } => "drop-repeated",

@@ -7,7 +7,7 @@ use super::*;
 
 const TS: f64 = 0.01;
 
-/// Waves below 0.8 of the Nyquist frequency of 50 Hz: Hz, amplitude, phase.
+/// Sine waves below 0.8 of the Nyquist frequency of 50 Hz: Hz, amplitude, phase.
 const WAVES: [(f64, f64, f64); 5] = [
     (0.13, 1.0, 0.3),
     (1.7, 0.8, 1.1),
@@ -71,7 +71,7 @@ fn scales_and_units() {
     assert!((found.input()[0] - 180.0).abs() < 1e-12 && found.output()[0] == 25.0);
     assert_eq!((found.output_channel().unit.as_str(), steps.len()), ("deg", 2));
     assert_eq!(steps[1].to_string(), "stick times 12.5 (now in deg)");
-    // There and back, for all pairs.
+    // Forwards and backwards, for all pairs.
     for (from, to) in [("rad", "deg"), ("deg", "mrad"), ("in", "cm"), ("V", "mV"), ("lbf", "N")] {
         let there: Scaling = format!("{from}:{to}").parse().unwrap();
         let back: Scaling = format!("{to}:{from}").parse().unwrap();
@@ -139,7 +139,7 @@ fn whole_offsets_move_rows_and_change_no_number() {
             ..
         }
     ));
-    // In s, and early: the same rows the other way round.
+    // In s, and early: the same rows in reverse.
     let early = moved("e", Offset::Seconds(-0.02));
     let (found, _) = early.apply(late.clone()).unwrap();
     assert_eq!(found.input(), &late.input()[..98]);
@@ -155,7 +155,7 @@ fn parts_of_a_sample_are_band_limited_interpolation() {
         let preparation = moved("u", Offset::Samples(offset));
         let (found, steps) = preparation.apply(late).unwrap();
         let begin = found.time_s(0) - 3.0;
-        // The sum of the amplitudes is 3: 1e-4 of it as stated.
+        // The sum of the amplitudes is 3, with a relative error of 1e-4.
         let error = largest(found.output(), |k| signal(begin + k as f64 * TS));
         assert!(error < 3e-4, "{offset}: {error:e}");
         assert!(largest(found.input(), |k| signal(begin + k as f64 * TS)) < 1e-12);
@@ -208,7 +208,7 @@ fn a_new_rate_down_and_up() {
         let steps = (found.time_s(0) - 3.0) / ts;
         assert!((steps - steps.round()).abs() < 1e-6, "{steps}");
     }
-    // The rate that it has anyhow.
+    // The rate that the record already has.
     assert!(
         with(|p| p.rate = NewRate::Hz(100.0))
             .apply(record(3, signal, signal))
@@ -272,7 +272,7 @@ fn what_cannot_be_done_is_said() {
         assert!(bad.parse::<Offset>().is_err(), "{bad}");
     }
     assert_eq!(" 0.02s".parse::<Offset>().unwrap(), Offset::Seconds(0.02));
-    // A factor that leaves floating point is an error of the record.
+    // A factor that leads out of floating point is an error of the record.
     let large = scaled("u", Scaling::by(1e300, None).unwrap());
     assert!(
         large
@@ -283,7 +283,7 @@ fn what_cannot_be_done_is_said() {
     );
 }
 
-/// Numbers that look arbitrary, the same in every run.
+/// Pseudo-random numbers, the same in every run.
 struct Arbitrary(u64);
 
 impl Arbitrary {

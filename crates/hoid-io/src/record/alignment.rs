@@ -1,10 +1,10 @@
-//! Channels that were recorded late, put next to the others without losing an end of the span.
+//! Alignment of channels that were recorded late, without losing an end of the span.
 //!
-//! A channel that is moved by d samples has no value for d rows at one end of the read data. A span
-//! of whole periods would lose its last period with them. Where the file reaches beyond the span,
-//! as much of it is read as the offsets need, channels are moved, and the span is cut out
-//! afterwards: it keeps its length. Where it does not, or where the rate changes (whose filters cut
-//! more than the offsets do), rows are lost as in any other record.
+//! A channel that is moved by d samples lacks d rows at one end of the read data. A span of whole
+//! periods would lose its last period with them. If the file extends beyond the span, as much of it
+//! is read as the offsets need, channels are moved, and the span is cut out afterwards: it keeps
+//! its length. Otherwise, or if the rate changes (whose filters cut more than the offsets do), rows
+//! are lost as in any other record.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,10 +17,10 @@ use crate::IoError;
 use crate::formats::bytes_of;
 use crate::preparation::{NewRate, Offset, Preparation, Step};
 
-/// Rows beyond the span for the interpolation of an offset between samples.
+/// Additional rows beyond the span for an offset between samples.
 const FOR_INTERPOLATION: f64 = 64.0;
 
-/// The record in a file, prepared, its output moved earlier by `late_samples` in addition.
+/// Reads and prepares a record, with its output moved earlier by `late_samples` in addition.
 ///
 /// # Errors
 /// As [`read_prepared`](crate::read_prepared).
@@ -62,7 +62,7 @@ pub fn read_aligned(
     }
 }
 
-/// The record as it is in the file.
+/// Reads the record as recorded.
 pub(super) fn read_as_recorded(path: &Path, options: &ReadOptions, drop_repeated: bool) -> Result<ReadRecord, IoError> {
     let file = path.display().to_string();
     let (format, mut bytes) = bytes_of(path)?;
@@ -75,7 +75,7 @@ pub(super) fn read_as_recorded(path: &Path, options: &ReadOptions, drop_repeated
     })
 }
 
-/// Most samples by which a channel is moved, with what an interpolation needs in addition.
+/// Largest number of samples by which a channel is moved, including those that interpolation needs.
 fn reach(preparation: &Preparation, late_samples: f64, ts_s: f64) -> f64 {
     let samples = |offset: &Offset| match offset {
         Offset::Samples(samples) => *samples,
@@ -87,8 +87,8 @@ fn reach(preparation: &Preparation, late_samples: f64, ts_s: f64) -> f64 {
     most.ceil() + if between { 2.0 * FOR_INTERPOLATION } else { 0.0 }
 }
 
-/// Moves the channels of a wide record, cuts out the span of a narrow one, and does what comes
-/// after the offsets; `None` if that is not possible, and the narrow record gives the reason.
+/// Moves the channels of the longer record, cuts out the span, and applies the steps after the
+/// offsets; `None` if that is not possible, and the shorter record gives the reason.
 fn moved_within(
     wide: Record,
     narrow: &Record,

@@ -1,9 +1,9 @@
-//! Records from files and into files.
+//! Reading and writing of records.
 //!
-//! Reading takes the columns that are requested, finds the sampling, checks every value in use and
-//! gives a [`Record`], or the error that names the place. Nothing is repaired unless
-//! [`Repair`](crate::Repair) asks for it, and what was repaired is reported in the notes. The
-//! format follows from the extension.
+//! Reading selects the requested columns, determines the sampling, checks every value in use and
+//! returns a [`Record`], or an error that names the place. Data are repaired only if
+//! [`Repair`](crate::Repair) requests it, and repairs are reported in the notes. The extension
+//! determines the format.
 
 use std::io::Write;
 use std::path::Path;
@@ -20,8 +20,8 @@ use crate::output::write_atomically;
 use crate::preparation::Preparation;
 use crate::results::{ColumnKind, ColumnSchema, TableSchema, Values, write_values};
 
-/// Reads a record with the defaults of the command line: columns e, u and t, and each other column
-/// of numbers as a channel of its own.
+/// Reads a record with the defaults of the command line: columns e, u and t, and each other numeric
+/// column as a separate channel.
 ///
 /// # Errors
 /// As [`read_record`].
@@ -29,8 +29,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Record, IoError> {
     Ok(read_record(path.as_ref(), &ReadOptions::default())?.record)
 }
 
-/// Reads a record from a file: input, output, and each other column of numbers as a channel of its
-/// own.
+/// Reads a record from a file: input, output, and each other numeric column as a separate channel.
 ///
 /// # Errors
 /// [`IoError`], naming the place in the file.
@@ -38,18 +37,18 @@ pub fn read_record(path: &Path, options: &ReadOptions) -> Result<ReadRecord, IoE
     read_prepared(path, options, &Preparation::default())
 }
 
-/// Reads a record and prepares it: the units, the alignment and the rate that the estimator is to
-/// see. A span keeps its length under offsets where the file reaches beyond it.
+/// Reads a record and prepares it for the estimator: units, alignment and rate. A span keeps its
+/// length under offsets if the file extends beyond it.
 ///
 /// # Errors
-/// [`IoError`], naming the place in the file or the step of the preparation.
+/// [`IoError`], naming the place in the file or the preparation step.
 pub fn read_prepared(path: &Path, options: &ReadOptions, preparation: &Preparation) -> Result<ReadRecord, IoError> {
     read_aligned(path, options, preparation, 0.0)
 }
 
 /// Writes a record: t, then `f_t` if there is one, input, output, and the other channels in their
-/// order, all with the digits that give the same numbers back. Units and sample time are kept next
-/// to them as comments; the label is not written.
+/// order, with digits that reproduce the same numbers. Units and sample time are written as
+/// comments; the label is not written.
 ///
 /// # Errors
 /// [`IoError::UnknownFormat`], [`IoError::ChannelName`] for a channel that could not be read back,
@@ -81,11 +80,11 @@ fn write_columns(path: &Path, record: &Record) -> Result<(), IoError> {
     write_values(path, schema, &values.collect::<Vec<_>>())
 }
 
-/// Writes a record as CSV into something that is open already, such as standard output.
+/// Writes a record as CSV to an open output, such as standard output.
 ///
 /// # Errors
-/// [`IoError::ChannelName`]; [`IoError::Unwritable`] for what `out` states. `name` represents it in
-/// both.
+/// [`IoError::ChannelName`]; [`IoError::Unwritable`] for an error of `out`. Both name the output
+/// `name`.
 pub fn write_record_csv(out: &mut dyn Write, name: &str, record: &Record) -> Result<(), IoError> {
     check_names(record, || name.to_owned())?;
     write_record_as_csv(out, record).map_err(|source| IoError::Unwritable {

@@ -1,4 +1,4 @@
-//! From the columns of a file to a record: which rows, on which grid, with which values.
+//! From the columns of a file to a record: selection of rows, grid and values.
 
 use hoid_model::{Channel, Record};
 
@@ -12,21 +12,21 @@ use crate::preparation::{Preparation, Step};
 use crate::table::{ColumnExpression, Signal, Table};
 use crate::wording::{list, named};
 
-/// A record, the processing of it, and what else a person should know about how it was read.
+/// A record, the steps applied to it, and notes on reading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadRecord {
     /// The record, labelled with the name of the file without extension.
     pub record: Record,
     /// Notes on parts that were not read or look wrong, one sentence each.
     pub notes: Vec<String>,
-    /// Processing applied to the numbers of the file, in this order.
+    /// Steps applied to the numbers of the file, in this order.
     pub steps: Vec<Step>,
-    /// Problems with the input, the output and their time in the file, before anything was done;
-    /// within the span that is read.
+    /// Problems with the input, the output and their time in the file, before any step; within the
+    /// span that is read.
     pub quality_issues: Vec<QualityIssue>,
 }
 
-/// The record in a table, without rows that are duplicated where that is requested.
+/// Makes the record of a table, without duplicated rows if requested.
 pub(super) fn record_of(
     mut table: Table<'_>,
     options: &ReadOptions,
@@ -73,7 +73,7 @@ pub(super) fn record_of(
 }
 
 impl ReadRecord {
-    /// The record prepared, and the processing of it after the actions taken in reading.
+    /// The prepared record, with the preparation steps after those of reading.
     pub(super) fn prepared(mut self, preparation: &Preparation) -> Result<Self, IoError> {
         let (record, steps) = preparation.apply(self.record)?;
         self.steps.extend(steps);
@@ -121,7 +121,7 @@ impl TableReader<'_> {
                 }
             }
         }
-        // What is made of columns first: then a column that is a signal by itself can move.
+        // Expressions of columns first; after that a column that is itself a signal can be moved.
         let mut made: Vec<Channel> = signals()
             .map(|(signal, expression)| combine(signal, expression, &columns))
             .collect();
@@ -148,13 +148,13 @@ impl TableReader<'_> {
     }
 }
 
-/// A channel without samples, which no record takes.
+/// A channel without samples, which no record accepts.
 fn nothing() -> Channel {
     Channel::new("", "", Vec::new())
 }
 
-/// The signal that an expression makes of columns; nothing if it is a column by itself. Its name is
-/// the expression; a difference has a unit where both terms share it.
+/// The signal of an expression of columns; nothing if it is a column itself. Its name is the
+/// expression; a difference has a unit if both terms share it.
 fn combine(signal: Signal, expression: &ColumnExpression, columns: &[Option<Channel>]) -> Channel {
     let nothing = nothing();
     let column = |index: usize| columns[index].as_ref().unwrap_or(&nothing);

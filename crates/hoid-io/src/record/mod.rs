@@ -1,7 +1,7 @@
-//! Records out of the columns of a file, and into files.
+//! Records from the columns of a file, and into files.
 //!
-//! A trial is chosen, its rows are put on an even grid, and each value in use is checked; what may be repaired is
-//! repaired only when that is requested.
+//! A trial is selected, its rows are placed on an even grid, and each value in use is checked; data are repaired only
+//! on request.
 //!
 //! | module | contents |
 //! |---|---|

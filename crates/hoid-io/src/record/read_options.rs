@@ -1,5 +1,5 @@
-//! How to read a record: which columns are input and output, which trials, the sampling, and what may
-//! be repaired.
+//! Options of reading a record: columns of input and output, trials, sampling, and permitted
+//! repairs.
 
 use std::fmt;
 use std::str::FromStr;
@@ -15,28 +15,28 @@ pub struct Repair {
     /// the first t; its sample time is that of the typical step, or of
     /// [`ReadOptions::sampling_hz`].
     pub resample: bool,
-    /// Bridge missing values (empty, NaN, NA) linearly between the values before and after.
+    /// Interpolate missing values (empty, NaN, NA) linearly between the values before and after.
     pub fill: bool,
 }
 
-/// How to read a record.
+/// Options of reading a record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadOptions {
-    /// Input of the person; `e` by default. `None` reads an output alone, for the structures
+    /// Input of the operator; `e` by default. `None` reads only an output, for the structures
     /// without input.
     pub input: Option<ColumnExpression>,
-    /// Output of the person; `u` by default.
+    /// Output of the operator; `u` by default.
     pub output: ColumnExpression,
-    /// The column of the time and its unit; by default it is found by names and types.
+    /// The time column and its unit; by default it is found by names and types.
     pub time: Option<TimeChoice>,
-    /// Which trials of the file are read; by default they are known by a t that starts again. A record
-    /// is one of them, [`read_segments`](crate::read_segments) gives all.
+    /// Trials of the file to read; by default they are recognised by a t that restarts. A record is
+    /// one of them, [`read_segments`](crate::read_segments) gives all.
     pub trial: Option<TrialChoice>,
-    /// Sampling frequency in Hz. It wins over the column t, which then gives only the time of the
-    /// first sample (0 when there is none); with [`Repair::resample`] it is the frequency of the
-    /// new grid. By default the sampling is that of t.
+    /// Sampling frequency in Hz. It takes precedence over the column t, which then gives only the
+    /// time of the first sample (0 if there is none); with [`Repair::resample`] it is the frequency
+    /// of the new grid. By default the sampling is that of t.
     pub sampling_hz: Option<f64>,
-    /// The samples with `from <= t < to`, s; anything outside is not used. By default all.
+    /// Uses the samples with `from <= t < to`, s. By default all.
     pub span_s: (Option<f64>, Option<f64>),
     /// Permitted repairs.
     pub repair: Repair,
@@ -56,8 +56,8 @@ impl Default for ReadOptions {
     }
 }
 
-/// Which trials of a file are read: `COLUMN` for each value of a column (`t`: where the time starts
-/// again), `COLUMN=VALUE` for one.
+/// Trials of a file to read: `COLUMN` for each value of a column (`t`: where the time restarts),
+/// `COLUMN=VALUE` for one.
 ///
 /// ```
 /// let trial: hoid_io::TrialChoice = "trial=3".parse()?;
@@ -79,7 +79,7 @@ impl TrialChoice {
         }
     }
 
-    /// Whether it names one trial.
+    /// True if it selects a single trial.
     pub(super) fn is_one(&self) -> bool {
         self.value.is_some()
     }
@@ -89,7 +89,7 @@ impl FromStr for TrialChoice {
     type Err = IoError;
 
     /// # Errors
-    /// [`IoError::Expression`] where no column or no value is named.
+    /// [`IoError::Expression`] if no column or no value is given.
     fn from_str(text: &str) -> Result<Self, IoError> {
         let (column, value) = match text.rsplit_once('=') {
             Some((column, value)) => (column.trim(), Some(value.trim().to_owned())),

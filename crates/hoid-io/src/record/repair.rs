@@ -1,33 +1,32 @@
-//! The remedies for damaged records, applied only when they are requested: rows that were written
-//! twice are dropped, straight lines are drawn over missing values, and from an uneven t to an even
-//! grid.
+//! Repairs of damaged records, applied only on request: duplicated rows are dropped, missing values
+//! are interpolated linearly, and samples with an uneven t are interpolated to an even grid.
 //!
-//! The lines invent data. Over a gap of one or two samples that does little harm; a long straight
-//! line is seen by every estimator as a person who behaves like that.
+//! Interpolated data are invented. Over a gap of one or two samples that does little harm; a long
+//! straight line looks to every estimator like the behaviour of the operator.
 
 use std::ops::Range;
 
 use crate::preparation::Step;
 use crate::table::{Table, kept};
 
-/// Why missing values could not be bridged: nothing is on one side of them.
+/// Reason why missing values could not be interpolated: there is no value on one side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum OpenEnd {
     Start,
     End,
 }
 
-/// The bridged samples.
+/// The interpolated values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Bridged {
-    /// Values in all.
+    /// Number of values.
     pub(super) values: usize,
     /// Longest run of them.
     pub(super) longest: usize,
 }
 
-/// Puts the straight line between its neighbours in place of each run of NaN, along `t` if it is
-/// known and else by rows.
+/// Replaces each run of NaN by the straight line between its neighbours, along `t` if it is known,
+/// otherwise by rows.
 pub(super) fn fill(values: &mut [f64], t: Option<&[f64]>) -> Result<Bridged, OpenEnd> {
     let mut bridged = Bridged::default();
     let mut at = 0;
@@ -49,7 +48,7 @@ pub(super) fn fill(values: &mut [f64], t: Option<&[f64]>) -> Result<Bridged, Ope
     Ok(bridged)
 }
 
-/// Drops each row that is in all columns, the time among them, what the row before is.
+/// Drops each row that equals the row before in all columns, including the time.
 pub(super) fn drop_repeated(table: Table<'_>) -> (Table<'_>, Option<Step>) {
     let same = |row: &usize| {
         table.columns.iter().enumerate().all(|(index, column)| {
@@ -85,7 +84,7 @@ fn next_run(values: &[f64], from: usize) -> Option<Range<usize>> {
     Some(start..end)
 }
 
-/// Values at `start + k step`, k = 0 .. n, on the straight lines between `(t, value)`; t increases.
+/// Interpolates linearly between the points `(t, value)` at `start + k step`, k = 0 .. n; t increases.
 pub(super) fn resample(t: &[f64], values: &[f64], start: f64, step: f64, n: usize) -> Vec<f64> {
     let mut left = 0;
     (0..n)
@@ -101,7 +100,7 @@ pub(super) fn resample(t: &[f64], values: &[f64], start: f64, step: f64, n: usiz
 }
 
 fn line(a: f64, b: f64, share: f64) -> f64 {
-    // This form gives a and b themselves at the ends and does not overflow between them.
+    // This form gives exactly a and b at the ends and does not overflow between them.
     a * (1.0 - share) + b * share
 }
 
@@ -136,11 +135,11 @@ mod tests {
         let values = t.map(|t| 2.0 - 3.0 * t);
         let even = resample(&t, &values, 0.0, 0.1, 11);
         for (k, value) in even.iter().enumerate() {
-            // Two products of numbers of the size of 1: a few units of the last place.
+            // Two products of numbers of order 1: a few units in the last place.
             assert!((value - (2.0 - 0.3 * k as f64)).abs() < 1e-14, "{k}");
         }
         assert_eq!(even[0], 2.0);
-        // A last sample that rounding puts after the data takes the last value.
+        // A last sample beyond the data due to rounding takes the last value.
         assert_eq!(resample(&t, &values, 0.0, 1.0 + 1e-12, 2)[1], values[5]);
     }
 }

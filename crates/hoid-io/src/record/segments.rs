@@ -1,10 +1,10 @@
-//! Records between faults of the recording: a file is cut where samples are missing, stay constant
-//! or are clipped, and each segment is a record.
+//! Records between faults of the recording: a file is cut where samples are missing, constant or
+//! clipped, and each segment is a record.
 //!
-//! Nothing is invented, and each segment has initial states of its own in a fit. But what is left
-//! out is chosen by the recorded data: without the samples at a rail the largest answers are gone,
-//! which biases what is left (the lead of C1 clipped at 1.5 standard deviations by 9 %, where the
-//! clipped record itself has its gain 12 % too small).
+//! No data are invented, and each segment has its own initial states in a fit. But the recorded
+//! data determine what is excluded: without the samples at saturation the largest responses are
+//! missing, which biases the rest (the lead of C1 clipped at 1.5 standard deviations by 9 %; for
+//! the clipped record itself the gain is 12 % too small).
 
 use std::ops::Range;
 use std::path::Path;
@@ -19,15 +19,15 @@ use crate::formats::bytes_of;
 use crate::preparation::{Preparation, Step};
 use crate::wording::{decimal, list};
 
-/// Reads the segments of a file between faults of these kinds that last `shortest_s` or more, in
-/// their order; the whole record where no kind is named. The first carries the problems of the file
-/// as a whole.
+/// Reads the segments of a file between faults of these kinds that last at least `shortest_s`, in
+/// their order; the whole record if no kind is given. The first carries the problems of the file as
+/// a whole.
 ///
-/// For a file with several trials each is read so, one after the other.
+/// In a file with several trials, each is read in this way, one after the other.
 ///
 /// # Errors
 /// As [`read_prepared`]; [`IoError::Preparation`] for kinds that are not places (a clock, a
-/// constant), for a run-in, and where no segment is left.
+/// constant), for a run-in, and if no segment is left.
 pub fn read_segments(
     path: &Path,
     options: &ReadOptions,
@@ -58,7 +58,7 @@ pub fn read_segments(
                     list_of(&trials)
                 ));
             } else {
-                // Report about the file was reported about its first trial.
+                // Problems of the file are reported with its first trial.
                 read.notes.clear();
             }
             all.push(read);
@@ -71,7 +71,7 @@ fn list_of(trials: &[String]) -> String {
     list(&trials.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
-/// The segments of a file with one trial.
+/// The segments of a file with a single trial.
 fn read_trial(
     path: &Path,
     options: &ReadOptions,
@@ -132,7 +132,7 @@ fn read_trial(
             span_s: (Some(from), to),
             ..options.clone()
         };
-        // What is masked is next to it: nothing beyond it is taken for an offset.
+        // The masked rows are adjacent: rows beyond them are not used for an offset.
         let read = read_as_recorded(path, &span, preparation.drop_repeated)?.prepared(preparation)?;
         let to_s = to.unwrap_or(last);
         let mut steps = vec![Step::Mask {
@@ -162,9 +162,9 @@ fn read_trial(
     Ok(segments)
 }
 
-/// Rows between the faults of these kinds.
+/// Rows between faults of these kinds.
 fn between(issues: &[QualityIssue], mask: &[QualityIssueKind], rows: Range<usize>) -> Vec<Range<usize>> {
-    // Rows out of use, and rows before which the record is cut.
+    // Excluded rows, and rows before which the record is cut.
     let mut out = vec![false; rows.len()];
     let mut cut = vec![false; rows.len() + 1];
     for found in issues.iter().filter(|found| mask.contains(&found.kind)) {

@@ -1,4 +1,4 @@
-//! A table on its way to a record: its columns are taken one by one, checked and repaired.
+//! Conversion of a table to a record: its columns are taken one by one, checked and repaired.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ use crate::preparation::Step;
 use crate::table::Table;
 use crate::wording::named;
 
-/// The table, and the processing of it.
+/// The table, and the steps applied to it.
 pub(super) struct TableReader<'a> {
     pub(super) table: Table<'a>,
     pub(super) options: &'a ReadOptions,
@@ -29,7 +29,7 @@ impl TableReader<'_> {
         }
     }
 
-    /// The part of these rows in which all signals have values on both sides, where missing ones are bridged: two
+    /// The range of these rows in which all signals have values on both sides, if missing ones are interpolated: two
     /// topics in one table do not start and end in the same row.
     pub(super) fn between_values(&mut self, rows: Range<usize>, time: Option<usize>) -> Range<usize> {
         if !self.options.repair.fill {
@@ -54,7 +54,7 @@ impl TableReader<'_> {
                 names.join(" and ")
             ));
         }
-        // The first and the last row of the part lie between values that the part does not hold.
+        // The first and the last row of the range lie between values outside it.
         for at in [first, last] {
             for &column in &self.signals {
                 if let Some(value) = self.between(column, at, &rows, time) {
@@ -65,8 +65,8 @@ impl TableReader<'_> {
         first..last + 1
     }
 
-    /// The value of a column that is missing in a row, on the line between its neighbours; `None` if it is not missing,
-    /// or there is none on a side.
+    /// A missing value of a column in a row, interpolated between its neighbours; `None` if it is not missing, or one
+    /// side has no value.
     fn between(&self, column: usize, at: usize, rows: &Range<usize>, time: Option<usize>) -> Option<f64> {
         let source = &self.table.columns[column];
         if !source.values[at].is_nan() || source.texts.binary_search(&at).is_ok() {
@@ -80,8 +80,8 @@ impl TableReader<'_> {
         value.is_finite().then_some(value)
     }
 
-    /// The time between two samples of the signal that has the more of them, where that is less than all rows: each of two
-    /// topics in one table has a clock of its own.
+    /// The times of the signal with the most samples, if there are fewer than rows: each of two topics in one table has
+    /// its own clock.
     pub(super) fn own_times(&self, rows: &Range<usize>, t: &[f64]) -> Option<Vec<f64>> {
         let of = |column: &usize| -> Vec<f64> {
             let values = &self.table.columns[*column].values[rows.clone()];
@@ -94,8 +94,7 @@ impl TableReader<'_> {
         (densest.len() > 2 && densest.len() + 2 < t.len()).then_some(densest)
     }
 
-    /// The values of a column in use: all finite, the missing ones bridged where that was
-    /// requested.
+    /// The values of a column in use: all finite, the missing ones interpolated if requested.
     pub(super) fn values(&mut self, column: usize, rows: Range<usize>, t: Option<&[f64]>) -> Result<Vec<f64>, IoError> {
         let source = &mut self.table.columns[column];
         let may_fill = self.options.repair.fill;
@@ -105,7 +104,7 @@ impl TableReader<'_> {
         if let Some(row) = rows.clone().find(bad) {
             return Err(self.table.bad_value(column, row, rows));
         }
-        // No one reads a column twice: what a file of hours fills is not copied.
+        // A column is read only once: long files are not copied.
         let mut values = std::mem::take(&mut source.values);
         values.truncate(rows.end);
         values.drain(..rows.start);

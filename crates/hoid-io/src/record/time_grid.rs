@@ -1,4 +1,4 @@
-//! The rows of a table that a record is made of, and the even grid on which its samples stand.
+//! The rows of a table that form a record, and the even grid of its samples.
 
 use std::ops::Range;
 
@@ -11,18 +11,18 @@ use crate::table::Precision;
 use crate::time::sampling::{self, Uneven};
 use crate::wording::list;
 
-/// Resampling makes at most this many samples out of one.
+/// Largest ratio of resampled to recorded samples.
 const LARGEST_FACTOR: usize = 100;
 
-/// Where the samples of the record come from.
+/// Origin of the samples of a record.
 pub(super) struct TimeGrid {
     /// Rows of the table in use.
     pub(super) rows: Range<usize>,
     pub(super) start_s: f64,
     pub(super) sample_time: SampleTime,
-    /// The number of samples to make out of rows whose t is uneven.
+    /// Number of samples to interpolate from rows with an uneven t.
     pub(super) resampled: Option<usize>,
-    /// The t of the rows where it is known to increase.
+    /// The t of the rows if it is known to increase.
     pub(super) t: Option<Vec<f64>>,
 }
 
@@ -60,7 +60,7 @@ impl TableReader<'_> {
             (Some(time), Some(first)) if first.is_finite() => {
                 let t = &self.table.columns[time].values;
                 let stated = (t[t.len() - 1] - first) / (t.len() - 1) as f64;
-                // More than one in a hundred is more than a clock is off.
+                // More than one percent is more than a clock error.
                 if (stated - ts).abs() > 0.01 * ts {
                     self.table.notes.push(format!(
                         "the given sampling frequency of {} Hz counts; t gives {:.6} Hz on average",
@@ -89,7 +89,7 @@ impl TableReader<'_> {
         })
     }
 
-    /// The sampling of the column t, or the one to resample it to.
+    /// The sampling of the column t, or the sampling to which it is resampled.
     fn grid_of_t(&mut self, time: usize, given: Option<SampleTime>) -> Result<TimeGrid, IoError> {
         let rows = self.rows(&self.table.columns[time].values)?;
         let rows = self.between_values(rows, Some(time));
@@ -129,12 +129,12 @@ impl TableReader<'_> {
         sample_time: SampleTime,
         precision: Precision,
     ) -> Result<TimeGrid, IoError> {
-        // A sample alone has no line to be on.
+        // A single sample does not define a line.
         if t.len() < 2 {
             return Err(self.uneven(Uneven::TooFew, &rows, &t));
         }
         let (start_s, end_s, ts) = (t[0], t[t.len() - 1], sample_time.s());
-        // The rounding of the last t does not cost the last sample.
+        // The rounding of the last t must not remove the last sample.
         let slack = 1e-6 + (precision.unit(end_s) / ts).min(0.5);
         let samples = ((end_s - start_s) / ts + slack).floor() + 1.0;
         if samples > (LARGEST_FACTOR * t.len()) as f64 || !samples.is_finite() {
@@ -154,7 +154,7 @@ impl TableReader<'_> {
             to_hz: 1.0 / ts,
             longest_step_s: longest,
         });
-        // Half as many samples or fewer: what lies above the new Nyquist frequency folds down.
+        // Half as many samples or fewer: frequencies above the new Nyquist frequency alias.
         if 2.0 * samples <= t.len() as f64 {
             self.table.notes.push(String::from(
                 "resampling to the lower frequency applied no low-pass filter: read at the old frequency and give the new one with --new-fs if the recording holds power above half of it",
@@ -222,7 +222,7 @@ impl TableReader<'_> {
             finite.next().unwrap_or(f64::NAN),
             finite.next_back().unwrap_or(f64::NAN),
         );
-        // A bound that falls on a sample, up to rounding, takes that sample.
+        // A bound that falls on a sample, up to rounding, includes it.
         let slack = ((end_s - start_s).abs() / times.len() as f64 * 1e-6).min(1e-6);
         let slack = if slack.is_finite() { slack } else { 0.0 };
         let start = match from {

@@ -1,11 +1,11 @@
-//! Trials in one file: a column that counts them, a time that starts again, or an array of
+//! Trials in one file: separated by a column that counts them, a time that restarts, or an array of
 //! structures in MATLAB.
 //!
-//! Each trial is a record of its own, with initial states of its own; one record over all of them would answer at each
-//! seam to what was never seen. A part starts where the value of the column changes or where t falls. Without `--trial`
-//! parts are only searched for where t falls: each must have [`SHORTEST`] rows, and t must fall by at least half of its
-//! rise, which no clock does that is set. The column that steps with the parts, if there is one, gives them their
-//! names.
+//! Each trial is a separate record with its own initial states; in one record over all of them the output after each
+//! seam would depend on inputs that never occurred. A part starts where the value of the column changes or where t
+//! decreases. Without `--trial`, parts are only searched for where t decreases: each must have [`SHORTEST`] rows, and t
+//! must decrease by at least half of its range, which a clock correction never does. The column that changes with the
+//! parts, if there is one, gives their names.
 
 use std::ops::Range;
 
@@ -15,13 +15,13 @@ use crate::formats::arrays::Contents;
 use crate::table::{Column, Table, kept};
 use crate::wording::{did_you_mean, list, shown};
 
-/// Rows of the shortest part that is taken for a trial unasked.
+/// Smallest number of rows of a part that is recognised as a trial automatically.
 const SHORTEST: usize = 8;
 
-/// Trials that were found: their names and rows.
+/// Trials found: their names and rows.
 type Parts = Vec<(String, Range<usize>)>;
 
-/// The trial of a table that was requested; the table itself where it holds one only.
+/// The requested trial of a table; the table itself if it holds only one.
 pub(crate) fn of_table<'a>(table: Table<'a>, choice: Option<&TrialChoice>) -> Result<Table<'a>, IoError> {
     let file = || table.source.file().to_owned();
     let (by, parts) = match choice {
@@ -58,7 +58,7 @@ fn several(file: String, by: &str, names: Vec<&str>) -> IoError {
     }
 }
 
-/// Where t falls.
+/// Rows where t decreases.
 fn falls(table: &Table<'_>) -> Vec<usize> {
     let time = table.columns.iter().find(|column| column.name == "t");
     let falls = |t: &Column| {
@@ -69,7 +69,7 @@ fn falls(table: &Table<'_>) -> Vec<usize> {
     time.map_or_else(Vec::new, falls)
 }
 
-/// The rows between the places at which something starts.
+/// Rows between the starting positions.
 fn between(begins: &[usize], rows: usize) -> Vec<Range<usize>> {
     let from = std::iter::once(0).chain(begins.iter().copied());
     let to = begins.iter().copied().chain([rows]);
@@ -86,7 +86,7 @@ fn cell(table: &Table<'_>, at: usize, row: usize) -> Option<String> {
     is_text.then(|| table.source.cell(row, at))
 }
 
-/// The parts by a column, or by t alone.
+/// The parts by a column, or by t only.
 fn parts_by(table: &Table<'_>, choice: &TrialChoice) -> Result<Parts, IoError> {
     let mut begins = falls(table);
     if choice.column == "t" {
@@ -110,8 +110,8 @@ fn parts_by(table: &Table<'_>, choice: &TrialChoice) -> Result<Parts, IoError> {
     Ok(named(between(&begins, table.rows), |row| labels[row].clone()))
 }
 
-/// Parts by the value in their first row, without those that have none; a value that comes again is
-/// counted.
+/// Parts named by the value in their first row, without those that have none; repeated values are
+/// numbered.
 fn named(parts: Vec<Range<usize>>, label: impl Fn(usize) -> Option<String>) -> Parts {
     let mut found: Vec<(String, usize, Range<usize>)> = Vec::new();
     for rows in parts {
@@ -126,8 +126,7 @@ fn named(parts: Vec<Range<usize>>, label: impl Fn(usize) -> Option<String>) -> P
     found.into_iter().map(name).collect()
 }
 
-/// The parts between the places where t starts again, and the column that counts them; `t` if there
-/// is none.
+/// The parts between restarts of t, and the column that counts them; `t` if there is none.
 fn restarts(table: &Table<'_>) -> Option<(String, Parts)> {
     let begins = falls(table);
     let t = &table.columns.iter().find(|column| column.name == "t")?.values;
@@ -145,7 +144,7 @@ fn restarts(table: &Table<'_>) -> Option<(String, Parts)> {
             first.is_some() && rows.clone().all(|row| cell(table, *at, row) == first)
         };
         let steps = |row: &usize| cell(table, *at, *row) != cell(table, *at, row - 1);
-        // The steps first: they are few.
+        // The changes first: they are few.
         begins.iter().all(steps) && parts.iter().all(same)
     };
     let is_named = |at: &usize| !table.columns[*at].name.is_empty() && table.columns[*at].name != "t";
@@ -162,13 +161,13 @@ fn restarts(table: &Table<'_>) -> Option<(String, Parts)> {
     })
 }
 
-/// The trial of an array of structures, `trial(3).e`, and whether that was the request.
+/// The trial of an array of structures, `trial(3).e`, and whether it was the request.
 pub(crate) fn of_contents(
     mut contents: Contents,
     choice: Option<&TrialChoice>,
     file: &str,
 ) -> Result<(Contents, bool), IoError> {
-    // The array and the number of a structure in it.
+    // The array and the index of a structure in it.
     let element = |parent: &str| -> Option<(String, String)> {
         let (array, rest) = parent.split_once('(')?;
         let (number, _) = rest.split_once(')')?;
@@ -205,7 +204,7 @@ pub(crate) fn of_contents(
                 available: list(&numbers),
             });
         }
-        // For one array the paths are as clear as without a choice.
+        // For a single array the paths are unique without a choice.
         None if numbers.len() < 2 => return Ok((contents, asked.is_some())),
         None => return Err(several(file.to_owned(), &array, numbers)),
     };

@@ -1,7 +1,7 @@
-//! A fit of a person as `hoid identify --json` prints it: read again as a prior or a start.
+//! A fit of an operator as printed by `hoid identify --json`: read as a prior or an initial state.
 //!
-//! The object has more than the data read here; keys that are not known are left alone, so that a file of a later
-//! version is read too.
+//! The object holds more data than are read here; unknown keys are ignored, so that files of later versions can be
+//! read.
 
 use std::path::Path;
 
@@ -15,33 +15,33 @@ use crate::{IoError, read_settings};
 pub struct FitParameter {
     /// Its name.
     pub name: String,
-    /// Its value with its standard error.
+    /// Value and standard error.
     pub estimate: Estimate,
     /// True if the data determine it.
     pub determined: bool,
 }
 
-/// Contents of a file of a fit.
+/// Contents of a fit file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitFile {
-    /// The parameters that have a value.
+    /// Parameters that have a value.
     pub parameters: Vec<FitParameter>,
     operator: Result<FittedOperator, String>,
     source: String,
 }
 
 impl FitFile {
-    /// The operator with its covariance.
+    /// Returns the operator with its covariance.
     ///
     /// # Errors
-    /// [`IoError::NoFit`] for a fit of another structure, one without covariance, and one of which
-    /// nothing is determined.
+    /// [`IoError::NoFit`] for a fit of another structure, one without covariance, and one without
+    /// determined parameters.
     pub fn operator(self) -> Result<FittedOperator, IoError> {
         self.operator.map_err(|reason| no_fit(&self.source, reason))
     }
 }
 
-/// True for a name that ends as that of a fit does.
+/// True for the name of a fit file, by its ending.
 pub fn is_fit_file(name: &str) -> bool {
     Path::new(name)
         .extension()

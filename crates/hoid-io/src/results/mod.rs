@@ -1,4 +1,4 @@
-//! Files of results of hoid: writing and reading.
+//! Writing and reading of result files of hoid.
 //!
 //! | module | contents |
 //! |---|---|

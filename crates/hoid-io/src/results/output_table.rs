@@ -1,4 +1,4 @@
-//! Columns of results, as they go into files and come out of them.
+//! Columns of results, for writing and reading.
 //!
 //! | | CSV | Parquet |
 //! |---|---|---|
@@ -7,9 +7,9 @@
 //! | text | quoted where that is needed | BYTE_ARRAY in UTF-8 |
 //! | comments | lines above the header, behind `# ` | lines under the key `hoid.comments` |
 //!
-//! Parquet gives back the written data. CSV keeps no types: a column is whole where each cell is, real where each cell
-//! is a number or empty, else text. What hoid writes comes back the same except for a column of text that looks like
-//! numbers, and one of no rows.
+//! Parquet reproduces the written data. CSV stores no types: a column is of integers if each cell is one, of reals if
+//! each cell is a number or empty, otherwise of text. Data written by hoid are reproduced except for a column of text
+//! that looks like numbers, and one without rows.
 
 use std::ops::Range;
 
@@ -18,18 +18,18 @@ use crate::IoError;
 /// Columns to be written.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OutputTable {
-    /// Notes on the table, a line each.
+    /// Comments on the table, one per line.
     pub comments: Vec<String>,
-    /// The columns, all of one length.
+    /// The columns, of equal length.
     pub columns: Vec<OutputColumn>,
 }
 
 /// One column of a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OutputColumn {
-    /// Its name, of which there is one in a table.
+    /// Its name, unique in the table.
     pub name: String,
-    /// One value a row.
+    /// One value per row.
     pub values: ColumnValues,
 }
 
@@ -44,21 +44,21 @@ pub enum ColumnValues {
     Text(Vec<String>),
 }
 
-/// Contents of a column.
+/// Kind of the values of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ColumnKind {
     /// Real numbers.
     Real,
-    /// Whole numbers.
+    /// Integers.
     Whole,
     /// Texts.
     Text,
 }
 
-/// A table without its rows.
+/// Schema of a table.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct TableSchema {
-    /// Notes on the table, a line each.
+    /// Comments on the table, one per line.
     pub comments: Vec<String>,
     /// The columns.
     pub columns: Vec<ColumnSchema>,
@@ -69,12 +69,12 @@ pub struct TableSchema {
 pub struct ColumnSchema {
     /// Its name.
     pub name: String,
-    /// Contents of it.
+    /// Kind of its values.
     pub kind: ColumnKind,
 }
 
 impl OutputTable {
-    /// The table without its rows.
+    /// Returns the schema of the table.
     #[must_use]
     pub fn schema(&self) -> TableSchema {
         let column = |column: &OutputColumn| ColumnSchema {
@@ -87,13 +87,13 @@ impl OutputTable {
         }
     }
 
-    /// The values of a column.
+    /// Returns the values of a column.
     #[must_use]
     pub fn column(&self, name: &str) -> Option<&ColumnValues> {
         self.columns.iter().find(|c| c.name == name).map(|c| &c.values)
     }
 
-    /// The rows of all columns.
+    /// Number of rows of all columns; an error if they differ.
     pub(super) fn rows(&self, file: &str) -> Result<usize, IoError> {
         let expected = self.columns.first().map_or(0, |column| column.values.len());
         match self.columns.iter().find(|column| column.values.len() != expected) {
@@ -113,19 +113,19 @@ impl OutputTable {
 }
 
 impl ColumnValues {
-    /// The number of rows.
+    /// Returns the number of rows.
     #[must_use]
     pub fn len(&self) -> usize {
         self.all().len()
     }
 
-    /// Whether there are no rows.
+    /// True if there are no rows.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Definition of the values.
+    /// Returns the kind of the values.
     #[must_use]
     pub fn kind(&self) -> ColumnKind {
         match self {
@@ -145,7 +145,7 @@ impl ColumnValues {
 }
 
 impl TableSchema {
-    /// The schema as it can be written: each comment one line, each name one that is found again.
+    /// The schema in a form that can be written: each comment one line, names unique.
     pub(super) fn checked(self, file: &str) -> Result<Self, IoError> {
         if self.columns.is_empty() {
             return Err(IoError::NoColumns { file: file.to_owned() });

@@ -1,4 +1,4 @@
-//! Tables of results into files and out of them, in the format that the extension represents.
+//! Writing and reading of tables of results, in the format given by the extension.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use super::table_writer::write_values;
 use crate::IoError;
 use crate::formats::{bytes_of, format_to_write};
 
-/// Whether a table can be written to a place of this name; checked before long computations.
+/// Checks that a table can be written to a file of this name, before long computations.
 ///
 /// # Errors
 /// [`IoError::UnknownFormat`] for an extension that does not correspond to any format,
@@ -16,8 +16,8 @@ pub fn check_table_path(path: &Path) -> Result<(), IoError> {
     format_to_write(path).map(drop)
 }
 
-/// Writes a table, whole or not at all: as CSV (`.csv`, `.txt`, with tabs `.tsv`), Parquet
-/// (`.parquet`, `.pq`), NPZ (`.npz`) or for MATLAB (`.mat`). The same table gives the same bytes.
+/// Writes a table atomically: as CSV (`.csv`, `.txt`, with tabs `.tsv`), Parquet (`.parquet`,
+/// `.pq`), NPZ (`.npz`) or for MATLAB (`.mat`). The same table gives the same bytes.
 ///
 /// # Errors
 /// The errors of [`check_table_path`]; [`IoError::ColumnLength`], [`IoError::NoColumns`],
@@ -45,9 +45,9 @@ pub fn write_table(path: &Path, table: &OutputTable) -> Result<(), IoError> {
     write_values(path, table.schema(), &table.values())
 }
 
-/// Reads a table back, with the kinds that it was written with; see the table of this module for
-/// those of CSV. A column of integers in a Parquet file of other origin is whole where no value is
-/// missing or negative, else real.
+/// Reads a table, with the kinds with which it was written; see the table of this module for those
+/// of CSV. A column of integers in a Parquet file of other origin is of integers if no value is
+/// missing or negative, otherwise real.
 ///
 /// # Errors
 /// [`IoError`], naming the place in the file.

@@ -1,5 +1,5 @@
-//! Tables that are written while they grow: CSV and Parquet in bounded memory, the formats of whole
-//! arrays once all rows are there.
+//! Tables written incrementally: CSV and Parquet in bounded memory, the array formats once all rows
+//! are known.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -9,16 +9,16 @@ use crate::IoError;
 use crate::formats::{ColumnsWriter, Format, RowWriter, Writing, format_to_write};
 use crate::output::{WholeFile, write_atomically};
 
-/// Rows that are written together. The file depends on the rows, not on how they came.
+/// Rows written at a time. The file depends on the rows, not on how they were appended.
 const GROUP: usize = 1 << 16;
 
-/// A file between its groups of rows.
+/// State of a file between its groups of rows.
 enum Sink {
     Rows(Box<dyn RowWriter>),
     Columns(WaitingColumns),
 }
 
-/// Columns that wait for their end, since an array reports its length first.
+/// Columns kept until the end, since the length of an array precedes its values.
 struct WaitingColumns {
     write: ColumnsWriter,
     schema: TableSchema,
@@ -80,17 +80,17 @@ pub(crate) fn write_values(path: &Path, schema: TableSchema, values: &[Values<'_
     })
 }
 
-/// A table that is written as it grows, for studies that are larger than memory; NPZ and .mat keep
-/// their rows in memory until the end. The file is in its place once [`finish`](Self::finish) is
-/// done; a writer that is dropped before leaves everything as it was. The bytes are those that
+/// A table written incrementally, for studies larger than memory; NPZ and .mat keep their rows in
+/// memory until the end. The file is in place after [`finish`](Self::finish); a writer dropped
+/// earlier leaves everything unchanged. The bytes are those that
 /// [`write_table`](crate::write_table) gives for all rows at once.
 pub struct TableWriter {
     file: WholeFile,
     name: String,
     columns: Vec<ColumnSchema>,
-    /// None after an error of the system: half a group may be in the file then.
+    /// None after an error of the system: the file may then hold part of a group.
     sink: Option<Sink>,
-    /// Rows that do not yet make a group.
+    /// Rows that do not yet fill a group.
     waiting: Vec<ColumnValues>,
 }
 
@@ -103,7 +103,7 @@ impl std::fmt::Debug for TableWriter {
 }
 
 impl TableWriter {
-    /// Starts a file of a format by its extension, as in [`write_table`](crate::write_table).
+    /// Starts a file in the format given by its extension, as in [`write_table`](crate::write_table).
     ///
     /// # Errors
     /// [`IoError::UnknownFormat`]; [`IoError::NoColumns`], [`IoError::DuplicateColumn`] or
@@ -125,7 +125,7 @@ impl TableWriter {
         })
     }
 
-    /// Appends the rows of a table of the same columns; its comments are not examined.
+    /// Appends the rows of a table with the same columns; its comments are ignored.
     ///
     /// # Errors
     /// [`IoError::ColumnsDiffer`] and [`IoError::ColumnLength`], after which other rows may be
@@ -156,7 +156,7 @@ impl TableWriter {
         Ok(())
     }
 
-    /// Ends the file and puts it in its place.
+    /// Completes the file and moves it to its place.
     ///
     /// # Errors
     /// [`IoError::Unwritable`] for errors that the operating system reports.
@@ -201,7 +201,7 @@ fn extend(column: &mut ColumnValues, values: Values<'_>) {
         (ColumnValues::Real(column), Values::Real(values)) => column.extend_from_slice(values),
         (ColumnValues::Whole(column), Values::Whole(values)) => column.extend_from_slice(values),
         (ColumnValues::Text(column), Values::Text(values)) => column.extend_from_slice(values),
-        // The kinds were compared before.
+        // The kinds were compared above.
         _ => debug_assert!(false, "values of two kinds in one column"),
     }
 }

@@ -1,4 +1,4 @@
-//! From the keys to a scenario, with what they leave out as in its condition.
+//! From the keys to a scenario; missing keys have the values of its condition.
 
 use std::f64::consts::TAU;
 

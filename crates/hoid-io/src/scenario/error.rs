@@ -1,9 +1,9 @@
-//! Why a file gives no scenario.
+//! Errors of scenario files.
 
 use hoid_model::ModelError;
 use thiserror::Error;
 
-/// Why a file gives no scenario.
+/// Reason why a file gives no scenario.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ScenarioFileError {
@@ -15,7 +15,7 @@ pub enum ScenarioFileError {
         /// Error reported by the operating system.
         reason: String,
     },
-    /// No TOML, or keys and types that do not belong to a scenario.
+    /// Invalid TOML, or keys and types that do not belong to a scenario.
     #[error("scenario file {path}, line {line}: {reason}")]
     Syntax {
         /// The file.
@@ -25,7 +25,7 @@ pub enum ScenarioFileError {
         /// The problem.
         reason: String,
     },
-    /// A value without meaning.
+    /// An invalid value.
     #[error("scenario file {path}, line {line}: {key} is {found}, expected {expected}")]
     Value {
         /// The file.
@@ -47,7 +47,7 @@ pub enum ScenarioFileError {
         /// Missing or surplus parts, and the remedy.
         reason: String,
     },
-    /// Values that have a meaning each, but not together.
+    /// Values that are valid individually, but not together.
     #[error("scenario file {path}: {source}")]
     Model {
         /// The file.

@@ -1,4 +1,4 @@
-//! From the keys to a scenario of the family.
+//! From the keys to a scenario of the operator family.
 
 use hoid_model::{
     ContinuousTransferFunction, FamilyOperator, FamilyScenario, FamilyState, Form, ModelError, SampleTime,
@@ -115,7 +115,7 @@ impl Source<'_> {
         given: &FamilyStateTable,
     ) -> Result<FamilyOperator, ScenarioFileError> {
         for (key, value) in given.numbers() {
-            // An infinite lag is an integrator.
+            // An infinite time constant is an integrator.
             if let Some(value) = value.filter(|value| !(key == "T_I_s" && value.is_infinite())) {
                 self.checked(&format!("{table}.{key}"), value, limits_of(key))?;
             }
@@ -196,7 +196,7 @@ impl Source<'_> {
         self.checked("feedforward.tau_f_s", given.tau_f_s, Limits::LEAD_S)?;
         let preview_s = self.whole("feedforward.preview_s", given.preview_s, 0.0, scenario.sample_time, 0.0)?;
         let delay_s = given.tau_f_s + preview_s;
-        // Rounding of a sum is none of the user's.
+        // Rounding of a sum is not an error of the user.
         let delay_s = if delay_s.abs() < 1e-12 { 0.0 } else { delay_s };
         if delay_s < 0.0 {
             return Err(self.keys(&format!(
@@ -222,7 +222,7 @@ impl Source<'_> {
         })
     }
 
-    /// `90/(s(s+6))`, or `90/1,6,0` by falling powers of s.
+    /// Parses `90/(s(s+6))`, or `90/1,6,0` by falling powers of s.
     fn element(&self, key: &str, given: &Spanned<String>) -> Result<ContinuousTransferFunction, ScenarioFileError> {
         let at = given.span().start;
         let element: ContinuousTransferFunction = given.get_ref().parse().map_err(|error| match error {
@@ -408,7 +408,7 @@ impl Source<'_> {
     }
 }
 
-/// Admissible values of a number of an operator.
+/// Admissible values of a parameter of an operator.
 fn limits_of(key: &str) -> Limits {
     match key {
         "T_L_s" | "T_I_s" | "c_1_s" | "c_2_s2" | "tau_e_s" | "K_d_s" => Limits::LEAD_S,
@@ -436,8 +436,8 @@ impl FamilyStateTable {
         ]
     }
 
-    /// Missing settings are those of `base`. Of two ways to state the gain, the one stated here
-    /// counts.
+    /// Takes missing settings from `base`. Of two definitions of the gain, the one given here
+    /// applies.
     fn over(&self, base: &Self) -> Self {
         let says_gain = self.k.is_some() || self.k_over_t_i.is_some();
         let gain = |own: Option<f64>, of_base: Option<f64>| if says_gain { own } else { of_base };

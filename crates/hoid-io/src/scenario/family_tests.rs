@@ -128,7 +128,7 @@ fn what_does_not_fit_is_refused_with_its_remedy() {
             "{message} lacks {part}"
         );
     }
-    // Studies take the operator of the thesis.
+    // Studies use the operator of the thesis.
     let message = parse_scenario(SHORT, "x.toml", "x").unwrap_err().to_string();
     assert!(message.contains("key form"), "{message}");
     assert!(matches!(

@@ -1,6 +1,6 @@
 //! Scenarios in TOML.
 //!
-//! A file starts from a condition C1-C6 and changes what it names, or describes everything itself.
+//! A file starts from a condition C1-C6 and changes the given keys, or describes everything itself.
 //! Units are part of the keys, times count from the start of the measurement, an unknown key is an
 //! error.
 //!
@@ -29,11 +29,11 @@
 //! | `[remnant]` | `order`, `T_n_s`; `noise_level` and `noise_definition` ("response", "remnant"), or `K_n_initial_deg` and `K_n_last_deg` |
 //! | `[[forcing]]` | `amplitude_deg`, `phase_rad`, and `omega_rad_s` or `cycles` (within `measurement_s`); `forcing = []` is a target at rest |
 //!
-//! A file with the key `form` describes an operator of the family around any controlled element
+//! A file with the key `form` describes an operator of the family with any controlled element
 //! ([`AnyScenario`]); its keys are in `family_keys`.
 //!
 //! Missing keys have the values of the condition; without one, the parameters of `[last]` are those of `[initial]`, and
-//! all else is as in C1.
+//! all others are as in C1.
 //!
 //! | module | contents |
 //! |---|---|

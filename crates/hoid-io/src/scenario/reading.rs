@@ -13,23 +13,23 @@ use crate::wording::printable;
 /// A scenario of either kind.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AnyScenario {
-    /// The task of the thesis, or one near it.
+    /// The task of the thesis, or a similar one.
     Reference(Box<Scenario>),
     /// An operator of the family: a file with the key `form`.
     Family(Box<FamilyScenario>),
 }
 
-/// Reads and checks a scenario of either kind. Without a `name` it is called as its file.
+/// Reads and checks a scenario of either kind. Without a `name` it is named after its file.
 ///
 /// # Errors
-/// [`ScenarioFileError`], which names the file and where it can the line and the key.
+/// [`ScenarioFileError`], which names the file and, if known, the line and the key.
 pub fn read_any_scenario(path: &Path) -> Result<AnyScenario, ScenarioFileError> {
     let (text, shown, name) = text_of(path)?;
     parse_any_scenario(&text, &shown, &name)
 }
 
-/// A scenario of either kind from the text of a file; `path` is for messages, `name` for a text that
-/// has none.
+/// Parses a scenario of either kind from text; `path` is for messages, `name` for a text without a
+/// name.
 ///
 /// # Errors
 /// As [`read_any_scenario`].
@@ -50,16 +50,16 @@ fn has_form(text: &str) -> bool {
         .is_ok_and(|table| table.contains_key("form"))
 }
 
-/// Reads and checks a scenario. Without a `name` it is called as its file.
+/// Reads and checks a scenario. Without a `name` it is named after its file.
 ///
 /// # Errors
-/// [`ScenarioFileError`], which names the file and where it can the line and the key.
+/// [`ScenarioFileError`], which names the file and, if known, the line and the key.
 pub fn read_scenario(path: &Path) -> Result<Scenario, ScenarioFileError> {
     let (text, shown, name) = text_of(path)?;
     parse_scenario(&text, &shown, &name)
 }
 
-/// The text of a file, its path as it is shown, and its name.
+/// The text of a file, its path for messages, and its name.
 fn text_of(path: &Path) -> Result<(String, String, String), ScenarioFileError> {
     let shown = path.display().to_string();
     let text = crate::input_file::settings_text(path).map_err(|error| ScenarioFileError::Unreadable {
@@ -71,7 +71,7 @@ fn text_of(path: &Path) -> Result<(String, String, String), ScenarioFileError> {
     Ok((text, shown, name))
 }
 
-/// A scenario from the text of a file; `path` is for messages, `name` for a text that has none.
+/// Parses a scenario from text; `path` is for messages, `name` for a text without a name.
 ///
 /// # Errors
 /// As [`read_scenario`].
@@ -97,13 +97,13 @@ fn syntax(text: &str, path: &str, error: &toml::de::Error) -> ScenarioFileError 
     }
 }
 
-/// JSON schema of a scenario file of the family, as text.
+/// Returns the JSON schema of a scenario file of the family.
 pub fn family_scenario_schema() -> String {
     let schema = schemars::schema_for!(FamilyFile);
     format!("{:#}", schema.as_value())
 }
 
-/// JSON schema of a scenario file, as text.
+/// Returns the JSON schema of a scenario file.
 pub fn scenario_schema() -> String {
     let schema = schemars::schema_for!(File);
     format!("{:#}", schema.as_value())

@@ -92,8 +92,8 @@ fn a_file_with_every_key_is_c4() {
         realisation: Realisation::Output,
         ..Scenario::condition(Condition::C4)
     };
-    // The last state takes omega_nm and zeta_nm from the initial one, cycles give Table 1 to the
-    // last bit.
+    // The last state takes omega_nm and zeta_nm from the initial one, and gives Table 1 to the last
+    // bit.
     assert_eq!(read_scenario(&path), Ok(expected));
 }
 

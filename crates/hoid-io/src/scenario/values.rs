@@ -6,26 +6,26 @@ use super::error::ScenarioFileError;
 use super::keys::Number;
 use crate::wording::printable;
 
-/// Most samples of a run, so that a slip of the unit does not ask for all memory.
+/// Maximum number of samples of a run, so that an error of the unit does not exhaust the memory.
 const MOST_SAMPLES: f64 = 1e7;
 
-/// Admissible values of a number of a scenario, so that a slip of the unit is reported and not
+/// Admissible values of a number of a scenario, so that an error of the unit is reported and not
 /// simulated.
 #[derive(Clone, Copy)]
 pub(super) struct Limits(f64, f64);
 
 impl Limits {
-    /// Sample times: a second of a recording at 1 MHz down to one sample in ten seconds.
+    /// Sample times: from 1 us (1 MHz) to 10 s.
     pub(super) const SAMPLE_TIME_S: Self = Self(1e-6, 10.0);
     pub(super) const RATE_HZ: Self = Self(0.1, 1e6);
-    /// Gains of a person, an element or a remnant, and amplitudes.
+    /// Gains of an operator, an element or a remnant, and amplitudes.
     pub(super) const GAIN: Self = Self(-1e6, 1e6);
     pub(super) const NOISE_GAIN: Self = Self(0.0, 1e6);
-    /// Leads and other times of a person.
+    /// Leads and other times of an operator.
     pub(super) const LEAD_S: Self = Self(-1e3, 1e3);
     /// Break frequencies of an element; below zero it is unstable.
     pub(super) const BREAK_RAD_S: Self = Self(-1e4, 1e4);
-    /// Frequencies of a person and of forcing functions.
+    /// Frequencies of an operator and of forcing functions.
     pub(super) const FREQUENCY_RAD_S: Self = Self(1e-6, 1e4);
     pub(super) const DAMPING: Self = Self(1e-6, 1e3);
     pub(super) const CYCLES: Self = Self(1e-6, 1e6);
@@ -63,7 +63,7 @@ impl std::fmt::Display for Limits {
     }
 }
 
-/// A number with an exponent where its digits would fill the line.
+/// Formats a number with an exponent if its digits would fill the line.
 fn in_short(value: f64) -> String {
     if value == 0.0 || !value.is_finite() || (1e-5..1e16).contains(&value.abs()) {
         value.to_string()
@@ -77,15 +77,15 @@ pub(super) fn line_of(text: &str, offset: usize) -> usize {
     1 + text.bytes().take(offset).filter(|b| *b == b'\n').count()
 }
 
-/// The text that values are traced back to.
+/// The text in which the lines of values are found.
 pub(super) struct Source<'a> {
     pub(super) text: &'a str,
     pub(super) path: &'a str,
 }
 
 impl Source<'_> {
-    /// A time that is `least` to ten million samples, a whole number of them. One that the file
-    /// does not give can fail as well, when the file gives the sample time.
+    /// A time of `least` to ten million samples, a whole number of them. A default time can fail as
+    /// well, if the file gives the sample time.
     pub(super) fn whole(
         &self,
         key: &str,
@@ -111,7 +111,7 @@ impl Source<'_> {
         })
     }
 
-    /// A number that the file may give.
+    /// An optional number of the file.
     pub(super) fn limited(
         &self,
         key: &str,
@@ -129,7 +129,7 @@ impl Source<'_> {
         Err(self.value(key, given.span().start, &in_short(value), &limits.to_string()))
     }
 
-    /// A number whose line is not known.
+    /// A number without a known line.
     pub(super) fn checked(&self, key: &str, value: f64, limits: Limits) -> Result<(), ScenarioFileError> {
         if limits.hold(value) {
             return Ok(());

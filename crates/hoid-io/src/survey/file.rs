@@ -1,8 +1,8 @@
-//! Contents of a file before any choice: columns, their sampling and ranges, and suspicious values.
+//! Contents of a file before any selection: columns, their sampling and ranges, and suspicious values.
 //!
-//! Nothing is judged finally here: a channel may rightly be constant. What is suspicious is found
-//! by `data_quality`, in columns that belong to one time together; a column that is constant is
-//! only marked, because many files carry such.
+//! The survey gives no final verdict: a channel may legitimately be constant. Suspicious values are
+//! found by `data_quality`, in columns that share a time; a constant column is only marked, because
+//! many files have some.
 
 use std::path::Path;
 
@@ -18,11 +18,11 @@ use crate::time::with_time;
 /// Contents of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FileSurvey {
-    /// Its format, as in "Parquet".
+    /// Name of its format, as in "Parquet".
     pub format: &'static str,
     /// Its columns, in their order.
     pub columns: Vec<ColumnSurvey>,
-    /// The sampling of each structure with a time, one for a flat table.
+    /// The sampling of each structure with a time; one for a flat table.
     pub samplings: Vec<SamplingSurvey>,
     /// Problems with the sampling, structure by structure.
     pub quality_issues: Vec<QualityIssue>,
@@ -39,16 +39,16 @@ pub struct ColumnSurvey {
     pub unit: String,
     /// The type of its values, such as "double" or "text".
     pub kind: String,
-    /// The number of its rows; 0 for what is not read.
+    /// Number of rows; 0 for unsupported content.
     pub rows: usize,
     /// Statistics of its finite numbers, if there are any.
     pub values: Option<ValueSurvey>,
 }
 
-/// Looks into a file of any format that is read.
+/// Surveys a file of any supported format.
 ///
 /// # Errors
-/// The errors of reading: [`IoError`], naming the place in the file.
+/// As for reading: [`IoError`], naming the place in the file.
 pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
     let file = path.display().to_string();
     let (format, mut bytes) = bytes_of(path)?;
@@ -86,7 +86,7 @@ fn signal(column: &RawColumn) -> Signal<'_> {
     }
 }
 
-/// Problems with the columns that are next to each other, by structure and length.
+/// Problems with the columns that belong together, by structure and length.
 fn quality_issues(columns: &[RawColumn]) -> Vec<QualityIssue> {
     let mut seen: Vec<(&str, usize)> = Vec::new();
     let mut found = Vec::new();

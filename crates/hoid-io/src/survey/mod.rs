@@ -1,4 +1,4 @@
-//! Contents of a file before any choice: columns, their sampling and ranges.
+//! Contents of a file before any selection: columns, their sampling and ranges.
 //!
 //! | module | contents |
 //! |---|---|

@@ -1,10 +1,10 @@
-//! The columns of a file of any format, before anything is chosen.
+//! The columns of a file of any format, before any selection.
 
 use crate::formats::arrays::{ColumnPath, Contents, Holds, TIMES};
 use crate::table::{Column, DECIMAL_COMMA, Precision, Table, UNITS_ROW, has_decimal_comma};
 use crate::wording::named;
 
-/// A column as it was read.
+/// A column as read.
 pub(super) struct RawColumn {
     pub(super) path: String,
     pub(super) parent: String,
@@ -16,7 +16,7 @@ pub(super) struct RawColumn {
     pub(super) precision: Precision,
 }
 
-/// The entries of a flat table, with what a reader of it should know.
+/// The columns of a flat table, with notes for the reader.
 pub(super) fn of_table(mut table: Table<'_>) -> (Vec<RawColumn>, Vec<String>) {
     let rows = table.rows;
     let commas = decimal_commas(&table);
@@ -43,7 +43,7 @@ pub(super) fn of_table(mut table: Table<'_>) -> (Vec<RawColumn>, Vec<String>) {
     (table.columns.into_iter().map(read).collect(), table.notes)
 }
 
-/// Columns of text that would be numbers with a point in the place of each comma.
+/// Columns of text that would be numeric if each comma were a point.
 fn decimal_commas(table: &Table<'_>) -> Vec<String> {
     let first_text = |(at, column): (usize, &Column)| {
         let row = *column.texts.first()?;
@@ -57,8 +57,7 @@ fn decimal_commas(table: &Table<'_>) -> Vec<String> {
     table.columns.iter().enumerate().filter_map(first_text).collect()
 }
 
-/// Columns of numbers in which some cells are text, or infinite: they are refused when read, and reported as they are
-/// then.
+/// Numeric columns with some text or infinite cells: reading them is refused with the same message.
 fn unusable(table: &Table<'_>) -> Vec<String> {
     let first = |(at, column): (usize, &Column)| {
         let numbers = column.values.iter().any(|value| value.is_finite());
@@ -71,7 +70,7 @@ fn unusable(table: &Table<'_>) -> Vec<String> {
     table.columns.iter().enumerate().filter_map(first).collect()
 }
 
-/// The entries of a file of named arrays.
+/// The columns of a file of named arrays.
 pub(super) fn of_arrays(contents: &Contents) -> (Vec<RawColumn>, Vec<String>) {
     let column_paths = contents.column_paths();
     let read = |column_path: ColumnPath| {

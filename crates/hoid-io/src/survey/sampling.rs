@@ -1,9 +1,9 @@
-//! The sampling of columns that belong together, as it is found.
+//! Sampling of columns that belong together.
 
 use super::read::RawColumn;
 use crate::data_quality::Grid;
 
-/// The sampling of columns that belong together.
+/// Sampling of columns that belong together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SamplingSurvey {
     /// Path of the time.
@@ -16,19 +16,19 @@ pub struct SamplingSurvey {
     pub sample_time_s: f64,
     /// Largest deviation of a time from the even grid, s.
     pub jitter_s: f64,
-    /// Places where rows are missing.
+    /// Number of gaps.
     pub gaps: usize,
-    /// Rows missing in them.
+    /// Number of rows missing in them.
     pub missing: u64,
     /// Time of the row before the first gap, s.
     pub first_gap_s: Option<f64>,
-    /// Rows in which the time stays constant or runs back.
+    /// Number of rows in which the time is constant or runs backwards.
     pub not_increasing: usize,
-    /// Rows in which each other column that is not constant repeats the row before.
+    /// Number of rows in which each other non-constant column repeats the row before.
     pub repeated: usize,
 }
 
-/// The sampling by a time; none if it holds fewer than two finite values.
+/// The sampling given by a time; none if it has fewer than two finite values.
 pub(super) fn sampling(time: &RawColumn, columns: &[RawColumn]) -> Option<SamplingSurvey> {
     let t: Vec<f64> = time
         .values
@@ -102,7 +102,7 @@ mod tests {
         let columns = [read("t", t), read("x", x), read("c", vec![1.0; 100])];
         let found = sampling(&columns[0], &columns).unwrap();
         assert!((found.sample_time_s - 0.01).abs() < 1e-5 && (found.jitter_s - 0.002).abs() < 2e-4);
-        // The row after the one that stays constant is two steps late.
+        // The row after one whose time is constant is two steps late.
         assert_eq!(
             (found.gaps, found.missing, found.not_increasing, found.repeated),
             (2, 4, 1, 1)

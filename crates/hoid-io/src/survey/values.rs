@@ -1,4 +1,4 @@
-//! The numbers of a column: how many are missing, their range and course, their steps and rails.
+//! The numbers of a column: missing values, range and course, quantisation and saturation.
 
 use crate::data_quality::{Levels, rails};
 
@@ -9,7 +9,7 @@ const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█']
 /// The numbers of a column, in its unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ValueSurvey {
-    /// Values that are missing, text or not finite.
+    /// Number of values that are missing, text or not finite.
     pub missing: usize,
     /// Smallest value.
     pub min: f64,
@@ -19,19 +19,19 @@ pub struct ValueSurvey {
     pub mean: f64,
     /// Root mean square deviation from the mean.
     pub deviation: f64,
-    /// Whether all values are one.
+    /// True if all values are equal.
     pub constant: bool,
-    /// The step of a quantised column.
+    /// Step of a quantised column.
     pub quantum: Option<f64>,
-    /// Rows in which a saturated column is at its smallest value.
+    /// Number of rows in which a saturated column has its smallest value.
     pub saturated_low: usize,
-    /// Rows in which a saturated column is at its largest value.
+    /// Number of rows in which a saturated column has its largest value.
     pub saturated_high: usize,
     /// The course of the values in block characters.
     pub sketch: String,
 }
 
-/// The numbers of a column; none if no value is finite.
+/// Statistics of a column; none if no value is finite.
 pub(super) fn values(all: &[f64]) -> Option<ValueSurvey> {
     let finite: Vec<f64> = all.iter().copied().filter(|value| value.is_finite()).collect();
     let (min, max) = finite.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), v| {
@@ -70,7 +70,7 @@ pub(super) fn values(all: &[f64]) -> Option<ValueSurvey> {
     })
 }
 
-/// Means of equal parts as bars; a blank where no value is finite.
+/// Means of equal parts as bars; a blank if no value is finite.
 fn sketch(all: &[f64], min: f64, max: f64) -> String {
     let parts = SKETCH.min(all.len());
     let bar = |part: usize| {

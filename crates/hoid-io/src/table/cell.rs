@@ -1,4 +1,4 @@
-//! Meaning of the text of a cell: a number, with a point or a comma, nothing, or something else.
+//! Interpretation of the text of a cell: a number with a point or a comma, a missing value, or text.
 
 use std::borrow::Cow;
 
@@ -7,21 +7,20 @@ use std::borrow::Cow;
 pub(crate) enum Cell {
     /// A number, finite or infinite.
     Number(f64),
-    /// Nothing, or a word for nothing.
+    /// An empty cell, or a word for a missing value.
     Missing,
-    /// Something else.
+    /// Any other text.
     Text,
 }
 
-/// How programs write that there is no value: R, pandas, databases, spreadsheets, statistics packages, the C library of
-/// Windows.
+/// Words for missing values: R, pandas, databases, spreadsheets, statistics packages, the C library of Windows.
 const MISSING: [&str; 16] = [
     "", "na", "n/a", "null", "none", "<na>", "#n/a", "#na", "-", "--", ".", "?", "1.#ind", "-1.#ind", "1.#qnan",
     "-1.#qnan",
 ];
 
 impl Cell {
-    /// Meaning of the text of a cell: empty, NaN and the words of [`MISSING`] are missing values.
+    /// Interprets the text of a cell: empty cells, NaN and the words of [`MISSING`] are missing values.
     pub(crate) fn parse(text: &str) -> Self {
         let text = text.trim();
         match text.parse::<f64>() {
@@ -36,12 +35,12 @@ impl Cell {
 /// The remedy for [`has_decimal_comma`].
 pub(crate) const DECIMAL_COMMA: &str = "write the numbers with a decimal point instead of a comma";
 
-/// Whether a cell that is text would be a number with a point in the place of its comma.
+/// True if a text cell would be a number with a point instead of its comma.
 pub(crate) fn has_decimal_comma(cell: &str) -> bool {
     cell.contains(',') && matches!(Cell::parse(&cell.replacen(',', ".", 1)), Cell::Number(_))
 }
 
-/// A number as it is written with a decimal point; any other cell as it is.
+/// A number with a decimal point instead of a comma; any other cell unchanged.
 pub(crate) fn with_decimal_point(cell: &str, commas: bool) -> Cow<'_, str> {
     if commas && has_decimal_comma(cell) {
         Cow::Owned(cell.replacen(',', ".", 1))
@@ -50,7 +49,7 @@ pub(crate) fn with_decimal_point(cell: &str, commas: bool) -> Cow<'_, str> {
     }
 }
 
-/// Whether a cell looks like a date or the time of a clock: `2024-03-01 10:00:00.5`, `10:00:00,5`.
+/// True if a cell looks like a date or a clock time: `2024-03-01 10:00:00.5`, `10:00:00,5`.
 pub(super) fn is_moment(cell: &str) -> bool {
     let parts = |marks: &[char]| {
         cell.split(marks)

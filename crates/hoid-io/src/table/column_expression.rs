@@ -1,8 +1,8 @@
-//! Which columns are the input and the output: `NAME`, `-NAME` or `NAME-NAME`.
+//! Selection of input and output: `NAME`, `-NAME` or `NAME-NAME`.
 //!
-//! Laboratories often record the target r and the output y of the controlled element and leave the
-//! tracking error `e = r - y` to the reader, or count the control with the other sign. A column
-//! whose name is the whole text wins, so that a name may hold a hyphen.
+//! Laboratories often record the target r and the output y of the controlled element and not the
+//! tracking error `e = r - y`, or use the opposite sign of the control. A column whose name is the
+//! whole text takes precedence, so that a name may contain a hyphen.
 
 use std::fmt;
 use std::str::FromStr;
@@ -10,8 +10,8 @@ use std::str::FromStr;
 use crate::IoError;
 use crate::wording::{did_you_mean, list};
 
-/// A column, its negative, or the difference of two columns. It is text until the columns of a file
-/// are known.
+/// A column, its negative, or the difference of two columns. It remains text until the columns of a
+/// file are known.
 ///
 /// ```
 /// let error: hoid_io::ColumnExpression = "r-y".parse()?;
@@ -32,7 +32,7 @@ pub(crate) enum Signal {
 }
 
 impl Signal {
-    /// The columns that it is made of.
+    /// The columns of the expression.
     pub(crate) fn columns(self) -> impl Iterator<Item = usize> {
         let (a, b) = match self {
             Self::Column(a) | Self::Negative(a) => (a, None),
@@ -43,12 +43,12 @@ impl Signal {
 }
 
 impl ColumnExpression {
-    /// The column of this name.
+    /// The column with this name.
     pub fn column(name: impl Into<String>) -> Self {
         Self { text: name.into() }
     }
 
-    /// Every text in it that may be the name of a column.
+    /// All parts of the text that may be the name of a column.
     pub(crate) fn terms(&self) -> Vec<&str> {
         let mut terms = vec![self.text.as_str()];
         terms.extend(self.text.strip_prefix('-'));
@@ -60,16 +60,16 @@ impl ColumnExpression {
         terms
     }
 
-    /// Whether it has a meaning among these columns.
+    /// True if the expression is valid for these columns.
     #[must_use]
     pub fn is_among(&self, names: &[&str]) -> bool {
         self.resolve(names, "").is_ok()
     }
 
-    /// The columns that it is made of, each with its sign and its place among `names`.
+    /// The columns of the expression, each with its sign and its index in `names`.
     ///
     /// # Errors
-    /// [`IoError`] where it has no meaning among them; `file` is what they are of.
+    /// [`IoError`] if the expression is not valid for them; `file` is their origin.
     pub fn signed_columns(&self, names: &[&str], file: &str) -> Result<Vec<(f64, usize)>, IoError> {
         Ok(match self.resolve(names, file)? {
             Signal::Column(one) => vec![(1.0, one)],
@@ -78,7 +78,7 @@ impl ColumnExpression {
         })
     }
 
-    /// The columns that are meant, among `names`.
+    /// Resolves the expression to columns of `names`.
     pub(crate) fn resolve(&self, names: &[&str], file: &str) -> Result<Signal, IoError> {
         let find = |name: &str| {
             let name = name.trim();
@@ -105,8 +105,8 @@ impl ColumnExpression {
         match (meanings.as_slice(), splits.as_slice()) {
             ([one], _) => Ok(*one),
             ([], splits) => {
-                // With one hyphen it is clear which of the two names is wrong; otherwise the text
-                // is named unchanged.
+                // With one hyphen it is clear which of the two names is wrong; otherwise the
+                // message quotes the text unchanged.
                 let parts = match splits {
                     [(left, right)] => vec![*left, *right],
                     _ => vec![self.text.strip_prefix('-').unwrap_or(&self.text)],
@@ -135,7 +135,7 @@ impl FromStr for ColumnExpression {
     type Err = IoError;
 
     /// # Errors
-    /// [`IoError::Expression`] when the text holds no name.
+    /// [`IoError::Expression`] if the text contains no name.
     fn from_str(text: &str) -> Result<Self, IoError> {
         let trimmed = text.trim();
         if trimmed.trim_matches(|c: char| c == '-' || c.is_whitespace()).is_empty() {
@@ -189,7 +189,7 @@ mod tests {
         assert_eq!(resolve("-stick-x").unwrap(), Signal::Negative(3));
         assert_eq!(resolve("stick-x-y").unwrap(), Signal::Difference(3, 2));
         assert_eq!(resolve("y - stick-x").unwrap(), Signal::Difference(2, 3));
-        // There is no column d, but r-d is one: the exact name wins.
+        // There is no column d, but r-d is one: the exact name takes precedence.
         assert_eq!(resolve("r-d").unwrap(), Signal::Column(5));
     }
 

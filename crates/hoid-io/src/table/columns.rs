@@ -1,8 +1,8 @@
-//! Columns of numbers as they are in a file, before anything is chosen, checked or repaired.
+//! Columns of numbers as stored in a file, before selection, checks and repair.
 //!
-//! Each format fills a [`Table`]; everything after it (choice of columns, sampling, repair) is the
-//! same for all formats. A value that is missing or no number is NaN here; the file is asked again
-//! what was there only when an error has to report it, which keeps a million rows cheap.
+//! Each format fills a [`Table`]; everything after it (selection of columns, sampling, repair) is
+//! the same for all formats. A value that is missing or not a number is NaN here; the file is
+//! consulted again only when an error message quotes the cell, so that a million rows are cheap.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -19,25 +19,25 @@ pub(crate) struct Column {
     pub(crate) name: String,
     /// Unit; empty when unknown.
     pub(crate) unit: String,
-    /// One value a row, NaN if there is no number.
+    /// One value per row, NaN if there is no number.
     pub(crate) values: Vec<f64>,
     /// Rows that hold text, in increasing order.
     pub(crate) texts: Vec<usize>,
-    /// Whether the values are moments of a clock, in s from the first.
+    /// True if the values are clock times, in s from the first.
     pub(crate) moments: bool,
-    /// How exactly the values are printed; only kept for the time.
+    /// Precision of the printed values; kept only for the time.
     pub(crate) precision: Precision,
 }
 
-/// Where the rows came from, for messages.
+/// Origin of the rows, for messages.
 pub(crate) trait Source {
     /// Name of the file.
     fn file(&self) -> &str;
     /// "line 12" or "row 12".
     fn place(&self, row: usize) -> String;
-    /// Contents of a cell, cut to a readable length.
+    /// Contents of a cell, shortened to a readable length.
     fn cell(&self, row: usize, column: usize) -> String;
-    /// Whether the file ends in the middle of this row, as far as can be seen.
+    /// True if the file appears to end in the middle of this row.
     fn is_open(&self, _row: usize) -> bool {
         false
     }
@@ -47,7 +47,7 @@ pub(crate) trait Source {
 pub(crate) struct Table<'a> {
     pub(crate) columns: Vec<Column>,
     pub(crate) rows: usize,
-    /// Sample time that the file states next to its columns, s.
+    /// Sample time stated in the file, s.
     pub(crate) sample_time_s: Option<f64>,
     pub(crate) source: Box<dyn Source + 'a>,
     pub(crate) notes: Vec<String>,
@@ -59,14 +59,14 @@ impl Table<'_> {
         self.columns.iter().map(|c| c.name.as_str()).collect()
     }
 
-    /// Whether no column has a number in a row, as in one of units.
+    /// True if no column has a number in a row, as in a row of units.
     pub(crate) fn has_no_number_in(&self, row: usize) -> bool {
         let has_none = |column: &Column| column.values.get(row).is_none_or(|value| value.is_nan());
         self.columns.iter().all(has_none)
     }
 
-    /// Why the value at `row` of a column, which is not finite, cannot be used. `rows` are the rows
-    /// in use.
+    /// Returns the reason why the value at `row` of a column, which is not finite, cannot be used.
+    /// `rows` are the rows in use.
     pub(crate) fn bad_value(&self, column: usize, row: usize, rows: Range<usize>) -> IoError {
         let Column {
             name, values, texts, ..
@@ -76,7 +76,7 @@ impl Table<'_> {
         let found = self.source.cell(row, column);
         let is_last_cell = column + 1 == self.columns.len();
         let column = named(name);
-        // At the end of a file that is cut a sign or a point is the start of a number.
+        // At the end of a truncated file a sign or a point is the start of a number.
         let begun = is_last_cell && self.source.is_open(row) && matches!(found.as_str(), "-" | ".");
         if begun || texts.binary_search(&row).is_ok() {
             let remedy = if has_decimal_comma(&found) {
@@ -125,7 +125,7 @@ impl Table<'_> {
 pub(crate) const UNITS_ROW: &str =
     "no column has a number there: where that line names the units, remove it and report them with --unit e=deg,u=deg";
 
-/// Checks that the names differ, and notes the columns without one.
+/// Checks that the names are unique, and notes the columns without one.
 pub(crate) fn check_names(names: &[String], file: &str, notes: &mut Vec<String>) -> Result<(), IoError> {
     check_number(names.len(), file)?;
     let mut known: HashMap<&str, usize> = HashMap::new();
@@ -144,10 +144,10 @@ pub(crate) fn check_names(names: &[String], file: &str, notes: &mut Vec<String>)
     Ok(())
 }
 
-/// Largest number of columns of a table: a recording has some tens.
+/// Maximum number of columns of a table; recordings have some tens.
 const MOST_COLUMNS: usize = 10_000;
 
-/// Checks the number of columns, before anything is made of them.
+/// Checks the number of columns before they are created.
 pub(crate) fn check_number(columns: usize, file: &str) -> Result<(), IoError> {
     if columns <= MOST_COLUMNS {
         return Ok(());
@@ -159,16 +159,16 @@ pub(crate) fn check_number(columns: usize, file: &str) -> Result<(), IoError> {
     })
 }
 
-/// Takes the units from the comments above a table, and gives the sample time that they state.
+/// Takes the units from the comments above a table, and returns the sample time that they state.
 pub(crate) fn asides<'a>(comments: impl Iterator<Item = &'a str>, columns: &mut [Column]) -> Option<f64> {
     let mut sample_time_s = None;
     for line in comments {
         let line = line.trim_start_matches('#').trim();
         if let Some(units) = line.strip_prefix("units:") {
-            // Of more parts than columns the rest names nothing.
+            // If there are more parts than columns, the rest is ignored.
             for part in units.split(',').take(columns.len()).map(str::trim) {
-                // A name or a unit may hold blanks: the column that fits with the longest name is
-                // the one.
+                // A name or a unit may contain blanks: the matching column with the longest name
+                // applies.
                 let unit_of = |column: &Column| {
                     let unit = part.strip_prefix(column.name.as_str())?;
                     unit.starts_with(char::is_whitespace).then(|| unit.trim().to_owned())
@@ -188,7 +188,7 @@ pub(crate) fn asides<'a>(comments: impl Iterator<Item = &'a str>, columns: &mut 
     sample_time_s
 }
 
-/// A table without some of its rows; messages still name the rows of the file.
+/// A table without some of its rows; messages still refer to the rows of the file.
 struct Kept<'a> {
     source: Box<dyn Source + 'a>,
     rows: Vec<usize>,

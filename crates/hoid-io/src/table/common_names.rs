@@ -1,9 +1,9 @@
-//! Error and control by the names that people give their columns.
+//! Error and control recognised by common column names.
 //!
-//! A column is meant whose whole name is a typical one, whatever its capitals; else the only one that has a common name
-//! as a word, as in `Tracking error`, `stick [V]` or `e (deg)`. A single letter counts as the first word alone.
+//! A column matches if its whole name is a typical one, regardless of case; otherwise the only one with a common name
+//! as a word, as in `Tracking error`, `stick [V]` or `e (deg)`. A single letter counts only as the first word.
 
-/// Names of the error, the most informative first.
+/// Names of the error, the most specific first.
 const ERRORS: [&str; 6] = ["e", "error", "err", "tracking_error", "tracking error", "e_t"];
 /// Names of the control.
 const CONTROLS: [&str; 8] = [
@@ -17,13 +17,13 @@ const CONTROLS: [&str; 8] = [
     "delta",
 ];
 
-/// The column that is the tracking error by its name.
+/// The column whose name denotes the tracking error.
 #[must_use]
 pub fn error_among<'a>(columns: &[&'a str]) -> Option<&'a str> {
     among(columns, &ERRORS)
 }
 
-/// The column that is the control by its name.
+/// The column whose name denotes the control.
 #[must_use]
 pub fn control_among<'a>(columns: &[&'a str]) -> Option<&'a str> {
     among(columns, &CONTROLS)

@@ -1,5 +1,5 @@
-//! The columns of a file of any format, before a record is made of them: what their cells mean, and
-//! which of them are requested.
+//! The columns of a file of any format, before they form a record: interpretation of the cells, and
+//! selection of the columns.
 //!
 //! | module | contents |
 //! |---|---|

@@ -1,19 +1,19 @@
-//! How exactly the numbers of a column are printed.
+//! Precision of the printed numbers of a column.
 
-/// Most decimals of rounded times that are searched for: a µs.
+/// Largest number of decimals searched for in rounded times: a µs.
 const MOST_DECIMALS: i32 = 6;
 
-/// How exactly a column of decimal numbers is printed.
+/// Precision with which a column of decimal numbers is printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Precision {
-    /// Most decimals of any value; `None` when the values were not printed.
+    /// Largest number of decimals of any value; `None` if the values were not printed.
     decimals: Option<i32>,
-    /// Most significant digits of any value.
+    /// Largest number of significant digits of any value.
     significant: i32,
 }
 
 impl Precision {
-    /// The value for binary numbers in single precision, seven digits.
+    /// Precision of binary numbers in single precision, seven digits.
     pub(crate) fn single() -> Self {
         Self {
             decimals: Some(45),
@@ -21,9 +21,10 @@ impl Precision {
         }
     }
 
-    /// The value for times in a file of binary numbers. A recorder that rounds its values, as to tenths of a ms, leaves
-    /// times that are all whole multiples of its last digit, and is known by that. The rest of a rounded number is
-    /// below two units of its last binary digit; as many digits as are searched for here leave no such rest by chance.
+    /// Precision of times in a file of binary numbers. If a recorder rounds its values, as to tenths of a ms, all times
+    /// are multiples of its last digit, by which the rounding is recognised. The remainder of a rounded number is below
+    /// two units of its last binary digit; with the number of digits searched for here no such remainder occurs by
+    /// chance.
     pub(crate) fn of_times(values: &[f64], single: bool) -> Self {
         if single {
             return Self::single();
@@ -39,12 +40,12 @@ impl Precision {
         }
     }
 
-    /// Takes one more printed number into account.
+    /// Takes another printed number into account.
     pub(crate) fn add(&mut self, text: &str) {
         self.add_bytes(text.trim().as_bytes());
     }
 
-    /// Takes one more printed number without blanks around it into account.
+    /// Takes another printed number without surrounding blanks into account.
     pub(crate) fn add_bytes(&mut self, text: &[u8]) {
         let (mut behind, mut significant, mut point) = (0, 0, false);
         let mut exponent = 0;
@@ -75,12 +76,12 @@ impl Precision {
         self.significant = self.significant.max(other.significant);
     }
 
-    /// Takes one more number with a given number of decimals into account.
+    /// Takes another number with the given number of decimals into account.
     pub(crate) fn add_decimals(&mut self, decimals: usize) {
         self.decimals = Some(self.decimals.unwrap_or(0).max(decimals as i32));
     }
 
-    /// The value for the same numbers times a power of ten.
+    /// Precision of the same numbers times a power of ten.
     pub(crate) fn shifted(self, power: i32) -> Self {
         Self {
             decimals: self.decimals.map(|decimals| decimals - power),
@@ -125,7 +126,7 @@ mod tests {
         assert_eq!(precision(&["0", "1", "120"]).unit(3.0), 1.0);
         assert!(precision(&["0.30000000000000004"]).unit(0.3) < 1e-15);
         assert_eq!(Precision::default().unit(3.0), 0.0);
-        // Nothing that can be in a file gives anything but a number of s.
+        // Any content of a file gives a number of s.
         assert!(precision(&["1e-99999999999", ".", "-", "e"]).unit(1e300) >= 0.0);
     }
 
@@ -139,7 +140,7 @@ mod tests {
         let exact: Vec<f64> = times(60.0).collect();
         assert_eq!(Precision::of_times(&exact, false).unit(45.0), 0.0);
         assert_eq!(Precision::of_times(&exact, true), Precision::single());
-        // A t with NaN is judged elsewhere.
+        // A t with NaN is handled elsewhere.
         assert_eq!(Precision::of_times(&[f64::NAN, 0.5], false).unit(1.0), 0.1);
     }
 }

@@ -1,4 +1,4 @@
-//! The time of a recording: which column it is, what its numbers mean, and whether it is even.
+//! The time of a recording: its column, its unit, and whether it is even.
 //!
 //! | module | contents |
 //! |---|---|

@@ -1,24 +1,24 @@
-//! Dates and times of a clock in text: `2024-03-05T10:11:12.020Z`, `05.03.2024 10:11:12,02`,
+//! Dates and clock times in text: `2024-03-05T10:11:12.020Z`, `05.03.2024 10:11:12,02`,
 //! `10:11:12.5`.
 //!
-//! A moment is counted in ns since 1970 (since midnight where there is no date), by the proleptic
+//! A clock time is counted in ns since 1970 (since midnight without a date), by the proleptic
 //! Gregorian calendar. Days are counted from 1 March, so that the leap day is the last of its year:
-//! with `y`, `m` moved so, `365 y + y/4 - y/100 + y/400 + (153 m + 2)/5 + d` (H. Hinnant,
-//! *chrono-compatible low-level date algorithms*).
+//! with `y`, `m` shifted in this way, `365 y + y/4 - y/100 + y/400 + (153 m + 2)/5 + d` (H.
+//! Hinnant, *chrono-compatible low-level date algorithms*).
 
 use crate::table::{Column, Precision};
 
 /// ns in a s.
 const NS_PER_S: i64 = 1_000_000_000;
 
-/// A moment and the digits after the point of its seconds.
+/// A clock time and the number of decimals of its seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Moment {
     ns: i64,
     decimals: usize,
 }
 
-/// The moment that a cell states; `None` if it is none. A date without a time is one of midnight.
+/// Parses a cell as a clock time; `None` if it is not one. A date without a time is midnight.
 fn parse(cell: &str) -> Option<Moment> {
     let cell = cell.trim();
     if !cell.starts_with(|c: char| c.is_ascii_digit()) || cell.len() > 40 {
@@ -38,20 +38,20 @@ fn parse(cell: &str) -> Option<Moment> {
     })
 }
 
-/// Definition of the texts of a column, row by row: moments as long as none is anything else.
+/// Interpretation of the texts of a column, row by row: clock times unless a cell is anything else.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum Moments {
     /// Only missing values so far.
     #[default]
     Unknown,
-    /// Moments, counted from the first, which is kept in ns.
+    /// Clock times, counted from the first, which is kept in ns.
     From(i64),
     /// Numbers, or texts.
     No,
 }
 
 impl Moments {
-    /// Takes a cell that is text, and puts its reliability after the values of its column.
+    /// Takes a text cell, and appends its value to the column.
     pub(crate) fn push(&mut self, column: &mut Column, cell: &str) {
         let moment = parse(cell).filter(|_| *self != Self::No);
         let row = column.values.len();
@@ -72,7 +72,7 @@ impl Moments {
         column.values.push(seconds(ns, first));
     }
 
-    /// A number in the column: what looked like moments is text.
+    /// The column contains a number: apparent clock times are text.
     pub(crate) fn refuse(&mut self, column: &mut Column) {
         if let Self::From(_) = std::mem::replace(self, Self::No) {
             column.moments = false;
@@ -87,7 +87,7 @@ impl Moments {
     }
 }
 
-/// s between two moments.
+/// Time between two clock times, s.
 pub(crate) fn seconds(ns: i64, from: i64) -> f64 {
     // Exact below 2^53 ns, a hundred days.
     (i128::from(ns) - i128::from(from)) as f64 / NS_PER_S as f64
@@ -102,7 +102,7 @@ fn days_of(date: &str) -> Option<i64> {
     let (year, month, day) = match mark {
         '.' => (c, b, a),
         _ if a.len() == 4 => (a, b, c),
-        // Month or day first: which one is not known, and it does not matter within a day.
+        // Month or day first: the order is not known, and does not matter within a day.
         _ => (c, a, b),
     };
     let (year, month, day) = (year.len() == 4).then_some((number(year)?, number(month)?, number(day)?))?;
@@ -125,7 +125,7 @@ fn days_of(date: &str) -> Option<i64> {
     Some(of_years + (153 * month + 2) / 5 + day - 1 - 719_468)
 }
 
-/// ns since midnight UTC, and decimals: `10:11:12.5`, with `Z` or `+02:00` behind, AM or PM.
+/// ns since midnight UTC, and decimals: `10:11:12.5`, optionally followed by `Z`, `+02:00`, AM or PM.
 fn time_of_day(text: &str) -> Option<(i64, usize)> {
     let (text, half_day) = match text.rsplit_once(' ') {
         Some((text, half)) if half.eq_ignore_ascii_case("pm") => (text, Some(12)),

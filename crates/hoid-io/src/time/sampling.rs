@@ -1,19 +1,19 @@
-//! The sampling that a column t states, and whether it is even.
+//! The sampling given by a column t, and whether it is even.
 //!
 //! `Ts = (t_last - t_first) / (N - 1)`, and each t must lie on the grid `t_first + k Ts` within the
 //! larger of `1e-3 Ts` and one unit of the last printed decimal of t: files print t rounded (0.0167
-//! at 60 Hz), and a rounded t is not an uneven one. When `1 / Ts` is a whole number of Hz within
-//! `1e-4`, or within the rounding of t, it is taken as that number, so that runs of one laboratory
-//! have one sample time.
+//! at 60 Hz), and a rounded t is not uneven. If `1 / Ts` is a whole number of Hz within `1e-4`, or
+//! within the rounding of t, that number is used, so that all runs of a laboratory have the same
+//! sample time.
 
 use crate::table::Precision;
 
 /// Largest deviation from the even grid, in sample times.
 const JITTER: f64 = 1e-3;
-/// Largest relative distance from a whole number of Hz that is taken as that number.
+/// Largest relative deviation from a whole number of Hz that is rounded to it.
 const WHOLE_HZ: f64 = 1e-4;
 
-/// Why the sampling is not even. Rows count from the first in use.
+/// Reason why the sampling is not even. Rows count from the first in use.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Uneven {
     TooFew,
@@ -34,15 +34,15 @@ pub(crate) enum Uneven {
     },
 }
 
-/// A sample time, and the words about it when it was not simply read.
+/// A sample time, and a note if it was not simply read.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sampling {
     pub(crate) sample_time_s: f64,
     pub(crate) note: Option<String>,
 }
 
-/// The sample time in s of even times that come from no file, by the rules of files: their rounding is
-/// found in them.
+/// Returns the sample time of even times that come from no file, in s, by the rules of files: their
+/// rounding is detected.
 ///
 /// # Errors
 /// The row, counted from 0, at which they are not even.
@@ -55,8 +55,7 @@ pub fn even_times(t: &[f64]) -> Result<f64, usize> {
     }
 }
 
-/// The sample time of an even t. A sample time that the file states next to its columns counts when
-/// t agrees with it.
+/// The sample time of an even t. A sample time stated in the file is used if t agrees with it.
 pub(crate) fn even(t: &[f64], precision: Precision, stated_s: Option<f64>) -> Result<Sampling, Uneven> {
     let (&[first, .., last], steps) = (t, t.len().saturating_sub(1) as f64) else {
         return match stated_s {
@@ -111,7 +110,7 @@ pub(crate) fn even(t: &[f64], precision: Precision, stated_s: Option<f64>) -> Re
     Ok(Sampling { sample_time_s, note })
 }
 
-/// The sample time to resample an uneven t to: that of its typical step.
+/// The sample time for resampling an uneven t: that of its typical step.
 pub(crate) fn typical(t: &[f64], precision: Precision) -> Result<f64, Uneven> {
     let &[first, .., last] = t else {
         return Err(Uneven::TooFew);
@@ -131,7 +130,7 @@ fn increasing(t: &[f64]) -> Result<(), Uneven> {
     }
 }
 
-/// How far rounding may move a printed t.
+/// Largest rounding error of a printed t.
 #[derive(Clone, Copy)]
 struct Rounding {
     precision: Precision,
@@ -148,8 +147,8 @@ impl Rounding {
         }
     }
 
-    /// One unit of the last digit of t, but no more than the median step: a t coarser than that
-    /// would have stayed constant.
+    /// One unit of the last digit of t, but at most the median step: a coarser t would have been
+    /// constant.
     fn unit(self, t: f64) -> f64 {
         self.precision.unit(t).min(self.median_step_s)
     }
@@ -167,9 +166,9 @@ fn typical_step(t: &[f64], rounding: Rounding) -> f64 {
     if count == 0 { median } else { sum / count as f64 }
 }
 
-/// Where samples are missing. Rounding makes steps of one unit more than the sample time, as in
-/// 0.00, 0.02, 0.03 at 60 Hz, but not of a whole unit more where the sample time is itself a
-/// multiple of the unit.
+/// Detects missing samples. Rounding makes steps longer than the sample time by one unit, as in
+/// 0.00, 0.02, 0.03 at 60 Hz, but not by a whole unit if the sample time is itself a multiple of
+/// the unit.
 fn gap(t: &[f64], rounding: Rounding, typical_s: f64) -> Result<(), Uneven> {
     let is_gap = |k: &usize| {
         let step = t[k + 1] - t[*k];
@@ -185,8 +184,8 @@ fn gap(t: &[f64], rounding: Rounding, typical_s: f64) -> Result<(), Uneven> {
     })
 }
 
-/// `ts`, or the sample time of the whole number of Hz near it; `slack_s` is the uncertainty of `ts`
-/// from the rounding of t.
+/// `ts`, or the sample time of the nearest whole number of Hz; `slack_s` is the uncertainty of `ts`
+/// due to the rounding of t.
 fn whole_hz(ts: f64, slack_s: f64) -> f64 {
     let frequency = (1.0 / ts).round();
     let near = (1.0 / ts - frequency).abs() <= WHOLE_HZ * frequency || (1.0 / frequency - ts).abs() <= slack_s;
@@ -247,7 +246,7 @@ mod tests {
                 }
             }
         }
-        // Steps of 0.01 and 0.02 by turns.
+        // Alternating steps of 0.01 and 0.02.
         let (t, precision) = printed(grid(2000, 0.0, 1.0 / 60.0), 2);
         assert_eq!(even(&t, precision, None).unwrap().sample_time_s, 1.0 / 60.0);
     }
@@ -259,7 +258,7 @@ mod tests {
         assert!((ts - 0.0125 / 0.79).abs() < 1e-12);
         let (t, precision) = printed(grid(100, 0.0, 2.0), 0);
         assert_eq!(even(&t, precision, None).unwrap().sample_time_s, 2.0);
-        // 99.995 Hz is taken as 100 Hz, but not in silence.
+        // 99.995 Hz is rounded to 100 Hz, with a note.
         let (t, precision) = printed(grid(8000, 0.0, 1.0 / 99.995), 9);
         let sampling = even(&t, precision, None).unwrap();
         assert_eq!(sampling.sample_time_s, 0.01);
@@ -298,7 +297,7 @@ mod tests {
             assert_eq!((row, missing, gaps), (399, 1, 2), "{decimals} decimals");
             assert!((sample_time_s - 0.01).abs() < 1e-4);
         }
-        // Counts in place of s.
+        // Counts instead of s.
         let (mut t, precision) = printed(grid(50, 0.0, 1.0), 0);
         t.remove(20);
         assert!(matches!(

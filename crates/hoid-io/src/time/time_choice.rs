@@ -1,20 +1,20 @@
-//! Which column is the time, and its unit, as a person types them: `clock:ms`.
+//! Selection of the time column and its unit by the user: `clock:ms`.
 
 use std::fmt;
 use std::str::FromStr;
 
 use crate::IoError;
 
-/// The unit of a time.
+/// Unit of a time column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Unit {
     /// Seconds, times a power of ten.
     Power(i32),
     Minutes,
     Hours,
-    /// Dates and times of a clock.
+    /// Dates and clock times.
     Iso,
-    /// Whole seconds, and nanoseconds in a column alongside.
+    /// Whole seconds, with nanoseconds in another column.
     SecondsAndNanoseconds,
 }
 
@@ -49,7 +49,7 @@ impl fmt::Display for Unit {
     }
 }
 
-/// Which column is the time, and its unit: `COLUMN`, `COLUMN:UNIT`, or `SECONDS+NANOSECONDS`.
+/// The time column and its unit: `COLUMN`, `COLUMN:UNIT`, or `SECONDS+NANOSECONDS`.
 ///
 /// ```
 /// let time: hoid_io::TimeChoice = "clock:ms".parse()?;
@@ -76,7 +76,7 @@ impl FromStr for TimeChoice {
         let (column, unit) = match text.rsplit_once(':') {
             Some((column, unit)) => match Unit::of(unit.trim()) {
                 Some(unit) => (column.trim(), Some(unit)),
-                // MATLAB and numpy have colons in the names of lines: `ans(1,:)`.
+                // MATLAB and numpy names of lines contain colons: `ans(1,:)`.
                 None if unit.starts_with([')', ',', ']']) => (text, None),
                 None => {
                     return Err(refuse(

@@ -1,28 +1,28 @@
-//! The time under the name and in the unit that a recorder gives it.
+//! The time column under the name and in the unit of a recorder.
 //!
-//! The time is the column t, in s. Where no column is called so, the first of these takes its place:
-//! 1. the only one that is called a time, with or without a unit: `Time (s)`, `Zeit [s]`, `time_ns`,
-//!    `elapsed`, `%time`;
-//! 2. the only one that holds stamps: dates and times of a clock in text or as such, or numbers that
+//! The time is the column t, in s. If there is no such column, the first of these is used:
+//! 1. the only one whose name denotes a time, with or without a unit: `Time (s)`, `Zeit [s]`,
+//!    `time_ns`, `elapsed`, `%time`;
+//! 2. the only one with time stamps: dates and clock times in text or as a type, or numbers that
 //!    count from 1970 in a column `timestamp`, `header.stamp`;
 //! 3. whole seconds with nanoseconds in the next column: `stamp.sec`, `stamp.nanosec`;
 //! 4. a first column without a name, or the first line of a matrix, that increases from row to row and is not a row
 //!    number.
 //!
-//! `--time COLUMN[:unit]` wins over all of them. A unit is that of the name; else that of the size of numbers that
-//! count from 1970 (1e11 s would be the year 5138); else that of the steps: whole numbers at least 5 apart are not s
-//! but the unit in which 2 to 2000 of them are in a second. What is taken is reported.
+//! `--time COLUMN[:unit]` takes precedence. The unit is that of the name; otherwise it follows from the size of numbers
+//! that count from 1970 (1e11 s would be the year 5138); otherwise from the steps: integers at least 5 apart are not s
+//! but the unit of which 2 to 2000 steps make a second. The choice is reported.
 
 use super::time_choice::{TimeChoice, Unit};
 use crate::IoError;
 use crate::table::{Column, Precision, Table};
 use crate::wording::{did_you_mean, list, named, shown};
 
-/// Numbers from here on that are called a stamp count from 1970: 1e8 s is in 1973.
+/// Numbers in a time stamp column above this limit count from 1970: 1e8 s is in 1973.
 const STAMP: f64 = 1e8;
-/// The smallest step of whole numbers that is none of s.
+/// Smallest step of integers that are not in s.
 const STEP_OF_NO_SECONDS: f64 = 5.0;
-/// Most samples in a second by which a unit is known from its steps.
+/// Largest sampling frequency for which a unit follows from the steps, Hz.
 const MOST_HZ: f64 = 2000.0;
 
 /// Words for the time.
@@ -37,10 +37,10 @@ const WORDS: [&str; 9] = [
     "elapsed time",
     "elapsedtime",
 ];
-/// Words for a moment, which may as well be the time of day, or a count.
+/// Words for a time stamp, which may also be the time of day, or a count.
 const STAMPS: [&str; 5] = ["timestamp", "stamp", "datetime", "date time", "date"];
 
-/// Statement of a name about a column.
+/// Role of a column according to its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum ColumnRole {
     Time(Option<Unit>),
@@ -67,12 +67,12 @@ fn column_role(name: &str) -> ColumnRole {
     }
 }
 
-/// Whether the values of a column may become the time.
+/// True if the values of a column may become the time.
 pub(crate) fn is_time(name: &str) -> bool {
     column_role(name) != ColumnRole::Other
 }
 
-/// The table with a column t in s, where it has one column that is a time or was named as such.
+/// The table with a column t in s, if a column is a time or was selected as such.
 pub(crate) fn with_time<'a>(mut table: Table<'a>, choice: Option<&TimeChoice>) -> Result<Table<'a>, IoError> {
     let found = match choice {
         Some(choice) => Some(chosen(&table, choice)?),
@@ -86,7 +86,7 @@ pub(crate) fn with_time<'a>(mut table: Table<'a>, choice: Option<&TimeChoice>) -
     if let Some((at, unit)) = found {
         take(&mut table, at, unit);
     }
-    // Moments that are not the time are not numbers.
+    // Clock times that are not the time are not numbers.
     for column in table.columns.iter_mut().filter(|column| column.moments) {
         column.values.fill(f64::NAN);
         column.texts = (0..table.rows).collect();
@@ -94,7 +94,7 @@ pub(crate) fn with_time<'a>(mut table: Table<'a>, choice: Option<&TimeChoice>) -
     Ok(table)
 }
 
-/// The column that was requested.
+/// The selected column.
 fn chosen(table: &Table<'_>, choice: &TimeChoice) -> Result<(usize, Option<Unit>), IoError> {
     let position = |name: &str| table.columns.iter().position(|column| column.name == name);
     let unit = choice.unit;
@@ -126,12 +126,12 @@ fn chosen(table: &Table<'_>, choice: &TimeChoice) -> Result<(usize, Option<Unit>
     })
 }
 
-/// The only one of some columns.
+/// The only one of some columns; none if there are several.
 fn only(mut columns: impl Iterator<Item = usize>) -> Option<usize> {
     columns.next().filter(|_| columns.next().is_none())
 }
 
-/// The column that is the time by its name, type or place.
+/// The column that is the time by its name, type or position.
 fn found(table: &Table<'_>) -> Option<(usize, Option<Unit>)> {
     let columns = &table.columns;
     let is_constant = |column: &Column| column.values.iter().all(|value| *value == column.values[0]);
@@ -176,7 +176,7 @@ fn nanoseconds_of(table: &Table<'_>, at: usize) -> Option<usize> {
     }))
 }
 
-/// A first column without a name, or the first line of a matrix, that runs as a time does.
+/// A first column without a name, or the first line of a matrix, that increases like a time.
 fn first_line(table: &Table<'_>) -> Option<usize> {
     let is_first = |(at, column): (usize, &Column)| {
         let line = ["(1,:)", "(:,1)", "[0,:]", "[:,0]", "[0]"];
@@ -189,7 +189,7 @@ fn first_line(table: &Table<'_>) -> Option<usize> {
     (values.len() > 2 && rises && !counts && values.iter().all(|value| value.is_finite())).then_some(first)
 }
 
-/// The unit in which numbers without one count.
+/// The unit of numbers without a stated one.
 fn unit_of(values: &[f64]) -> Unit {
     let first = values.iter().copied().find(|value| value.is_finite()).unwrap_or(0.0);
     match first {

@@ -1,12 +1,12 @@
 //! Files that tests write and read.
-// Each file of tests uses its own part of this.
+// Each test file uses a part of this module.
 #![allow(dead_code, clippy::unwrap_used)]
 
 use std::{fs, path::PathBuf};
 
 use hoid_io::{IoError, ReadOptions, ReadRecord, read_record};
 
-/// A folder of its own, gone with the test.
+/// A temporary folder, removed after the test.
 pub struct Desk {
     pub dir: tempfile::TempDir,
 }
@@ -29,7 +29,7 @@ impl Desk {
         read_record(&path, options)
     }
 
-    /// Report about a file with this text, which must name it.
+    /// The error for a file with this text, which must name it.
     pub fn error(&self, text: impl AsRef<[u8]>, options: &ReadOptions) -> String {
         let message = self.read(text, options).unwrap_err().to_string();
         assert!(message.contains("run.csv"), "{message}");
@@ -37,7 +37,7 @@ impl Desk {
     }
 }
 
-/// Input and output by these expressions.
+/// Options with input and output given by these expressions.
 pub fn options(input: &str, output: &str) -> ReadOptions {
     ReadOptions {
         input: Some(input.parse().unwrap()),

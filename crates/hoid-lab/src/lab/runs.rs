@@ -1,4 +1,4 @@
-//! A run as the server has it: sent, started, taken batch by batch, ended.
+//! A run on the server: sent, started, received in batches, ended.
 
 use std::{collections::BTreeMap, sync::Arc, thread};
 
@@ -84,7 +84,7 @@ impl Shared {
         let Some(Ready { planned, task, .. }) = ready else {
             return Err(LabError::Order(format!("run {number} was not asked for")));
         };
-        // Until the log is there.
+        // Until the log exists.
         state.over = Some(number);
         let session = session_of(state)?;
         let plan = &session.facts.plan[planned];
@@ -135,7 +135,7 @@ impl Shared {
         state.running(number)?;
         let Some(run) = &mut state.run else { return Ok(()) };
         run.log.continued_by(batch)?;
-        // First the estimate, which is waited for; the disk may take its time.
+        // First the estimate, which is awaited; the disk may take its time.
         let first = batch.first.next_multiple_of(TICKS_PER_SAMPLE) - batch.first;
         let samples = (first..batch.u.len().min(batch.e.len()))
             .step_by(TICKS_PER_SAMPLE)
@@ -146,19 +146,19 @@ impl Shared {
             });
         let samples: Samples = samples.collect();
         if let (Some(live), false) = (&run.live, samples.is_empty()) {
-            // An estimate that ended early is seen by the lines that lack.
+            // An estimate that ended early is recognised by its missing lines.
             let _ = live.send(samples);
         }
         let refused = match run.log.append(batch) {
             Err(error @ LabError::File { .. }) => not_taken(error),
             other => return other,
         };
-        // What the disk does not take now is closed when the session is opened again.
+        // If the disk is full now, the run is closed when the session is opened again.
         let _ = self.end_run(state, How::Interrupted, BTreeMap::new());
         Err(refused)
     }
 
-    /// Ends a run that has all its ticks.
+    /// Ends a run with all its ticks.
     pub(super) fn finish(
         self: &Arc<Self>,
         state: &mut Current,
@@ -184,7 +184,7 @@ impl Shared {
         Ok(())
     }
 
-    /// Ends the run that continues, if one does.
+    /// Ends the current run, if there is one.
     pub(super) fn end_run(
         &self,
         state: &mut Current,
@@ -204,7 +204,7 @@ impl Shared {
         Ok(())
     }
 
-    /// Writes the end of a run: first its record, so that a run that was reported as verified has one.
+    /// Writes the end of a run: first its record, so that every run reported as verified has one.
     fn close(
         &self,
         state: &mut Current,
@@ -232,7 +232,7 @@ impl Shared {
         Ok(Some(checked.measures))
     }
 
-    /// Makes the pages about the session, on a thread of its own.
+    /// Creates the pages about the session, on a thread of its own.
     pub(super) fn report(self: &Arc<Self>, state: &mut Current) {
         let (Some(program), Some(session)) = (&self.program, &state.session) else {
             return;
@@ -257,7 +257,7 @@ impl Shared {
     }
 }
 
-/// A run that cannot be written cannot be verified: it ends, and the session continues.
+/// Error for a run that cannot be written and therefore cannot be verified: it ends, and the session continues.
 fn not_taken(error: LabError) -> LabError {
     let what = match &error {
         LabError::File { file, source } => format!("{file}: {source}"),

@@ -1,4 +1,4 @@
-//! Report of the pages are: the state of the session, and the live estimate.
+//! Messages to the pages: the state of the session, and the live estimate.
 
 use std::path::{Path, PathBuf};
 
@@ -13,15 +13,15 @@ use crate::{
 };
 
 impl Shared {
-    /// Sends to the pages that `wants` picks.
+    /// Sends to the pages that `wants` selects.
     pub(super) fn tell(&self, message: &ToPage<'_>, wants: impl Fn(u64, &Page) -> bool) {
-        // Everything that is reported can be written as JSON.
+        // All messages can be written as JSON.
         let Ok(text) = serde_json::to_string(message) else {
             return;
         };
         for (id, page) in &*self.pages() {
             if wants(*id, page) {
-                // A page that is gone leaves by itself.
+                // A closed page leaves by itself.
                 let _ = page.sender.send(Outgoing::Text(text.clone()));
             }
         }
@@ -96,7 +96,7 @@ impl Shared {
     }
 }
 
-/// The runs with the verdicts that their files deserve now.
+/// The runs with verdicts from the present state of their files.
 fn judged_again(session: &Session) -> Vec<Done> {
     let again = |done: &Done| {
         let checked = check(&session.stem(&done.condition, done.number));

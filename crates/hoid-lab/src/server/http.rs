@@ -1,13 +1,13 @@
-//! The head of a request, and replies.
+//! Heads of requests, and replies.
 
 use std::{
     io::{self, Write as _},
     net::TcpStream,
 };
 
-/// Longest head of a request, bytes.
+/// Maximum length of a head, bytes.
 const LONGEST: usize = 16 * 1024;
-/// Largest number of lines of a head.
+/// Maximum number of lines of a head.
 const MOST_LINES: usize = 64;
 
 /// The used parts of a request.
@@ -23,7 +23,7 @@ pub struct Request {
 }
 
 impl Request {
-    /// The request of a head as far as it has come, or why it is none; nothing while there may be more of it.
+    /// Parses the received part of a head: the request, or the refusal; nothing while the head is incomplete.
     pub fn of(head: &[u8]) -> Option<Result<Self, Reply>> {
         if !head.windows(4).any(|four| four == b"\r\n\r\n") {
             let long = head.len() > LONGEST;
@@ -32,7 +32,7 @@ impl Request {
         Some(Self::parse(head).ok_or_else(|| Reply::refused(400, "not a request of HTTP")))
     }
 
-    /// The token that it shows, and the path after it.
+    /// The token, and the path after it.
     pub fn token(&self) -> (&str, &str) {
         let path = self.path.trim_start_matches('/');
         path.split_once('/').unwrap_or((&self.path, ""))
@@ -46,7 +46,7 @@ impl Request {
         }
         let path = parsed.path?.split('?').next()?.to_owned();
         let method = parsed.method?.to_owned();
-        // A header that is duplicated belongs to no person honest one.
+        // An honest client does not duplicate a header.
         let header = |name: &str| {
             let mut all = parsed.headers.iter().filter(|h| h.name.eq_ignore_ascii_case(name));
             let value = std::str::from_utf8(all.next()?.value).ok()?.trim().to_owned();
@@ -70,7 +70,7 @@ pub struct Reply {
     status: u16,
     kind: &'static str,
     policy: String,
-    /// Where else it is.
+    /// New location.
     location: Option<String>,
     body: Vec<u8>,
 }
@@ -110,7 +110,7 @@ impl Reply {
         }
     }
 
-    /// It is elsewhere.
+    /// A redirection.
     pub fn moved(address: &str) -> Self {
         Self {
             location: Some(address.to_owned()),
@@ -118,7 +118,7 @@ impl Reply {
         }
     }
 
-    /// Writes it; the connection ends with it.
+    /// Writes the reply; the connection ends after it.
     pub fn write(&self, stream: &mut TcpStream) -> io::Result<()> {
         let reason = match self.status {
             200 => "OK",
@@ -133,7 +133,7 @@ impl Reply {
             _ => "Internal Server Error",
         };
         let location = (self.location.as_ref()).map_or_else(String::new, |to| format!("Location: {to}\r\n"));
-        // Isolation from other origins gives the page the fine clock.
+        // Isolation from other origins gives the page a precise clock.
         let head = format!(
             "HTTP/1.1 {} {reason}\r\n{location}Content-Type: {}\r\nContent-Length: {}\r\nConnection: close\r\n\
              Cache-Control: no-store\r\nContent-Security-Policy: {}\r\nCross-Origin-Opener-Policy: same-origin\r\n\

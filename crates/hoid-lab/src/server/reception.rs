@@ -1,9 +1,9 @@
-//! Those who have not shown the token: one thread for all of them, that never waits for any.
+//! Clients that have not presented the token: one thread for all of them, which never waits for any.
 //!
-//! While there are none it waits for the next one. Else it takes what comes, looks at each once (a head that is whole,
-//! one that is too long or too late, a peer that is gone), and pauses for [`PAUSE`] where nothing has happened. Who has
-//! come is examined before anyone gives way: so the page, whose head comes at once, is heard however many others come
-//! and go, and the oldest of [`MOST`] that carry no information is closed for the next.
+//! While there are none it waits for the next one. Otherwise it accepts connections, examines each once (a complete
+//! head, one that is too long or too late, a closed peer), and pauses for [`PAUSE`] if nothing has happened. New
+//! connections are examined before any is closed: so the page, whose head arrives at once, is served however many
+//! others connect, and the oldest of [`MOST`] incomplete ones is closed for the next.
 
 use std::{
     collections::VecDeque,
@@ -15,23 +15,23 @@ use std::{
 
 use super::http::{Reply, Request};
 
-/// Most of them at once, and those that are taken before all are examined.
+/// Maximum number of them, and of those accepted before all are examined.
 const MOST: usize = 256;
 const AT_ONCE: usize = 64;
-/// Longest time that the head of a request may take to come, all of it.
+/// Timeout of a complete head.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// Pause where nothing happens, and where the system gives no connection.
+/// Pause if nothing happens, or if the system provides no connection.
 const PAUSE: Duration = Duration::from_millis(1);
 const BACK_OFF: Duration = Duration::from_millis(50);
 
-/// A connection whose head is not whole.
+/// A connection with an incomplete head.
 struct Stranger {
     stream: TcpStream,
     head: Vec<u8>,
     came: Instant,
 }
 
-/// Known properties of a stranger after a look.
+/// State of a stranger after an examination.
 enum Look {
     Waits,
     Gone,
@@ -60,13 +60,13 @@ impl Stranger {
     }
 }
 
-/// Receives for as long as the program runs; `admitted` takes a request with its connection, or gives the reason not.
+/// Accepts connections while the program runs; `admitted` takes a request with its connection, or returns the refusal.
 pub fn receive(listener: &TcpListener, mut admitted: impl FnMut(Request, TcpStream) -> Result<(), (Reply, TcpStream)>) {
     let mut all: VecDeque<Stranger> = VecDeque::new();
     loop {
         let mut idle = match take(listener, &mut all) {
             Ok(came) => came == 0,
-            // No descriptor is left: who carries no information makes room.
+            // No descriptor is left: an incomplete connection is closed.
             Err(_) => {
                 drop(all.pop_front());
                 thread::sleep(BACK_OFF);
@@ -90,7 +90,7 @@ pub fn receive(listener: &TcpListener, mut admitted: impl FnMut(Request, TcpStre
                 Err(reply) => Some((reply, stream)),
             };
             if let Some((reply, mut stream)) = refused {
-                // It is shorter than what a connection holds; who does not take it needs none.
+                // It fits into the send buffer; a client that does not read it needs none.
                 let _ = reply.write(&mut stream);
             }
         }
@@ -104,7 +104,7 @@ pub fn receive(listener: &TcpListener, mut admitted: impl FnMut(Request, TcpStre
     }
 }
 
-/// Takes those who have come; waits for one where there are none.
+/// Accepts waiting connections; waits for one if there are none.
 fn take(listener: &TcpListener, all: &mut VecDeque<Stranger>) -> io::Result<usize> {
     let first = all.is_empty();
     listener.set_nonblocking(!first)?;
@@ -112,7 +112,7 @@ fn take(listener: &TcpListener, all: &mut VecDeque<Stranger>) -> io::Result<usiz
         let stream = match listener.accept() {
             Ok((stream, _)) => stream,
             Err(error) if error.kind() == ErrorKind::WouldBlock => return Ok(came),
-            // A peer that is gone already.
+            // A peer that is already closed.
             Err(error) if matches!(error.kind(), ErrorKind::ConnectionAborted | ErrorKind::Interrupted) => continue,
             Err(error) => return Err(error),
         };

@@ -1,5 +1,5 @@
-//! The socket of a page: what it reports goes to the lab, what the lab reports goes to it. One
-//! thread does both: it waits for the page a hundredth of a second at a time.
+//! The socket of a page: messages of the page go to the lab, and those of the lab to the page. One
+//! thread does both: it waits for the page for a hundredth of a second at a time.
 
 use std::{
     io::{ErrorKind, Write as _},
@@ -65,13 +65,13 @@ pub fn run(mut stream: TcpStream, key: &str, lab: &Lab) {
                 elsewhere: false,
             };
             let told = serde_json::to_string(&words).map(|text| socket.send(Message::text(text)));
-            // A page that does not keep to the rules is not of this program.
+            // A page that violates the protocol is not part of this program.
             if matches!(error, LabError::Message(_)) || !matches!(told, Ok(Ok(()))) {
                 break;
             }
         }
     }
-    // First: a page that sees its connection closed, and comes back, finds its run ended.
+    // First: a page that reconnects after its connection closed finds its run ended.
     lab.leave(id);
     let _ = socket.close(None);
     let _ = socket.flush();

@@ -1,4 +1,4 @@
-//! The names of files and folders of a session, as BIDS has them where it has them.
+//! Names of the files and folders of a session, following BIDS where it defines them.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ pub fn session_folder(out: &Path, subject: &str, session: usize) -> PathBuf {
     out.join(format!("sub-{subject}")).join(format!("ses-{session:02}"))
 }
 
-/// A pseudonym: 1 to 20 letters and digits.
+/// Checks a pseudonym: 1 to 20 letters and digits.
 ///
 /// # Errors
 /// [`LabError::Order`].
@@ -24,7 +24,7 @@ pub(super) fn check_subject(subject: &str) -> Result<(), LabError> {
     )))
 }
 
-/// Common start of the names of all files of a run.
+/// Common prefix of the file names of a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Stem {
     folder: PathBuf,
@@ -45,7 +45,7 @@ impl Stem {
         &self.stem
     }
 
-    /// One of its files, as `ticks.csv`.
+    /// Path of one of its files, such as `ticks.csv`.
     pub fn file(&self, end: &str) -> PathBuf {
         self.folder.join(format!("{}_{end}", self.stem))
     }
@@ -55,7 +55,7 @@ impl Stem {
         self.folder.join("reports").join(&self.stem)
     }
 
-    /// All runs of a folder that have started, by their number.
+    /// All started runs of a folder, by their number.
     ///
     /// # Errors
     /// [`LabError::Io`].

@@ -1,13 +1,14 @@
 //! Journal of a run in progress: each line is complete or absent.
 //!
-//! A line is whole with its end. A batch that cannot be written to its end is taken back: the files
-//! are cut to the last whole batch, and its ticks count only once all three have them. A disk that
-//! is full for a moment therefore leaves no half of a line in front of later ones; the run is ended,
-//! and *unverified*. What a power cut leaves is cut to the last whole line when it is read.
+//! A line is complete with its line end. A batch that cannot be written completely is undone: the
+//! files are cut to the last complete batch, and its ticks count only once all three files have
+//! them. A temporarily full disk therefore leaves no partial line before later ones; the run is
+//! ended, and *unverified*. After a power cut the files are cut to the last complete line when they
+//! are read.
 //!
-//! A batch is handed to the system when it comes, so that a server that is killed loses nothing of
-//! it, and to the disk at least each second, so that a computer that stops loses no more. Numbers are
-//! written with the digits that give the same bits back.
+//! A batch is passed to the system when it arrives, so that a killed server loses nothing of it,
+//! and to the disk at least every second, which limits the loss if the computer stops. Numbers are
+//! written with the digits that reproduce the same bits.
 
 use std::{
     fs::{File, OpenOptions},
@@ -21,20 +22,20 @@ use serde::Deserialize;
 use super::{folder::Stem, run_start::APPENDED};
 use crate::LabError;
 
-/// Longest time until the disk has what was appended.
+/// Maximum time until appended data are on the disk.
 const SYNC: Duration = Duration::from_millis(900);
 
 /// An input event.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(from = "(f64, f64, f64, f64)")]
 pub struct Event {
-    /// The first tick that takes it.
+    /// The first tick at which it takes effect.
     pub tick: f64,
     /// Its own time stamp, ms from tick 0.
     pub stamp_ms: f64,
-    /// When the page had it, ms from tick 0.
+    /// Time at which the page received it, ms from tick 0.
     pub handled_ms: f64,
-    /// Report of the device.
+    /// Value of the device.
     pub raw: f64,
 }
 
@@ -55,11 +56,11 @@ impl From<(f64, f64, f64, f64)> for Event {
 pub struct Frame {
     /// The browser's time of the frame, ms from tick 0.
     pub frame_ms: f64,
-    /// When it was drawn, ms from tick 0.
+    /// Time at which it was drawn, ms from tick 0.
     pub drawn_ms: f64,
-    /// The tick that it shows.
+    /// The displayed tick.
     pub tick: f64,
-    /// e as shown.
+    /// Displayed e.
     pub e: f64,
 }
 
@@ -80,9 +81,9 @@ impl From<(f64, f64, f64, f64)> for Frame {
 pub struct Batch {
     /// The first tick.
     pub first: usize,
-    /// u from there on.
+    /// u from the first tick on.
     pub u: Vec<f64>,
-    /// e from there on.
+    /// e from the first tick on.
     pub e: Vec<f64>,
     /// Input events since the last batch.
     pub events: Vec<Event>,
@@ -90,11 +91,11 @@ pub struct Batch {
     pub frames: Vec<Frame>,
 }
 
-/// The files of a run that continues.
+/// The files of the current run.
 #[derive(Debug)]
 pub struct RunLog {
     files: [(PathBuf, File); 3],
-    /// Bytes of each file that are whole batches.
+    /// Size of the complete batches in each file, bytes.
     whole: [u64; 3],
     synced: Instant,
     logged: usize,
@@ -102,10 +103,10 @@ pub struct RunLog {
 }
 
 impl RunLog {
-    /// Makes the files with their headers.
+    /// Creates the files with their headers.
     ///
     /// # Errors
-    /// [`LabError::File`]; a file that is already present is not written over.
+    /// [`LabError::File`]; an existing file is not overwritten.
     pub fn create(stem: &Stem, ticks: usize) -> Result<Self, LabError> {
         let headers = [
             "tick,u,e\n",
@@ -128,10 +129,10 @@ impl RunLog {
         })
     }
 
-    /// Whether a batch continues the log; the tick after its last.
+    /// Checks that a batch continues the log; returns the tick after its last.
     ///
     /// # Errors
-    /// [`LabError::Message`] for one that does not continue the last one or is beyond the end.
+    /// [`LabError::Message`] for a batch that does not continue the last one or exceeds the end.
     pub fn continued_by(&self, batch: &Batch) -> Result<usize, LabError> {
         let end = batch.first.saturating_add(batch.u.len());
         if batch.first != self.logged || batch.u.len() != batch.e.len() || end > self.planned {
@@ -146,10 +147,10 @@ impl RunLog {
         Ok(end)
     }
 
-    /// Appends a batch, all of it or nothing.
+    /// Appends a batch completely or not at all.
     ///
     /// # Errors
-    /// The errors of [`RunLog::continued_by`]; [`LabError::File`], after which the files hold the batches before.
+    /// The errors of [`RunLog::continued_by`]; [`LabError::File`], after which the files hold the previous batches.
     pub fn append(&mut self, batch: &Batch) -> Result<(), LabError> {
         let end = self.continued_by(batch)?;
         let mut texts = [String::new(), String::new(), String::new()];
@@ -180,19 +181,19 @@ impl RunLog {
         Ok(())
     }
 
-    /// Cuts the files to the last whole batch. What cannot be cut now is when the session is opened.
+    /// Cuts the files to the last complete batch. If this fails, it is done when the session is opened.
     fn take_back(&self) {
         for ((_, file), whole) in self.files.iter().zip(self.whole) {
             let _ = file.set_len(whole);
         }
     }
 
-    /// Ticks that are logged.
+    /// Number of logged ticks.
     pub fn ticks(&self) -> usize {
         self.logged
     }
 
-    /// Hands all to the disk.
+    /// Flushes all files to the disk.
     ///
     /// # Errors
     /// [`LabError::File`].
@@ -210,7 +211,7 @@ fn append(path: &Path, file: &mut File, text: &str) -> Result<(), LabError> {
         .map_err(|source| LabError::file(path, source))
 }
 
-/// Bytes up to the end of the last whole line.
+/// Number of bytes up to the end of the last complete line.
 pub(super) fn whole_lines(bytes: &[u8]) -> usize {
     bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1)
 }
@@ -220,7 +221,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// The third file is on a disk that takes nothing: the batch is in none of them, and does not count.
+    /// The third file is on a full disk: the batch is in none of them, and does not count.
     #[test]
     fn a_batch_that_a_full_disk_refuses_is_taken_back() {
         let dir = tempfile::tempdir().unwrap();
@@ -242,7 +243,7 @@ mod tests {
         assert!(log.append(&batch(10)).unwrap_err().to_string().contains("frames.csv"));
         assert_eq!(log.ticks(), 10);
         assert_eq!(std::fs::read(stem.file("ticks.csv")).unwrap(), before);
-        // Once there is room it continues where it was.
+        // Once there is space it continues at the same place.
         log.files[2].1 = frames;
         log.append(&batch(10)).unwrap();
         assert_eq!(log.ticks(), 20);

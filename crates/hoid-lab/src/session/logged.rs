@@ -1,4 +1,4 @@
-//! The journal, read back.
+//! Reading of the journal.
 
 use std::path::Path;
 
@@ -11,9 +11,9 @@ use crate::{LabError, task::Signals};
 /// The log of a run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Logged {
-    /// The number of each tick, as it is there.
+    /// The number of each tick, as logged.
     pub numbers: Vec<f64>,
-    /// u and e of each.
+    /// u and e of each tick.
     pub signals: Signals,
     /// Input events.
     pub events: Vec<Event>,
@@ -24,11 +24,11 @@ pub struct Logged {
 }
 
 impl Logged {
-    /// Reads it, as far as it is whole: to the end of the last line, in the words of a line that is invalid, and
-    /// nothing of a file that does not exist, which reports it in `faults`.
+    /// Reads the complete part of the log: up to the last complete or first invalid line, and nothing of a missing
+    /// file, which is reported in `faults`.
     ///
     /// # Errors
-    /// [`LabError::Io`] for errors that the operating system reports of a file that is there.
+    /// [`LabError::Io`] for errors of the operating system with an existing file.
     pub fn read(stem: &Stem) -> Result<Self, LabError> {
         let mut logged = Self::default();
         let mut faults = Vec::new();
@@ -48,8 +48,8 @@ impl Logged {
     }
 }
 
-/// Calls `each` with the numbers of every whole line after the header, up to one that is invalid; the problems of the
-/// file, if something is.
+/// Calls `each` with the numbers of every complete line after the header, up to an invalid one; returns the problem of
+/// the file, if any.
 fn rows<const N: usize>(path: &Path, mut each: impl FnMut([f64; N])) -> Result<Option<String>, LabError> {
     let name = || {
         path.file_name()

@@ -15,9 +15,9 @@
 //!       beh.parquet                        the record at 100 Hz, for all commands of hoid
 //! ```
 //!
-//! Files that are appended to are handed to the system with each batch of the page and to the disk
-//! each second. What is written at once is whole or not there. A folder therefore shows at any
-//! instant how far the session is: a run without `end.json` was interrupted.
+//! Appended files are passed to the system with each batch of the page and to the disk every
+//! second. Other files are written atomically. A folder therefore shows the progress of the session
+//! at any instant: a run without `end.json` was interrupted.
 //!
 //! | file | contents |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! Prior knowledge of a run before it starts and after its end, each written at once.
+//! Data of a run before its start and after its end, each written at once.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -14,7 +14,7 @@ use crate::{
     task::{Phase, Task},
 };
 
-/// Prior knowledge before a run: `run.json`, and `forcing.parquet` next to it.
+/// Data before a run: `run.json`, and `forcing.parquet` in the same folder.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunStart {
@@ -22,30 +22,30 @@ pub struct RunStart {
     pub hoid: String,
     /// Number of the run in its session, from 1.
     pub number: usize,
-    /// Its place in the plan of the session.
+    /// Its index in the plan of the session.
     pub planned: usize,
-    /// Whether it is a training run.
+    /// True for a training run.
     pub training: bool,
-    /// When, in UTC.
+    /// Time in UTC.
     pub utc: String,
     /// The condition.
     pub condition: Condition,
-    /// Place of the condition in the configuration, and the replication: with its seed they name the
-    /// phases.
+    /// Index of the condition in the configuration, and the replication: with its seed they
+    /// determine the phases.
     pub cell: u64,
     /// See `cell`.
     pub replication: u64,
-    /// Ticks before the measurement.
+    /// Number of ticks before the measurement.
     pub run_in: usize,
-    /// All ticks.
+    /// Number of all ticks.
     pub ticks: usize,
-    /// From the device to u.
+    /// Map from the device to u.
     pub input: InputMap,
     /// The device.
     pub device: String,
-    /// `browser`, or `injected` if a program gives the time.
+    /// `browser`, or `injected` if a program provides the time.
     pub clock: String,
-    /// Time from frame to frame as measured before the run, ms.
+    /// Time between frames measured before the run, ms.
     pub refresh_ms: f64,
     /// The clock of the browser at tick 0, ms.
     pub zero_ms: f64,
@@ -59,37 +59,37 @@ pub struct RunStart {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum How {
-    /// To its end.
+    /// Completed.
     Finished,
-    /// By the person, a closed window, or an end of the server.
+    /// Aborted by the person, a closed window, or the end of the server.
     Interrupted,
 }
 
-/// Results known after a run: `end.json`.
+/// Data after a run: `end.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ended {
-    /// How.
+    /// How it ended.
     pub how: How,
-    /// When, in UTC.
+    /// Time in UTC.
     pub utc: String,
-    /// Counts of the page: events that no hand made, megabytes of its memory.
+    /// Counters of the page: events not made by hand, megabytes of its memory.
     #[serde(default)]
     pub counted: BTreeMap<String, f64>,
     /// SHA-256 of ticks, events and frames, in that order.
     pub sha256: Vec<String>,
 }
 
-/// The three files that are appended to.
+/// The three appended files.
 pub(super) const APPENDED: [&str; 3] = ["ticks.csv", "events.csv", "frames.csv"];
 
 impl RunStart {
-    /// Writes it, and the tables of the task.
+    /// Writes the file, and the tables of the task.
     ///
     /// # Errors
     /// [`LabError::Io`].
     pub fn write(&self, stem: &Stem, task: &Task) -> Result<(), LabError> {
-        // Both as long as the target, which a preview shows beyond the end.
+        // Both have the length of the target, which a preview shows beyond the end.
         let mut disturbance = task.disturbance.clone();
         disturbance.resize(task.target.len(), 0.0);
         let column = |name: &str, values: Vec<f64>| OutputColumn {
@@ -107,7 +107,7 @@ impl RunStart {
         write_json(&stem.file("run.json"), self)
     }
 
-    /// Reads it.
+    /// Reads the file.
     ///
     /// # Errors
     /// [`LabError::Damaged`], [`LabError::Io`].
@@ -115,7 +115,7 @@ impl RunStart {
         read_json(&stem.file("run.json"))
     }
 
-    /// The task, of what was written before the run.
+    /// The task, from the data written before the run.
     ///
     /// # Errors
     /// [`LabError::Damaged`] for tables of another length.
@@ -152,7 +152,7 @@ impl RunStart {
 }
 
 impl Ended {
-    /// Writes it.
+    /// Writes the file.
     ///
     /// # Errors
     /// [`LabError::Io`].
@@ -160,7 +160,7 @@ impl Ended {
         write_json(&stem.file("end.json"), self)
     }
 
-    /// Reads it; nothing if the run has not ended.
+    /// Reads the file; nothing if the run has not ended.
     ///
     /// # Errors
     /// [`LabError::Damaged`], [`LabError::Io`].
@@ -172,7 +172,7 @@ impl Ended {
         read_json(&path).map(Some)
     }
 
-    /// The hashes of the files as they are; empty for one that does not exist.
+    /// The hashes of the present files; empty for a missing one.
     ///
     /// # Errors
     /// [`LabError::Io`].

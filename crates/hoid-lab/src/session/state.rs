@@ -1,4 +1,4 @@
-//! The session as a whole: what is planned, what is done, and how it continues after whatever ended it.
+//! The session as a whole: planned and finished runs, and its continuation after an interruption.
 
 use std::{
     collections::BTreeMap,
@@ -22,7 +22,7 @@ use crate::{
     verify::{Checked, check},
 };
 
-/// The file of what was to be, and its copy for when that is lost.
+/// The file of the plan, and its backup copy.
 const FACTS: &str = "lab.toml";
 const FACTS_AGAIN: &str = "lab.copy.toml";
 
@@ -39,13 +39,13 @@ pub struct Facts {
     pub hoid: String,
     /// Pseudonym.
     pub subject: String,
-    /// Which session of this person, from 1.
+    /// Number of the session of this person, from 1.
     pub session: usize,
-    /// When it started, in UTC.
+    /// Start time in UTC.
     pub began: String,
-    /// That the consent was confirmed, and when.
+    /// Confirmation of the consent, and its time.
     pub consent: String,
-    /// `CC0-1.0` if the person gives the data away; empty otherwise.
+    /// `CC0-1.0` if the person donates the data; otherwise empty.
     pub licence: String,
     /// Row of the Latin square.
     pub row: usize,
@@ -55,7 +55,7 @@ pub struct Facts {
     /// Browser and screen, as the page reports them.
     #[serde(default)]
     pub browser: BTreeMap<String, String>,
-    /// All runs that are to be.
+    /// All planned runs.
     pub plan: Vec<Planned>,
     /// The experiment.
     pub config: Config,
@@ -83,25 +83,25 @@ impl Facts {
 pub struct Done {
     /// Its number.
     pub number: usize,
-    /// Its place in the plan.
+    /// Its index in the plan.
     pub planned: usize,
     /// Name of its condition.
     pub condition: String,
-    /// Whether it was a training run.
+    /// True for a training run.
     pub training: bool,
     /// How it ended.
     pub how: How,
-    /// When, in UTC.
+    /// Time in UTC.
     pub utc: String,
     /// `verified` or `unverified`.
     pub verdict: String,
-    /// Why not.
+    /// Reasons of the verdict `unverified`.
     pub reasons: String,
     /// Additional notes.
     pub notes: String,
     /// Root mean square of e.
     pub rms_e: f64,
-    /// 100 for no error, 0 for hands at rest.
+    /// 100 for no error, 0 for the error without control.
     pub score: f64,
 }
 
@@ -112,7 +112,7 @@ pub struct Session {
     pub folder: PathBuf,
     /// Contents of its `lab.toml`.
     pub facts: Facts,
-    /// The runs that ended, in their order.
+    /// The finished runs, in their order.
     pub done: Vec<Done>,
 }
 
@@ -151,11 +151,11 @@ impl Session {
         Ok(begun)
     }
 
-    /// Opens a session; runs that were interrupted by the end of a server, or of which files are missing or
-    /// cut, are closed as unverified.
+    /// Opens a session; runs interrupted by the end of a server, or with missing or truncated files, are closed as
+    /// unverified.
     ///
     /// # Errors
-    /// [`LabError::Damaged`] for a folder that holds no session; those of files that cannot be written.
+    /// [`LabError::Damaged`] for a folder without a session; errors of files that cannot be written.
     pub fn open(folder: &Path) -> Result<Self, LabError> {
         let mut session = Self::read(folder)?;
         for (number, stem) in Stem::all(folder)? {
@@ -173,12 +173,12 @@ impl Session {
         Ok(session)
     }
 
-    /// Reads a session and changes nothing.
+    /// Reads a session without changing it.
     ///
     /// # Errors
     /// [`LabError::Damaged`].
     pub fn read(folder: &Path) -> Result<Self, LabError> {
-        // What the copy shows is taken only where the file carries no information: it is one change behind at most.
+        // The copy is used only if the file is unreadable: it is at most one change behind the file.
         let facts = match Facts::read(&folder.join(FACTS)) {
             Ok(facts) => facts,
             Err(damaged) => Facts::read(&folder.join(FACTS_AGAIN)).map_err(|_| damaged)?,
@@ -203,7 +203,7 @@ impl Session {
         Ok(())
     }
 
-    /// The place in the plan of the next run; nothing when all are done.
+    /// The index in the plan of the next run; nothing if all are done.
     pub fn next(&self) -> Option<usize> {
         let finished = |place: &usize| {
             self.done
@@ -213,7 +213,7 @@ impl Session {
         (0..self.facts.plan.len()).find(|place| !finished(place))
     }
 
-    /// The number of a new run.
+    /// A number for a new run.
     ///
     /// # Errors
     /// [`LabError::Io`].
@@ -226,13 +226,13 @@ impl Session {
         Stem::new(&self.folder, &self.facts.subject, self.facts.session, condition, number)
     }
 
-    /// Ends a run: seals its files, checks it and writes down what came out.
+    /// Ends a run: seals its files, checks it and records the result.
     ///
     /// # Errors
     /// The errors of files.
     pub fn end(&mut self, stem: &Stem, how: How, counted: BTreeMap<String, f64>) -> Result<Checked, LabError> {
         if !APPENDED.iter().any(|end| stem.file(end).exists()) {
-            // It was ended before its first tick.
+            // It ended before its first tick.
             drop(RunLog::create(stem, 0)?);
         }
         Ended {
@@ -251,7 +251,7 @@ impl Session {
         Ok(checked)
     }
 
-    /// Appends a run that has ended to `runs.csv`.
+    /// Appends a finished run to `runs.csv`.
     fn note(&mut self, stem: &Stem, checked: &Checked) -> Result<(), LabError> {
         let begun = RunStart::read(stem)?;
         let done = Done {
@@ -270,7 +270,7 @@ impl Session {
         self.write_down(done)
     }
 
-    /// Writes down a run of which nothing but its name is known.
+    /// Records a run of which only the name is known.
     fn lost(&mut self, number: usize, stem: &Stem) -> Result<(), LabError> {
         let condition = stem
             .text()
@@ -278,7 +278,7 @@ impl Session {
             .and_then(|(_, rest)| rest.rsplit_once("_run-"));
         self.write_down(Done {
             number,
-            // A place that no plan has.
+            // An index that no plan has.
             planned: u32::MAX as usize,
             condition: condition.map_or_else(String::new, |(name, _)| name.to_owned()),
             training: false,
@@ -292,7 +292,7 @@ impl Session {
         })
     }
 
-    /// Appends a line, whole or not at all, after the last whole one.
+    /// Appends a line completely or not at all, after the last complete one.
     fn write_down(&mut self, done: Done) -> Result<(), LabError> {
         let path = self.folder.join("runs.csv");
         let whole = if path.exists() {
@@ -312,7 +312,7 @@ impl Session {
             .and_then(|()| file.write_all(&line))
             .and_then(|()| file.sync_data());
         if let Err(source) = written {
-            // What cannot be cut now is when the next line is written.
+            // If it cannot be cut now, it is when the next line is written.
             let _ = file.set_len(whole as u64);
             return Err(LabError::file(&path, source));
         }
@@ -337,7 +337,7 @@ impl Session {
     }
 }
 
-/// The directories in one whose names start so, sorted.
+/// The subdirectories whose names start with `prefix`, sorted.
 fn directories(of: &Path, prefix: &str) -> Result<Vec<PathBuf>, LabError> {
     if !of.exists() {
         return Ok(Vec::new());
@@ -352,7 +352,7 @@ fn directories(of: &Path, prefix: &str) -> Result<Vec<PathBuf>, LabError> {
     Ok(found)
 }
 
-/// The row of a person: that of their first session, else the number of people before.
+/// The row of a person: that of their first session, otherwise the number of previous people.
 fn row_of(out: &Path, subject: &str) -> Result<usize, LabError> {
     let mut others = 0;
     for person in directories(out, "sub-")? {
@@ -375,7 +375,7 @@ fn read_runs(path: &Path) -> Result<Vec<Done>, LabError> {
     if !path.exists() {
         return Ok(Vec::new());
     }
-    // A line that is cut or none is left out: its run is judged again when the session is opened.
+    // A truncated or invalid line is omitted: its run is evaluated again when the session is opened.
     let bytes = hoid_io::read_bytes(path)?;
     let mut reader = csv::Reader::from_reader(&bytes[..whole_lines(&bytes)]);
     Ok(reader.deserialize().flatten().collect())

@@ -1,4 +1,4 @@
-//! A disk of a size, and how it fills.
+//! A disk of limited size that can be filled.
 
 use std::{
     fs,
@@ -7,7 +7,7 @@ use std::{
     process::{Command, Stdio},
 };
 
-/// A disk of its own at a folder, for as long as it lives: a `tmpfs`, which Linux lets an administrator mount.
+/// A separate disk mounted on a folder while this exists: a `tmpfs`, which Linux lets an administrator mount.
 pub struct Disk<'a>(&'a Path);
 
 impl<'a> Disk<'a> {
@@ -29,7 +29,7 @@ impl Drop for Disk<'_> {
     }
 }
 
-/// Another takes all that is left.
+/// Fills the remaining space.
 pub fn fill(ballast: &Path) {
     let Ok(mut file) = fs::File::create(ballast) else {
         return;
@@ -39,7 +39,7 @@ pub fn fill(ballast: &Path) {
     }
 }
 
-/// All that is there, elsewhere.
+/// Copies all files to another place.
 pub fn copied(from: &Path, to: &Path) {
     fs::create_dir_all(to).unwrap();
     for entry in fs::read_dir(from).unwrap().map(Result::unwrap) {

@@ -1,5 +1,5 @@
-//! What no one reports to a lab, files of sessions as no one wrote them, and trackers restored from numbers that were
-//! changed and sealed again: each has an answer, and none panics, not even where it is caught.
+//! Invalid messages to a lab, damaged session files, and trackers restored from modified numbers with a valid checksum:
+//! each gives an answer, and none panics, not even a caught panic.
 //!
 //! Case `k` of a seed is the same on every machine.
 #![allow(clippy::unwrap_used)]
@@ -33,12 +33,12 @@ use crate::{
 
 /// Ticks of a run.
 const TICKS: usize = 500;
-/// Messages of one lab.
+/// Number of messages to one lab.
 const OF_A_LAB: usize = 200;
-/// Samples that a restored tracker takes.
+/// Number of samples for a restored tracker.
 const SAMPLES: usize = 25;
 
-/// Numbers at which places, lengths and sums go wrong.
+/// Numbers at which indices, lengths and sums fail.
 const EXTREMES: [f64; 16] = [
     0.0,
     -0.0,
@@ -58,7 +58,7 @@ const EXTREMES: [f64; 16] = [
     f64::NEG_INFINITY,
 ];
 
-/// The same, and a value that is not a number, as JSON has them.
+/// The same, and a value that is not a number, as in JSON.
 fn extreme(draw: &mut Draw) -> Value {
     match draw.below(12) {
         0 => Value::Null,
@@ -74,7 +74,7 @@ fn extreme(draw: &mut Draw) -> Value {
     }
 }
 
-/// What is tried.
+/// State of the tests.
 pub struct Hostile {
     directory: tempfile::TempDir,
     session: PathBuf,
@@ -126,7 +126,7 @@ impl Hostile {
         }
     }
 
-    /// A case: two of four a tracker, one messages, one files.
+    /// Runs a case: two of four a tracker, one messages, one files.
     pub fn case(&mut self, seed: u64, number: u64) {
         let mut draw = Draw(seed ^ number.wrapping_mul(0xd134_2543_de82_ef95));
         match number % 4 {
@@ -136,7 +136,7 @@ impl Hostile {
         }
     }
 
-    /// Some messages to a lab that is as earlier ones have left it.
+    /// Some messages to a lab in the state left by earlier ones.
     fn messages(&mut self, draw: &mut Draw) {
         if self.said % OF_A_LAB == OF_A_LAB - 1 {
             let out = self.directory.path().join(format!("lab-{}", self.said));
@@ -167,14 +167,14 @@ impl Hostile {
             if draw.below(8) == 0 {
                 bytes(&mut text, draw);
             }
-            // What is not a message ends at the door.
+            // Invalid messages are refused at once.
             if let Ok(message) = serde_json::from_slice::<FromPage>(&text) {
                 let _ = self.person.lab.hear(self.person.page, message);
             }
         }
     }
 
-    /// A session with one changed file, opened, judged and shown.
+    /// A session with one modified file, opened, evaluated and shown.
     fn damaged(&mut self, draw: &mut Draw) {
         let at = self.directory.path().join("damaged/sub-P01/ses-01");
         let _ = fs::remove_dir_all(&at);
@@ -207,7 +207,7 @@ impl Hostile {
         }
     }
 
-    /// A tracker, or a warm-up, from other numbers under a right seal.
+    /// A tracker, or a warm-up, from modified numbers with a valid checksum.
     fn restored(&mut self, draw: &mut Draw) {
         let which = draw.below(self.trackers.len() + 1);
         let saved = self.trackers.get(which).map_or(&self.warm_up, |(_, numbers)| numbers);
@@ -255,7 +255,7 @@ impl Hostile {
     }
 }
 
-/// Trackers that have run, and a warm-up.
+/// Saved trackers after a run, and a warm-up.
 fn saved(record: &Record) -> (Vec<(TrackOptions, Vec<f64>)>, Vec<f64>) {
     let span = record.span(0.0, 20.0).unwrap();
     let bj = Structure::BoxJenkins;
@@ -297,7 +297,7 @@ fn saved(record: &Record) -> (Vec<(TrackOptions, Vec<f64>)>, Vec<f64>) {
     (all.into_iter().map(run).collect(), live.saved().1)
 }
 
-/// One value of a message becomes another, goes or comes.
+/// Modifies, removes or adds one value of a message.
 fn change(value: &mut Value, draw: &mut Draw) {
     let deeper = draw.below(4) > 0;
     match value {
@@ -321,7 +321,7 @@ fn change(value: &mut Value, draw: &mut Draw) {
     }
 }
 
-/// A byte, an end, a part of a text, or a number in it.
+/// Modifies a byte, the end, a part of a text, or a number in it.
 fn bytes(text: &mut Vec<u8>, draw: &mut Draw) {
     if text.is_empty() {
         return;
@@ -347,7 +347,7 @@ fn bytes(text: &mut Vec<u8>, draw: &mut Draw) {
     }
 }
 
-/// A file is gone, or is another: where it is JSON a value of it, else bytes.
+/// Removes or modifies a file: a value if it is JSON, otherwise bytes.
 fn damage(path: &Path, draw: &mut Draw) {
     let Ok(mut whole) = fs::read(path) else { return };
     let json = serde_json::from_slice::<Value>(&whole);

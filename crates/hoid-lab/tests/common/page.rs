@@ -1,4 +1,4 @@
-//! The page's engine under node: what it computes with is what the browser runs.
+//! The page's engine under node: the same code as in the browser.
 #![allow(dead_code)]
 
 use std::{
@@ -22,7 +22,7 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// Nothing where there is no node.
+    /// Nothing if node is not installed.
     pub fn start() -> Option<Self> {
         let script = concat!(env!("CARGO_MANIFEST_DIR"), "/page/browser-test/engine.mjs");
         let mut child = Command::new("node")
@@ -38,7 +38,7 @@ impl Engine {
         })
     }
 
-    /// What it answers.
+    /// Returns the answer of the engine.
     pub fn ask(&mut self, question: &Value) -> Value {
         writeln!(self.input, "{question}").unwrap();
         let mut line = String::new();
@@ -64,7 +64,7 @@ impl Generator {
     }
 }
 
-/// A run of random plant, tables and events through the page; true if every bit is that of Rust.
+/// Runs a random plant with tables and events in the page; true if every bit equals that of Rust.
 pub fn same_bits(engine: &mut Engine, seed: u32) -> bool {
     let mut own = Generator(seed ^ 0x5bd1_e995);
     let mut any = |low: f64, high: f64| low + (high - low) * (own.next() + 0.5);
@@ -94,7 +94,7 @@ pub fn same_bits(engine: &mut Engine, seed: u32) -> bool {
     };
     let condition = match condition.course() {
         Ok(_) => condition,
-        // What was replaced made no element: without the change then.
+        // The replaced element was invalid: without the change then.
         Err(_) => Condition {
             last_element: None,
             ..condition

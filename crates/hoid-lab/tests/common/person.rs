@@ -1,5 +1,5 @@
-//! A page that keeps to the rules, without a server between: its person does nothing, so that e is the target.
-// Each file of tests uses its own part of this.
+//! A page that follows the protocol, without a server: its person does nothing, so that e is the target.
+// Each test file uses a part of this module.
 #![allow(dead_code, clippy::unwrap_used)]
 
 use std::{
@@ -11,7 +11,7 @@ use std::{
 use hoid_lab::{Config, Lab, Mode, lab::Outgoing, wire::FromPage};
 use serde_json::{Value, json};
 
-/// Ticks of a batch.
+/// Number of ticks of a batch.
 const BATCH: usize = 50;
 
 pub struct Person {
@@ -22,7 +22,7 @@ pub struct Person {
 }
 
 impl Person {
-    /// Who has agreed.
+    /// Starts a session with consent.
     pub fn begin(out: &Path, config: Config) -> Self {
         let lab = Lab::open(out, config, Mode::Sessions, None).unwrap();
         let (sender, heard) = channel();
@@ -67,7 +67,7 @@ impl Person {
         self.say(json!({"type": "finish", "number": number}))
     }
 
-    /// State of the session, as the page was reported last.
+    /// State of the session, as last sent to the page.
     pub fn state(&self) -> Value {
         let states = self.heard.try_iter().filter_map(|outgoing| match outgoing {
             Outgoing::Text(text) => serde_json::from_str::<Value>(&text).ok(),
@@ -82,7 +82,7 @@ pub fn begin(number: usize) -> Value {
         "input": {"centre": 512.0, "span": 300.0, "dead": 0.0, "gain": 1.0}})
 }
 
-/// Ticks of a hand that rests.
+/// Ticks of a hand at rest.
 pub fn batch(number: usize, first: usize, e: &[f64]) -> Value {
     json!({"type": "batch", "number": number,
         "batch": {"first": first, "u": vec![0.0; e.len()], "e": e, "events": [], "frames": []}})

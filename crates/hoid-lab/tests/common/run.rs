@@ -7,7 +7,7 @@ use hoid_lab::{
     task::Task,
 };
 
-/// The next run, under a number.
+/// Starts the next run with the given number.
 pub fn begun(session: &Session, number: usize, input: InputMap) -> Option<(RunStart, Task)> {
     let planned = session.next()?;
     let condition = session.facts.config.condition[0].clone();

@@ -6,17 +6,17 @@ use kuva::prelude::{Layout, TickFormat};
 
 use super::style;
 
-/// Height between the ticks of an ordinate at the least, and of a decade that has labels at 2 and 5
-/// as well.
+/// Smallest distance between the ticks of an ordinate, and smallest height of a decade with labels
+/// at 2 and 5.
 const TICK_HEIGHT: f64 = 16.0;
 const HIGH_DECADE: f64 = 48.0;
-/// Parts of a circle, deg.
+/// Steps of phase ticks, deg.
 const PHASE_STEPS: [f64; 6] = [15.0, 30.0, 45.0, 90.0, 180.0, 360.0];
-/// A logarithmic abscissa has labels at 2 and 5 as well where a decade is as wide.
+/// Smallest width of a decade with labels at 2 and 5 on a logarithmic abscissa.
 const WIDE_DECADE: f64 = 95.0;
-/// Width of the label of a tick with the space to its neighbour.
+/// Width of a tick label with the space to its neighbour.
 const TICK_WIDTH: f64 = 34.0;
-/// The library draws no smaller number on a logarithmic axis.
+/// Smallest number that the library draws on a logarithmic axis.
 const LEAST: f64 = 1e-10;
 
 /// Step of 1, 2 or 5 times a power of ten that gives at most `most` ticks.
@@ -30,7 +30,7 @@ pub fn tick_step(span: f64, most: f64) -> f64 {
     step.filter(|s| s.is_finite() && *s > 0.0).unwrap_or(span)
 }
 
-/// A tick with the digits that its step needs.
+/// Label of a tick with the digits that its step needs.
 pub fn tick(value: f64, step: f64) -> String {
     let place = step.log10().floor();
     let value = (value / step).round() * step;
@@ -45,8 +45,7 @@ pub fn tick(value: f64, step: f64) -> String {
     format!("{value:.digits$e}")
 }
 
-/// A layout with the ticks of an ordinate of this height in `unit`; their numbers are there where
-/// `labelled`.
+/// A layout with the ticks of an ordinate of this height in `unit`; with numbers if `labelled`.
 pub fn with_ordinate(
     layout: Layout,
     (low, high): (f64, f64),
@@ -78,11 +77,11 @@ pub fn with_ordinate(
         .with_y_tick_format(TickFormat::Custom(Arc::new(format)))
 }
 
-/// An ordinate that is linear up to a size and logarithmic beyond it, to both sides of zero: for
+/// An ordinate that is linear up to a limit and logarithmic beyond it, on both sides of zero: for
 /// numbers of either sign that differ by orders of magnitude.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bent {
-    /// Where the linear part ends; a decade beyond it is as high.
+    /// Limit of the linear part, whose height equals one decade.
     pub linear_within: f64,
 }
 
@@ -96,7 +95,7 @@ impl Bent {
         }
     }
 
-    /// The value at a whole height.
+    /// The value at an integer height.
     fn value(self, height: f64) -> f64 {
         match height.abs() {
             0.0 => 0.0,
@@ -104,7 +103,7 @@ impl Bent {
         }
     }
 
-    /// A layout with ticks at whole heights of a range of heights, over `height` units.
+    /// A layout with ticks at the integer heights of a range, over `height` units.
     pub fn with_ordinate(self, layout: Layout, (low, high): (f64, f64), height: f64) -> Layout {
         let step = ((high - low) * TICK_HEIGHT / height).ceil().max(1.0);
         let range = (self.linear_within, self.value(low.abs().max(high.abs())));
@@ -139,8 +138,8 @@ pub fn with_abscissa(layout: Layout, (low, high): (f64, f64), logarithmic: bool,
         .with_x_tick_format(TickFormat::Custom(Arc::new(format)))
 }
 
-/// Range of a logarithmic axis that holds these values, at 1, 2 or 5 times a power of ten; from 0.1
-/// to 1 where none is positive.
+/// Range of a logarithmic axis that contains these values, with ends at 1, 2 or 5 times a power of
+/// ten; from 0.1 to 1 if none is positive.
 pub fn log_range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let drawable = values.into_iter().filter(|v| style::is_drawable(*v) && *v >= LEAST);
     let start = (f64::INFINITY, 0.0_f64);
@@ -156,7 +155,7 @@ pub fn log_range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     }
 }
 
-/// A tick of a logarithmic axis over a range: all of one axis are decimals, or all powers of ten.
+/// Label of a tick of a logarithmic axis with this range: all labels of an axis are decimals, or all are powers of ten.
 pub fn log_tick(value: f64, (low, high): (f64, f64)) -> String {
     if low > 0.999e-3 && high < 1e6 {
         return crate::numbers::plain(value);
@@ -169,7 +168,7 @@ pub fn is_power_of_ten(value: f64) -> bool {
     (exponent - exponent.round()).abs() < 1e-6
 }
 
-/// The next of 1, 2, 5 times a power of ten, downwards or upwards.
+/// The next value of 1, 2, 5 times a power of ten, downwards or upwards.
 pub fn one_two_five(value: f64, up: bool) -> f64 {
     const MARKS: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
     let power = 10f64.powf(value.log10().floor());

@@ -1,10 +1,10 @@
-//! Bode pair: magnitude and phase of models with their 95 % bands, and of the true operator where
-//! it is known.
+//! Bode diagrams: magnitude and phase of models with their 95 % bands, and of the true operator if
+//! known.
 //!
 //! The estimators see the operator after the zero-order hold of their sampling, `B q^-nk/(A F)`;
-//! the truth is drawn after the same hold, so that both curves lie on each other when the
-//! parameters agree. The phase is unwrapped with the delay `nk Ts omega` taken out, which turns
-//! fastest, and put back.
+//! the true response is drawn with the same hold, so that the curves coincide if the parameters
+//! agree. The phase is unwrapped after removing the delay `nk Ts omega`, which contributes most,
+//! and the delay is added again.
 
 use std::f64::consts::TAU;
 
@@ -29,49 +29,48 @@ const MAGNITUDE_STEPS: [f64; 5] = [1.0, 2.0, 5.0, 10.0, 20.0];
 const MOST_STEPS: f64 = 6.5;
 const PHASE_STEPS: [f64; 6] = [15.0, 30.0, 45.0, 90.0, 180.0, 360.0];
 
-/// Frequencies of a curve.
+/// Number of frequencies of a curve.
 const POINTS: usize = 240;
-/// Range in which a person controls, rad/s; from a tenth to fifty the axis has ticks at 1, 2 and 5
-/// of each decade.
+/// Frequency range of manual control, rad/s; from 0.1 to 50 the axis has ticks at 1, 2 and 5 of
+/// each decade.
 const LOWEST_RAD_S: f64 = 0.1;
 const HIGHEST_RAD_S: f64 = 50.0;
-/// Phases that are shown, deg: below, a dead time alone turns on without end, and nothing of a loop
-/// is decided there.
+/// Range of the phase, deg: below it, the phase of a dead time decreases without bound and is
+/// irrelevant to the loop.
 const PHASE_SHOWN_DEG: (f64, f64) = (-540.0, 270.0);
 
-/// A model in the figure.
+/// A model of the figure.
 #[derive(Debug, Clone, Copy)]
 pub struct BodeModel<'a> {
     /// Its name in the legend.
     pub name: &'a str,
     /// The model.
     pub fit: &'a Fit,
-    /// The records it was fitted on; the longest decides the lowest frequency.
+    /// The records of the fit; the longest determines the lowest frequency.
     pub records: &'a [Record],
 }
 
-/// The true operator in the figure.
+/// The true operator of the figure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrueResponse {
     /// Its parameters.
     pub operator: OperatorParameters,
-    /// Sample time of the hold it is seen through.
+    /// Sample time of the hold.
     pub sample_time: SampleTime,
 }
 
 /// Magnitude in dB and phase in deg over frequency in rad/s, from 0.1 rad/s, or the lowest
 /// frequency that the longest record resolves, to 50 rad/s or half the sampling frequency.
 ///
-/// Bands are 1.96 standard errors to either side; a model without standard errors has none. A truth
-/// that no discrete model represents (a delay of no whole number of samples) is drawn without the
-/// hold.
+/// Bands are 1.96 standard errors to either side; a model without standard errors has none. A true
+/// response that no discrete model represents (a fractional delay) is drawn without the hold.
 pub fn bode(id: &str, models: &[BodeModel<'_>], truths: &[TrueResponse]) -> String {
     bode_with_points(id, models, truths, &[])
 }
 
-/// The same with points over it, such as a describing function of the same records, with error bars
-/// of 1.96 standard errors. The axes reach to all points below 50 rad/s. The first set is black,
-/// further ones have the colours that no model has.
+/// The same with points, such as a describing function of the same records, with error bars of 1.96
+/// standard errors. The axes include all points below 50 rad/s. The first set is black, further
+/// ones have colours that no model has.
 pub fn bode_with_points(id: &str, models: &[BodeModel<'_>], truths: &[TrueResponse], points: &[BodePoints]) -> String {
     let points: Vec<BodePoints> = points.iter().map(BodePoints::drawable).collect();
     let omega = frequencies(models, &points);
@@ -143,7 +142,7 @@ pub fn bode_with_points(id: &str, models: &[BodeModel<'_>], truths: &[TrueRespon
                 .with_y_label("magnitude (dB)")
                 .with_force_margins_y(style::TOP, style::BOTTOM_WITHOUT_LABEL)
         };
-        // A figure of points alone still has its axes.
+        // A figure with only points still has axes.
         if plots.is_empty() {
             plots.push(style::line([], BLACK, 1.0).into());
         }
@@ -188,7 +187,7 @@ pub fn bode_with_points(id: &str, models: &[BodeModel<'_>], truths: &[TrueRespon
     svg::finish(id, "Frequency response with 95 % bands", scene)
 }
 
-/// A phase that is shown; the others are gaps.
+/// A phase within the displayed range; others become gaps.
 fn shown(phase_deg: f64) -> f64 {
     let (low, high) = PHASE_SHOWN_DEG;
     if (low..=high).contains(&phase_deg) {
@@ -267,7 +266,7 @@ impl Curve {
     }
 }
 
-/// The first step that gives eight ticks or fewer, or a multiple of the last one.
+/// The first step with at most eight ticks, or a multiple of the last one.
 fn tick_step(span: f64, steps: &[f64]) -> f64 {
     let largest = steps.last().copied().unwrap_or(1.0);
     let enough = |step: &&f64| span / **step <= MOST_STEPS;
@@ -278,7 +277,7 @@ fn tick_step(span: f64, steps: &[f64]) -> f64 {
         .unwrap_or_else(|| largest * (span / (MOST_STEPS * largest)).ceil())
 }
 
-/// The 95 % band, cut at the range of the figure; `None` without standard errors.
+/// The 95 % band, limited to the range of the figure; `None` without standard errors.
 fn band(omega: &[f64], curve: &[(f64, Option<f64>)], (low, high): (f64, f64), colour: &str) -> Option<Plot> {
     let known: Vec<(f64, f64, f64)> = omega
         .iter()

@@ -1,8 +1,7 @@
-//! Bode pairs side by side: magnitude in dB over phase in deg, several curves and the true response
-//! in each column.
+//! Bode diagrams next to each other: magnitude in dB over phase in deg, several curves and the true
+//! response in each column.
 //!
-//! The phase is unwrapped with the delay taken out, which turns fastest, and put back, as in
-//! [`super::bode`].
+//! The phase is unwrapped after removing the delay, as in [`super::bode`].
 
 use hoid_ident::frequency::unwrapped_deg;
 use hoid_model::{Complex64, uncertainty::Estimate};
@@ -17,17 +16,17 @@ use crate::numbers::Z_95;
 /// One frequency response.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BodeCurve {
-    /// Its name in the legend, where equal names of one look are once; empty for none.
+    /// Name in the legend, where entries with equal name and style appear once; empty for none.
     pub name: String,
-    /// How it is drawn: [`LineKind::Truth`] for the response that the others are compared with.
+    /// Style: [`LineKind::Truth`] for the reference response.
     pub kind: LineKind,
-    /// Its colour.
+    /// Colour.
     pub shade: Shade,
     /// Frequencies in rad/s, ascending.
     pub omega_rad_s: Vec<f64>,
-    /// Magnitude in dB at each. What is not finite is a gap.
+    /// Magnitude in dB at each frequency. Non-finite values are gaps.
     pub magnitude_db: Vec<f64>,
-    /// Phase in deg at each, on any branch.
+    /// Phase in deg at each frequency, on any branch.
     pub phase_deg: Vec<f64>,
     /// Lower and upper edge of the band of the magnitude, dB; empty for none.
     pub magnitude_band: Vec<(f64, f64)>,
@@ -39,7 +38,7 @@ pub struct BodeCurve {
     /// Lower and upper end of the error bar of the phase, deg, on the branch of the phase; empty
     /// for none.
     pub phase_bars: Vec<(f64, f64)>,
-    /// Delay that is taken out while the phase is unwrapped, s; that of the model, or zero.
+    /// Delay removed for unwrapping the phase, s; that of the model, or zero.
     pub delay_s: f64,
 }
 
@@ -68,7 +67,7 @@ impl BodeCurve {
         }
     }
 
-    /// Points with error bars of 1.96 standard errors, none if there is no standard error.
+    /// Points with error bars of 1.96 standard errors, if there are standard errors.
     pub fn of_points(points: &BodePoints, shade: Shade) -> Self {
         let ends = |values: &[Estimate]| {
             let bar = |v: &Estimate| {
@@ -127,19 +126,19 @@ impl BodeCurve {
     }
 }
 
-/// Bode pairs of one column.
+/// Bode diagrams of one column.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BodeColumn {
-    /// Text above it; empty for none. After `_` or `^` comes one sign, or several in braces.
+    /// Title; empty for none. `_` or `^` is followed by one character, or several in braces.
     pub title: String,
     /// Its curves.
     pub curves: Vec<BodeCurve>,
 }
 
-/// Bode pairs side by side, with common ordinates.
+/// Bode diagrams next to each other, with common ordinates.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BodeGrid {
-    /// The columns. One is as wide as a column of text, several as a page.
+    /// The columns. A single one has the width of a text column, several have that of a page.
     pub columns: Vec<BodeColumn>,
 }
 

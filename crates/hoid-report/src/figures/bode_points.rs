@@ -1,9 +1,9 @@
-//! Points with error bars over a Bode pair: describing functions next to the models that were
-//! fitted to the same records.
+//! Points with error bars in a Bode diagram: describing functions and the models fitted to the same
+//! records.
 //!
-//! The phase of a point is known except for whole turns. It is drawn on the branch that is nearest
-//! to the first curve, and without a curve unwrapped from point to point with the delay of the
-//! points taken out.
+//! The phase of a point is known up to full turns. It is drawn on the branch nearest to the first
+//! curve, or, without a curve, unwrapped from point to point after removing the delay of the
+//! points.
 
 use hoid_ident::frequency::{DescribingFunction, unwrapped_deg};
 use hoid_model::uncertainty::Estimate;
@@ -13,27 +13,27 @@ use super::{draw, scale::Scale};
 use crate::numbers::Z_95;
 
 const RADIUS: f64 = 2.4;
-/// Half of the end of an error bar.
+/// Half width of the cap of an error bar.
 const CAP: f64 = 2.5;
 
 /// Points of a frequency response.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BodePoints {
-    /// Their name in the legend.
+    /// Name in the legend.
     pub name: String,
     /// Frequencies, rad/s, ascending.
     pub omega_rad_s: Vec<f64>,
-    /// Magnitude in dB at each, with its standard error if there is one. What is not finite is left
-    /// out.
+    /// Magnitude in dB at each frequency, with its standard error if there is one. Non-finite
+    /// values are omitted.
     pub magnitude_db: Vec<Estimate>,
-    /// Phase in deg at each, on any branch, with its standard error if there is one.
+    /// Phase in deg at each frequency, on any branch, with its standard error if there is one.
     pub phase_deg: Vec<Estimate>,
-    /// Delay that is taken out while the phase is unwrapped where there is no curve, s.
+    /// Delay removed for unwrapping the phase if there is no curve, s.
     pub delay_s: f64,
 }
 
 impl BodePoints {
-    /// The lines of a describing function.
+    /// Points of a describing function.
     pub fn of_describing_function(name: &str, h: &DescribingFunction) -> Self {
         Self {
             name: name.to_owned(),
@@ -44,7 +44,7 @@ impl BodePoints {
         }
     }
 
-    /// The lines at which all numbers are finite and the frequency has a logarithm.
+    /// The points at which all numbers are finite and the frequency is positive.
     pub(super) fn drawable(&self) -> Self {
         let n = self
             .omega_rad_s
@@ -65,7 +65,7 @@ impl BodePoints {
         }
     }
 
-    /// The same on the branch of a curve: frequencies and phases in deg.
+    /// The points on the branch of a curve: frequencies and phases in deg.
     pub(super) fn on_branch_of(mut self, curve: Option<(&[f64], &[f64])>) -> Self {
         let pairs: Vec<(f64, f64)> = self
             .omega_rad_s
@@ -83,7 +83,7 @@ impl BodePoints {
         self
     }
 
-    /// Ends of the error bars, and the values themselves.
+    /// Ends of the error bars, and the values.
     pub(super) fn reach(values: &[Estimate]) -> impl Iterator<Item = f64> + '_ {
         values.iter().flat_map(|v| {
             let half = half_bar(v);
@@ -91,7 +91,7 @@ impl BodePoints {
         })
     }
 
-    /// Bars of 1.96 standard errors and points; none outside the axes.
+    /// Draws points and bars of 1.96 standard errors; none outside the axes.
     pub(super) fn draw(&self, scene: &mut Scene, scale: &Scale, values: &[Estimate], colour: &str) {
         let mut at = Vec::new();
         for (&omega, value) in self.omega_rad_s.iter().zip(values).filter(|(w, _)| scale.has_x(**w)) {
@@ -125,7 +125,7 @@ fn half_bar(value: &Estimate) -> f64 {
     value.standard_error.map_or(0.0, |s| Z_95 * s).clamp(0.0, 1e6)
 }
 
-/// Linear between the points of a curve, the nearest end outside; `None` without a finite value.
+/// Linear interpolation between the points of a curve, the nearest end outside; `None` without a finite value.
 fn interpolated(omega: &[f64], y: &[f64], at: f64) -> Option<f64> {
     let n = omega.len().min(y.len());
     let above = omega[..n].partition_point(|w| *w <= at);

@@ -1,20 +1,20 @@
-//! The numbers of a box plot.
+//! Statistics of a box plot.
 //!
-//! A box reaches from the first to the third quartile with a line at the median; whiskers end at
-//! the last value within 1.5 interquartile ranges of the box, and anything beyond is a point
-//! (Tukey, *Exploratory Data Analysis*, 1977).
+//! A box extends from the first to the third quartile with a line at the median; whiskers end at
+//! the last value within 1.5 interquartile ranges of the box, and values beyond are points (Tukey,
+//! *Exploratory Data Analysis*, 1977).
 
 use hoid_numerics::statistics::{finite_sorted, quantile};
 
 use super::style;
 
-/// Longest whiskers, in interquartile ranges.
+/// Maximum length of whiskers, in interquartile ranges.
 const REACH: f64 = 1.5;
 
-/// Content of a box for a sample.
+/// Box plot statistics of a sample.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BoxStatistics {
-    /// Number of values; zero if there is none, and a cross is drawn in the place of the box.
+    /// Number of values; if it is zero, a cross is drawn instead of the box.
     pub count: usize,
     /// The smallest value within 1.5 interquartile ranges of the box.
     pub lower_whisker: f64,
@@ -31,7 +31,7 @@ pub struct BoxStatistics {
 }
 
 impl BoxStatistics {
-    /// For the values that are finite; quartiles by linear interpolation between ranks.
+    /// Statistics of the finite values; quartiles by linear interpolation between ranks.
     pub fn of(values: &[f64]) -> Self {
         let values = finite_sorted(values.iter().copied());
         let quartile = |q| quantile(&values, q).unwrap_or_default();
@@ -41,7 +41,7 @@ impl BoxStatistics {
         let inside: Vec<f64> = values.iter().copied().filter(within).collect();
         Self {
             count: values.len(),
-            // An interpolated quartile may lie beyond the last value within reach.
+            // An interpolated quartile may lie beyond the last value within the limit.
             lower_whisker: inside.first().copied().unwrap_or_default().min(lower),
             lower_quartile: lower,
             median: quartile(0.5),
@@ -62,7 +62,7 @@ impl BoxStatistics {
         ]
     }
 
-    /// True when there is a box to draw.
+    /// True if there is a box to draw.
     pub(super) fn is_drawable(&self) -> bool {
         self.count > 0 && self.marks().iter().all(|v| style::is_drawable(*v))
     }

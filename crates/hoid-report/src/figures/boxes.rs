@@ -1,5 +1,5 @@
-//! Box plots of the results of many runs: groups on the abscissa, in each group one box for each
-//! series. [`BoxStatistics`] describes the boxes.
+//! Box plots of the results of many runs: groups on the abscissa, and one box for each series in
+//! each group. [`BoxStatistics`] describes the boxes.
 
 use kuva::{
     prelude::Plot,
@@ -18,15 +18,15 @@ use super::{
     svg,
 };
 
-/// Height between the axes of a panel, and of one that is the whole figure.
+/// Height of the axes of a panel, and of a single panel.
 const HEIGHT: f64 = 112.0;
 const ALONE: f64 = 150.0;
-/// Space above a panel for the number of outliers beyond, and for its note.
+/// Space above a panel for the number of outliers beyond its range, and for its note.
 const COUNTS: f64 = 13.0;
-/// The names of the groups below the axis, and a second row of them below the first.
+/// Position of the group names below the axis, and of a second row of them.
 const NAMES_BELOW: f64 = 17.0;
 const SECOND: f64 = 12.0;
-/// Part of the width of a group that its boxes take, and of its place that a box takes.
+/// Fraction of the width of a group for its boxes, and of the width of each box.
 const GROUP: f64 = 0.86;
 const BOX: f64 = 0.8;
 const WIDEST: f64 = 26.0;
@@ -42,30 +42,29 @@ pub enum BoxRange {
     Whiskers,
 }
 
-/// A series: boxes of one colour.
+/// A series of boxes with the same colour.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoxSeries {
-    /// Its name in the legend.
+    /// Name in the legend.
     pub name: String,
-    /// Its colour.
+    /// Colour.
     pub shade: Shade,
 }
 
 /// One panel of box plots.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BoxPanel {
-    /// Name of the quantity, such as `B_r(b_0)`; after `_` or `^` comes one sign, or several in
-    /// braces.
+    /// Name of the quantity, such as `B_r(b_0)`; `_` or `^` is followed by one character, or
+    /// several in braces.
     pub name: String,
     /// Its unit; empty for none.
     pub unit: String,
-    /// The boxes by group and, in each, by series; a place that does not exist is one without a
-    /// value.
+    /// The boxes by group and series; a missing box is one without values.
     pub boxes: Vec<Vec<BoxStatistics>>,
-    /// Size up to which the ordinate is linear, and logarithmic beyond; linear throughout where it
-    /// is `None`.
+    /// Limit up to which the ordinate is linear, and logarithmic beyond; `None` for a linear
+    /// ordinate.
     pub linear_within: Option<f64>,
-    /// Text above the panel, such as the largest of its numbers; empty for nothing.
+    /// Text above the panel, such as the largest of its numbers; empty for none.
     pub note: String,
 }
 
@@ -74,12 +73,12 @@ pub struct BoxPanel {
 pub struct BoxGrid {
     /// The panels by rows.
     pub panels: Vec<BoxPanel>,
-    /// Panels in a row; one where it is zero. One column is as wide as a column of text, several as
-    /// a page.
+    /// Panels per row; zero counts as one. A single column has the width of a text column, several
+    /// have that of a page.
     pub columns: usize,
-    /// Text above each column, or above each panel; empty for none.
+    /// Title of each column, or of each panel; empty for none.
     pub titles: Vec<String>,
-    /// Name of the difference between the groups, such as `n_k^*`.
+    /// Name of the grouping variable, such as `n_k^*`.
     pub abscissa: String,
     /// Names of the groups.
     pub groups: Vec<String>,
@@ -87,11 +86,11 @@ pub struct BoxGrid {
     pub series: Vec<BoxSeries>,
     /// Range of the ordinates.
     pub range: BoxRange,
-    /// True when panels of a row have one ordinate.
+    /// True if the panels of a row share an ordinate.
     pub shared_ordinates: bool,
-    /// True when zero is in every range, with a line.
+    /// True if every range includes zero, with a line.
     pub with_zero: bool,
-    /// Least half width of every range, so that rounding is not drawn as a spread; zero for none.
+    /// Smallest half width of every range, so that rounding does not appear as spread; zero for none.
     pub least_reach: f64,
 }
 
@@ -144,7 +143,7 @@ impl BoxPanel {
         self.linear_within.map(|linear_within| Bent { linear_within })
     }
 
-    /// Height of a value on the ordinate, in units of that.
+    /// Height of a value on the ordinate, in its transformed units.
     fn height(&self, value: f64) -> f64 {
         self.bent().map_or(value, |bent| bent.height(value))
     }
@@ -169,7 +168,7 @@ impl BoxGrid {
         }
     }
 
-    /// The names of the groups, in two rows where they are long.
+    /// Draws the names of the groups, in two rows if they are long.
     fn add_names(&self, scene: &mut Scene, area: Area) {
         let names: Vec<String> = self.groups.iter().map(|g| marked(g)).collect();
         let pitch = area.width / names.len() as f64;
@@ -187,7 +186,7 @@ impl BoxGrid {
         }
     }
 
-    /// Draws the boxes of a panel; true when one is missing.
+    /// Draws the boxes of a panel; true if one is missing.
     fn draw(&self, scene: &mut Scene, panel: &BoxPanel, area: Area, (low, high): (f64, f64)) -> bool {
         let share = |v: f64| (panel.height(v).clamp(low, high) - low) / (high - low);
         let y_of = |v: f64| area.bottom() - share(v) * area.height;
@@ -292,7 +291,7 @@ fn draw_box(
     }
     let size = (2.0 * half, lower - upper);
     scene.add(draw::rectangle((x - half, upper), size, colour, Some((INK, 0.6))));
-    // A box without height is its median alone.
+    // A box without height consists of its median line.
     let on_box = if size.1 < 2.0 || !is_dark(colour) {
         BLACK
     } else {
@@ -331,7 +330,7 @@ mod tests {
 
     #[test]
     fn a_box_stands_at_the_place_of_its_numbers() {
-        // Ordinate from 0 to 10 with 5 % of room: -0.5 to 10.5 over the height of the axes.
+        // Ordinate from 0 to 10 with a margin of 5 %: -0.5 to 10.5 over the height of the axes.
         let one = BoxStatistics {
             count: 5,
             lower_whisker: 0.0,

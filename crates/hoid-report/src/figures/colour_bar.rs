@@ -1,8 +1,8 @@
-//! Colours of values, and the bar that explains them.
+//! Colour map of values, and its colour bar.
 //!
-//! They are viridis (Smith and van der Walt, 2015), evenly spaced in lightness, or for differences
-//! those from red over white at zero to blue of Harrower and Brewer (2003), of which both ends are
-//! equally dark.
+//! The colours are viridis (Smith and van der Walt, 2015), evenly spaced in lightness, or for
+//! differences those from red over white at zero to blue of Harrower and Brewer (2003), whose ends
+//! are equally dark.
 
 use kuva::{
     prelude::ColorMap,
@@ -20,7 +20,7 @@ use super::{
 pub const BESIDE: f64 = 72.0;
 const BAR: f64 = 12.0;
 const STEPS: usize = 64;
-/// Height between its ticks.
+/// Distance between its ticks.
 const TICK_HEIGHT: f64 = 30.0;
 
 /// Colours of the cells.
@@ -29,11 +29,11 @@ pub enum MapColours {
     /// From dark for the smallest value to light for the largest.
     #[default]
     Sequential,
-    /// White at zero, equally far to both sides.
+    /// White at zero, with equal range on both sides.
     Diverging,
 }
 
-/// From values to colours.
+/// Colour map of values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ColourScale {
     pub low: f64,
@@ -42,7 +42,7 @@ pub struct ColourScale {
 }
 
 impl ColourScale {
-    /// The colour `#rrggbb` of a value; those beyond the ends have the colour of the end.
+    /// The colour `#rrggbb` of a value; values outside the range have the colour of the end.
     pub fn colour(&self, value: f64) -> String {
         let share = ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
         let map = match self.colours {
@@ -68,7 +68,7 @@ impl ColourScale {
         }
     }
 
-    /// A bar of the colours with ticks and the name of the value, at the right end of the figure.
+    /// Draws a colour bar with ticks and the name of the value, at the right end of the figure.
     pub fn add_bar(&self, scene: &mut Scene, top: f64, bottom: f64, name: &str) {
         let left = scene.width - BESIDE + 2.0;
         let height = bottom - top;
@@ -96,7 +96,7 @@ impl ColourScale {
                 None,
             ));
         }
-        // A subscript of a name that is written upwards reaches further to the right.
+        // A subscript of a vertical name extends further to the right.
         let x = scene.width - 9.0;
         scene.add(draw::centred(x, top + 0.5 * height, marked(name), Some(-90.0)));
     }

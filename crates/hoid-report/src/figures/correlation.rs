@@ -1,4 +1,4 @@
-//! Residual auto- and cross-correlation with the bounds of no correlation.
+//! Residual auto- and cross-correlation with the bounds for uncorrelated residuals.
 
 use hoid_ident::validation::Correlation;
 use hoid_model::SampleTime;

@@ -1,5 +1,5 @@
-//! Curves over a number in a grid of panels: with bands, markers, error bars and stems, on linear
-//! and logarithmic axes.
+//! Curves in a grid of panels: with bands, markers, error bars and stems, on linear and logarithmic
+//! axes.
 
 use kuva::{
     prelude::{BandPlot, Plot},
@@ -19,49 +19,48 @@ use super::{
     svg,
 };
 
-/// Height between the axes of a panel, and of one that is the whole figure.
+/// Height of the axes of a panel, and of a single panel.
 const HEIGHT: f64 = 112.0;
 const ALONE: f64 = 150.0;
 const LINE: f64 = 1.4;
 const RADIUS: f64 = 2.2;
-/// Half of the end of an error bar.
+/// Half width of the cap of an error bar.
 const CAP: f64 = 2.5;
-/// Next to the first and the last stem or marker, part of the abscissa.
+/// Margin next to the first and the last stem or marker, as a fraction of the abscissa.
 const ROOM: f64 = 0.03;
 
-/// How a curve is drawn.
+/// Style of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LineKind {
-    /// Continuous, in its colour.
+    /// Solid, in its colour.
     #[default]
     Line,
-    /// Dashed, in its colour: what may lie on another line, which shows through.
+    /// Dashed, in its colour: for a curve that may coincide with another, which remains visible.
     Dashed,
     /// Dotted, in its colour.
     Dotted,
-    /// Dashed and black: the truth, or what was demanded.
+    /// Dashed and black: the true or specified value.
     Truth,
-    /// Continuous with a marker at each value, whose form is that of the level.
+    /// Solid with a marker at each value, whose shape represents the level.
     Marked,
-    /// A marker at each value, no line.
+    /// A marker at each value, without line.
     Points,
-    /// A line from the abscissa to each value, which has a marker: a spectrum of lines.
+    /// A line from the abscissa to each value, with a marker: a line spectrum.
     Stems,
 }
 
 /// One curve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    /// Its name in the legend, where equal names of one look are once; empty for none.
+    /// Name in the legend, where entries with equal name and style appear once; empty for none.
     pub name: String,
-    /// How it is drawn.
+    /// Style.
     pub kind: LineKind,
-    /// Its colour.
+    /// Colour.
     pub shade: Shade,
     /// Abscissas, ascending.
     pub x: Vec<f64>,
-    /// One value for each. What is not finite, or has no logarithm where the axis needs it, is a
-    /// gap.
+    /// Ordinates. A value that is not finite, or not positive on a logarithmic axis, is a gap.
     pub y: Vec<f64>,
     /// Lower and upper edge of the band at each abscissa; empty for none.
     pub band: Vec<(f64, f64)>,
@@ -72,15 +71,15 @@ pub struct Curve {
 /// One panel of curves.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CurvePanel {
-    /// Name of the ordinate; after `_` or `^` comes one sign, or several in braces.
+    /// Name of the ordinate; `_` or `^` is followed by one character, or several in braces.
     pub name: String,
-    /// Its unit; empty for none. An ordinate in `deg` has ticks at parts of the circle.
+    /// Its unit; empty for none. An ordinate in `deg` has ticks at fractions of a full turn.
     pub unit: String,
     /// True for a logarithmic ordinate.
     pub logarithmic: bool,
-    /// Its range; that of the curves with their bands and bars where it is `None`.
+    /// Range of the ordinate; that of the curves with their bands and bars if it is `None`.
     pub within: Option<(f64, f64)>,
-    /// The curves, drawn in this order above all bands.
+    /// The curves, drawn in this order over all bands.
     pub curves: Vec<Curve>,
 }
 
@@ -89,16 +88,16 @@ pub struct CurvePanel {
 pub struct CurveGrid {
     /// The panels by rows.
     pub panels: Vec<CurvePanel>,
-    /// Panels in a row; one where it is zero. One column is as wide as a column of text, several as
-    /// a page.
+    /// Panels per row; zero counts as one. A single column has the width of a text column, several
+    /// have that of a page.
     pub columns: usize,
-    /// Text above each column, or above each panel; empty for none.
+    /// Title of each column, or of each panel; empty for none.
     pub titles: Vec<String>,
     /// Name and unit of the abscissa, such as `time (s)`.
     pub abscissa: String,
     /// True for a logarithmic abscissa.
     pub logarithmic_abscissa: bool,
-    /// True when panels of a row have one ordinate.
+    /// True if the panels of a row share an ordinate.
     pub shared_ordinates: bool,
 }
 
@@ -171,7 +170,7 @@ impl CurveGrid {
             let factor = (high / low).powf(room);
             return (low / factor, high * factor);
         }
-        // A tick at the very end must not fall to rounding.
+        // A tick at the very end must not be lost by rounding.
         let room = room.max(1e-9);
         (low - room * (high - low), high + room * (high - low))
     }
@@ -197,7 +196,7 @@ impl CurveGrid {
         entries
     }
 
-    /// Levels of the method that has most.
+    /// Largest number of levels of a method.
     fn levels(&self) -> usize {
         let curves = self.panels.iter().flat_map(|p| &p.curves);
         curves.map(|c| c.shade.levels).max().unwrap_or(1)
@@ -209,7 +208,7 @@ impl CurvePanel {
         let edges = |c: &Curve| -> Vec<f64> { c.band.iter().chain(&c.bars).flat_map(|b| [b.0, b.1]).collect() };
         let mut values: Vec<f64> = self.curves.iter().flat_map(|c| c.y.iter().copied()).collect();
         if self.logarithmic {
-            // An edge at or below zero is that of a wide band, not a value to be shown.
+            // An edge at or below zero belongs to a wide band, and is not a value to be shown.
             let least = values
                 .iter()
                 .copied()
@@ -287,8 +286,7 @@ impl Curve {
         runs(n, known).into_iter().filter(|r| r.len() > 1).map(line).collect()
     }
 
-    /// Stems, error bars and markers, and the values that are alone between gaps; none outside the
-    /// axes.
+    /// Draws stems, error bars, markers and isolated values; none outside the axes.
     fn draw_marks(&self, scene: &mut Scene, scale: &Scale) {
         let colour = self.colour();
         let n = self.y.len().min(self.x.len());
@@ -368,7 +366,7 @@ mod tests {
         let svg = curves("c", "t", &grid(vec![stems], true));
         let left = style::LEFT;
         let width = style::WIDTH - style::LEFT - style::RIGHT;
-        // The abscissa reaches 3 % of two decades beyond both ends; the ordinate from 0.5 to 1000.
+        // The abscissa extends 3 % of two decades beyond both ends; the ordinate ranges from 0.5 to 1000.
         let x = |v: f64| left + width * (v.log10() + 0.06) / 2.12;
         let y = |v: f64| 8.0 + ALONE * (1000.0 / v).log10() / 2000.0_f64.log10();
         let upright = |at: f64, from: f64, to: f64| {
@@ -393,7 +391,7 @@ mod tests {
         let x: Vec<f64> = (0..8).map(f64::from).collect();
         let svg = curves("c", "t", &grid(vec![curve(LineKind::Line, &x, &y)], false));
         let blue = svg.to_lowercase().matches("stroke=\"#0072b2\"").count();
-        // Two lines and the sample of the legend.
+        // Two lines and the legend sample.
         assert_eq!(blue, 3, "{svg}");
         assert_eq!(svg.matches("<circle").count(), 1);
         assert!(!svg.contains("NaN") && !svg.contains("inf"));

@@ -1,7 +1,7 @@
-//! A describing function with its errors, over frequency: magnitude, phase and coherence, with any
-//! models drawn through it.
+//! A describing function with its errors, over frequency: magnitude, phase and coherence, with the
+//! curves of models.
 //!
-//! The phase of a model is drawn in the turn in which it lies nearest to the points.
+//! The phase of a model is drawn on the branch nearest to the points.
 
 use hoid_ident::{
     ResponsePoint,
@@ -16,30 +16,30 @@ use super::{
 };
 use crate::numbers::Z_95;
 
-/// In the legend; equal names are there once.
+/// Name in the legend; equal names appear once.
 const NAME: &str = "describing function, bars 95 %";
-/// The same where a bar is not drawn to its end.
+/// Name if a bar is truncated.
 const NAME_OF_CUT: &str = "describing function, bars 95 %, cut at 180 deg";
-/// Frequencies of a model curve.
+/// Number of frequencies of a model curve.
 const POINTS: usize = 240;
 
-/// A frequency response that is drawn through the points.
+/// A frequency response drawn with the points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelCurve {
-    /// Its name in the legend.
+    /// Name in the legend.
     pub name: String,
     /// Frequencies, rad/s, ascending.
     pub omega_rad_s: Vec<f64>,
-    /// The response at each.
+    /// Response at each frequency.
     pub response: Vec<Complex64>,
-    /// Standard errors of magnitude in dB and phase in deg at each, for a band; empty for none.
+    /// Standard errors of magnitude in dB and phase in deg at each frequency, for a band; empty for none.
     pub standard_errors: Vec<[f64; 2]>,
-    /// Its delay, which is taken out while the phase is unwrapped, s.
+    /// Delay removed for unwrapping the phase, s.
     pub delay_s: f64,
 }
 
 impl ModelCurve {
-    /// A response over the frequencies of a description, and a little beyond.
+    /// A response over the frequency range of a description with a small margin.
     pub fn over(found: &Description, name: &str, delay_s: f64, response: impl Fn(f64) -> Complex64) -> Self {
         let omega_rad_s = frequencies(found);
         Self {
@@ -79,14 +79,14 @@ impl ModelCurve {
     fn band(&self, part: usize, around: &[f64]) -> Vec<(f64, f64)> {
         let ends = |(value, errors): (&f64, &[f64; 2])| {
             let whole = Z_95 * errors[part];
-            // Not `min`, which takes the number of a number and NaN.
+            // Not `min`, which ignores NaN.
             let half = if whole > LONGEST_BAR { LONGEST_BAR } else { whole };
             (value - half, value + half)
         };
         around.iter().zip(&self.standard_errors).map(ends).collect()
     }
 
-    /// Phase in deg, in the turn that is nearest to points of frequency and phase.
+    /// Phase in deg, on the branch nearest to the points of frequency and phase.
     fn phase_deg(&self, points: &[(f64, f64)]) -> Vec<f64> {
         let principal = self.response.iter().map(|h| h.arg().to_degrees());
         let pairs: Vec<(f64, f64)> = self.omega_rad_s.iter().copied().zip(principal).collect();
@@ -106,7 +106,7 @@ impl ModelCurve {
     }
 }
 
-/// The frequencies of a description, and a little beyond, rad/s.
+/// The frequency range of a description with a small margin, rad/s.
 fn frequencies(found: &Description) -> Vec<f64> {
     let lines = &found.function.lines;
     let ends = lines.first().zip(lines.last());
@@ -150,7 +150,7 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
     };
     let known: Vec<(f64, f64)> = omega.iter().copied().zip(phases.iter().map(|p| p.value)).collect();
     let gain_of = |model: &ModelCurve| model.response.iter().map(|h| 20.0 * h.norm().log10()).collect();
-    // Models first: the points lie on them.
+    // Models first: the points are drawn over them.
     let mut magnitude: Vec<Curve> = models.iter().enumerate().map(|m| line(m, 0, gain_of(m.1))).collect();
     magnitude.push(points(&magnitudes, name));
     let mut phase: Vec<Curve> = models
@@ -161,7 +161,7 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
     phase.push(points(&phases, name));
     let mut panels = vec![panel("magnitude", "dB", magnitude), panel("phase", "deg", phase)];
     let coherences: Vec<Estimate> = lines.iter().filter_map(|l| l.coherence).map(Estimate::fixed).collect();
-    // Without the excitation it is that of u with e, which carries little information in a loop.
+    // Without the excitation it is the coherence of u with e, which carries little information in a closed loop.
     let shown = found.channel.is_some() && coherences.len() == omega.len();
     if let Some(chance) = chance_coherence(found.function.runs.len()).filter(|_| shown) {
         let ends = models.iter().flat_map(|m| m.omega_rad_s.iter()).chain(&omega);
@@ -190,7 +190,7 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
     curves(id, title, &grid)
 }
 
-/// The first model is a continuous line, those after it are broken: where they agree, all are seen.
+/// The first model is a solid line, further ones are broken: all remain visible where they agree.
 fn kind_of(model: usize) -> LineKind {
     match model {
         0 => LineKind::Line,
@@ -199,16 +199,16 @@ fn kind_of(model: usize) -> LineKind {
     }
 }
 
-/// Half of the longest error bar, dB or deg: a phase that is known no better than half a turn is not
-/// known, and a longer bar would press all others together.
+/// Largest half length of an error bar, dB or deg: a phase with an error of half a turn is unknown,
+/// and a longer bar would compress the scale of all others.
 const LONGEST_BAR: f64 = 180.0;
 
-/// Half of the error bar, NaN if there is no error.
+/// Half length of an error bar, NaN if there is no error.
 fn half_bar(v: &Estimate) -> f64 {
     v.standard_error.map_or(f64::NAN, |s| Z_95 * s)
 }
 
-/// Ends of an error bar as it is drawn.
+/// Ends of an error bar as drawn.
 fn bar(v: &Estimate) -> (f64, f64) {
     let whole = half_bar(v);
     let half = if whole > LONGEST_BAR { LONGEST_BAR } else { whole };
@@ -334,7 +334,7 @@ mod tests {
         let broken = |models: &[ModelCurve]| describing("d", "t", &found, models).matches("stroke-dasharray").count();
         let (none, one) = (broken(&[]), broken(&[model("a")]));
         let (two, three) = (broken(&[model("a"), model("b")]), broken(&["a", "b", "c"].map(model)));
-        // A line in each of two panels, and the sample of the legend.
+        // A line in each of two panels, and the legend sample.
         assert_eq!([one - none, two - one, three - two], [0, 3, 3]);
     }
 

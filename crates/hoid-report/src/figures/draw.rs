@@ -1,4 +1,4 @@
-//! Marks that are drawn at places of the figure itself, above the axes: coordinates in its units.
+//! Marks drawn at positions of the figure, over the axes, in its coordinates.
 
 use kuva::render::{
     color::Color,
@@ -11,14 +11,14 @@ use super::{
     style::{GREY, TEXT},
 };
 
-/// Outlines, whiskers, and the marks of missing values.
+/// Colour of outlines, whiskers and marks of missing values.
 pub const INK: &str = "#333333";
-/// Size of labels that would be too long.
+/// Font size of labels that would otherwise be too long.
 const SMALL: u32 = 10;
-/// For bands around lines.
+/// Opacity of bands around lines.
 pub const BAND_OPACITY: f64 = 0.2;
 
-/// Distance of the lines of a hatching.
+/// Distance between the lines of a hatching.
 const HATCH: f64 = 5.0;
 
 pub fn line(from: (f64, f64), to: (f64, f64), colour: &str, width: f64, dashes: Option<&str>) -> Primitive {
@@ -71,7 +71,7 @@ pub fn cross(scene: &mut Scene, (x, y): (f64, f64), half: f64, colour: &str, wid
     scene.add(line((x - half, y + half), (x + half, y - half), colour, width, None));
 }
 
-/// A mark of this form around a place: all cover about the same area.
+/// Draws a mark of this shape at a position: all cover about the same area.
 pub fn mark(scene: &mut Scene, at: (f64, f64), radius: f64, form: Mark, colour: &str) {
     let (x, y) = at;
     let (side, tall, wide) = (0.9 * radius, 1.35 * radius, 1.3 * radius);
@@ -87,7 +87,7 @@ pub fn mark(scene: &mut Scene, at: (f64, f64), radius: f64, form: Mark, colour: 
     }
 }
 
-/// A triangle that points up or down with its tip at a place.
+/// Draws a triangle that points up or down with its tip at a position.
 pub fn triangle(scene: &mut Scene, (x, y): (f64, f64), half: f64, up: bool, colour: &str) {
     let base = if up { y + 1.7 * half } else { y - 1.7 * half };
     let (left, right) = (x - half, x + half);
@@ -101,7 +101,7 @@ pub fn triangle(scene: &mut Scene, (x, y): (f64, f64), half: f64, up: bool, colo
     })));
 }
 
-/// A pale rectangle with diagonal lines: nothing is known here.
+/// Draws a pale rectangle with diagonal lines, for missing values.
 pub fn hatched(scene: &mut Scene, (x, y): (f64, f64), (width, height): (f64, f64)) {
     scene.add(rectangle((x, y), (width, height), "#f2f2f2", None));
     let mut offset = HATCH;
@@ -126,12 +126,12 @@ pub fn text(x: f64, y: f64, content: String, size: u32, anchor: TextAnchor, rota
     }
 }
 
-/// Text in the middle of a place, in the size of all labels.
+/// Text centred at a position, in the font size of labels.
 pub fn centred(x: f64, y: f64, content: String, rotate: Option<f64>) -> Primitive {
     text(x, y, content, TEXT, TextAnchor::Middle, rotate)
 }
 
-/// The same, smaller where it is longer than its room.
+/// The same, smaller if it is longer than the available space.
 pub fn fitted(x: f64, y: f64, content: String, room: f64, rotate: Option<f64>) -> Primitive {
     let size = match text_width(&content, TEXT) > room {
         true => SMALL,
@@ -140,13 +140,13 @@ pub fn fitted(x: f64, y: f64, content: String, room: f64, rotate: Option<f64>) -
     text(x, y, content, size, TextAnchor::Middle, rotate)
 }
 
-/// Room for a text in the font that the reader has: where there is no Helvetica or Arial it is often DejaVu
-/// Sans, which is an eighth wider.
+/// Space for a text in the reader's font: without Helvetica or Arial it is often DejaVu Sans, which is wider by an
+/// eighth.
 pub fn text_room(text: &str, size: u32) -> f64 {
     1.14 * text_width(text, size)
 }
 
-/// Width of text in Helvetica, a little more on average.
+/// Approximate width of text in Helvetica, slightly more on average.
 pub fn text_width(text: &str, size: u32) -> f64 {
     let of = |sign: char| match sign {
         ' ' | '.' | ',' | ':' | ';' | 'i' | 'j' | 'l' | '|' | '\'' | 'I' => 0.28,
@@ -163,8 +163,8 @@ pub fn text_width(text: &str, size: u32) -> f64 {
 pub mod tests {
     use super::*;
 
-    /// True when the figure has an element with these numbers, to the hundredth that it is written
-    /// with.
+    /// True if the figure has an element with these numbers, to the hundredth with which they are
+    /// written.
     pub fn has(svg: &str, element: &str, numbers: &[(&str, f64)]) -> bool {
         let number = |tag: &str, name: &str| -> Option<f64> {
             let (_, rest) = tag.split_once(&format!(" {name}=\""))?;
@@ -181,7 +181,7 @@ pub mod tests {
 
     #[test]
     fn widths_of_text() {
-        // Helvetica: digits 0.556, the point 0.278 of the size.
+        // Helvetica: digits are 0.556, the point 0.278 of the font size.
         assert!((text_width("-0.55", 10) - 22.9).abs() < 0.5);
         assert_eq!(text_width("", 13), 0.0);
     }

@@ -1,28 +1,28 @@
-//! A figure as a file: its width on paper, and the format that the name of the file states.
+//! A figure as a file: its width on paper, and the format given by the file name.
 //!
-//! Every figure is drawn as SVG. PDF, whose lines and letters stay such, and PNG, of [`DPI`] dots an
-//! inch, are made of it with the fonts of the system (feature `pdf-png`).
+//! Every figure is drawn as SVG. PDF, with vector lines and text, and PNG, with a resolution of
+//! [`DPI`], are made from it with the fonts of the system (feature `pdf-png`).
 
 use std::path::Path;
 
 use crate::ReportError;
 
-/// Dots an inch of a PNG: what journals ask of line art in colour. 85 mm are 1004 dots.
+/// Resolution of a PNG, dots per inch: that which journals require of colour line art. 85 mm are 1004 dots.
 pub const DPI: f64 = 300.0;
 
 /// Formats in which a figure can be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FigureFormat {
-    /// As it is drawn.
+    /// Vector graphics, as drawn.
     Svg,
     /// One page of the size of the figure.
     Pdf,
-    /// Dots on white.
+    /// Pixels on white.
     Png,
 }
 
 impl FigureFormat {
-    /// The format that the ending of a name states; none for another ending.
+    /// The format given by the extension of a name; none for another extension.
     pub fn of(path: &Path) -> Option<Self> {
         let ending = path.extension()?.to_str()?.to_ascii_lowercase();
         match ending.as_str() {
@@ -33,15 +33,15 @@ impl FigureFormat {
         }
     }
 
-    /// Whether this hoid can write it: PDF and PNG need the feature `pdf-png`.
+    /// True if this build can write the format: PDF and PNG need the feature `pdf-png`.
     pub const fn is_built(self) -> bool {
         matches!(self, Self::Svg) || cfg!(feature = "pdf-png")
     }
 
-    /// The bytes of the file.
+    /// Returns the bytes of the file.
     ///
     /// # Errors
-    /// [`ReportError::Figure`] where the format is not built, or the system has no font.
+    /// [`ReportError::Figure`] if the format is not built, or the system has no font.
     pub fn bytes(self, svg: &str) -> Result<Vec<u8>, ReportError> {
         match self {
             Self::Svg => Ok(svg.as_bytes().to_vec()),
@@ -57,8 +57,8 @@ impl FigureFormat {
     }
 }
 
-/// The same figure in another size: its width in mm, and the height that goes with it. The text
-/// grows with it; it has 7.5 pt at 85 mm.
+/// Scales the figure to a width in mm, with the corresponding height. The text is scaled too; it
+/// has 7.5 pt at 85 mm.
 pub fn with_width_mm(svg: &str, width_mm: f64) -> String {
     let size = |name: &str| -> Option<f64> {
         let (_, rest) = svg.split_once(&format!(" {name}=\""))?;
@@ -78,7 +78,7 @@ pub fn with_width_mm(svg: &str, width_mm: f64) -> String {
 
 #[cfg(feature = "pdf-png")]
 mod converted {
-    //! By svg2pdf and resvg, which read the same tree of the same SVG.
+    //! Conversion by svg2pdf and resvg, which use the same tree of the same SVG.
 
     use resvg::{
         tiny_skia::{Pixmap, Transform},
@@ -89,9 +89,9 @@ mod converted {
     use super::DPI;
     use crate::ReportError;
 
-    /// Pixels an inch of an SVG without a unit (CSS).
+    /// Pixels per inch of an SVG without a unit (CSS).
     const PIXELS_AN_INCH: f64 = 96.0;
-    /// Those that figures name, and what Linux has in their place.
+    /// Font families of the figures, and their replacements on Linux.
     const SANS_SERIF: [&str; 5] = ["Helvetica", "Arial", "Liberation Sans", "DejaVu Sans", "Noto Sans"];
 
     pub fn pdf(svg: &str) -> Result<Vec<u8>, ReportError> {
@@ -123,7 +123,7 @@ mod converted {
         Tree::from_str(svg, &options).map_err(|e| failed(&e))
     }
 
-    /// A family of the system for text: one of [`SANS_SERIF`], else any.
+    /// A font family of the system: one of [`SANS_SERIF`], otherwise any.
     fn sans_serif(fonts: &Database) -> Option<String> {
         let has = |name: &&str| {
             fonts

@@ -1,8 +1,9 @@
-//! The grid that figures of several panels are in: widths, heights and margins of its cells, labels
-//! of rows, titles of columns or panels.
+//! The grid of figures with several panels: widths, heights and margins of its cells, labels of
+//! rows, titles of columns or panels.
 //!
-//! One column is as wide as a column of text, several as a page. Axes are equally wide in all
-//! columns. Only the lowest panel of a column has the ticks and the name of the abscissa.
+//! A single column has the width of a text column, several have that of a page. Axes have the same
+//! width in all columns. Only the lowest panel of a column has the ticks and the name of the
+//! abscissa.
 
 use std::sync::Arc;
 
@@ -18,35 +19,35 @@ use super::{
     svg,
 };
 
-/// Above the axes of a panel, and below where there is no abscissa.
+/// Space above the axes of a panel, and below if there is no abscissa.
 const SPACE: f64 = 8.0;
-/// Before a panel that shares the ordinate of its neighbour.
+/// Space before a panel that shares the ordinate of its neighbour.
 const GAP: f64 = 16.0;
-/// Before a panel with ticks of its own, but no label.
+/// Space before a panel with its own ticks, but no label.
 const TICKS: f64 = 50.0;
-/// After such a panel, except for the last: less than the half of a tick's label, which reaches
+/// Space after such a panel, except for the last: less than half of a tick label, which extends
 /// into the space of the next.
 const NARROW: f64 = 5.0;
 const TITLE: f64 = 18.0;
 /// Centre of the label of the ordinate.
 const LABEL_AT: f64 = 13.0;
-/// The name of the abscissa below its axis, and below two rows of names of places.
+/// Position of the name of the abscissa below its axis, and below two rows of category names.
 const NAME_BELOW: f64 = 44.0;
 
-/// Which panels of a row have ticks and the label of the ordinate.
+/// Panels of a row with ticks and the label of the ordinate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ordinates {
-    /// Each has both.
+    /// Each panel has both.
     Each,
-    /// Each has ticks, the first the label.
+    /// Each panel has ticks, the first has the label.
     Ticks,
-    /// The first has both: all have the same range.
+    /// The first panel has both: all have the same range.
     Shared,
 }
 
 impl Ordinates {
-    /// For panels with these names and units by rows: one label is enough for a row of one
-    /// quantity.
+    /// Choice for panels with these names and units by rows: one label suffices for a row with a
+    /// single quantity.
     pub fn of<'a>(labels: impl Iterator<Item = (&'a str, &'a str)>, columns: usize, shared: bool) -> Self {
         let labels: Vec<(&str, &str)> = labels.collect();
         let one = |row: &[(&str, &str)]| row.iter().all(|l| *l == row[0]);
@@ -58,7 +59,7 @@ impl Ordinates {
     }
 }
 
-/// Rectangle between the axes of a panel, in units of the figure.
+/// Rectangle of the axes of a panel, in units of the figure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Area {
     pub left: f64,
@@ -68,7 +69,7 @@ pub struct Area {
 }
 
 impl Area {
-    /// Columns that a line between these axes is reduced to: one for each unit.
+    /// Number of columns to which a line between these axes is reduced: one for each unit.
     pub fn parts(&self) -> usize {
         self.width.max(1.0) as usize
     }
@@ -96,13 +97,13 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Panels with axes of this height, the first `titles` of them with a title: all, those of the
-    /// first row, or none.
+    /// Creates a frame of panels with axes of this height, the first `titles` of them with a title:
+    /// all, those of the first row, or none.
     pub fn new(n: usize, columns: usize, axes_height: f64, ordinates: Ordinates, titles: usize) -> Self {
         Self::with_space(n, columns, axes_height, ordinates, titles, (0.0, 0.0))
     }
 
-    /// Panels in a figure that leaves some units above each panel and at its right.
+    /// Creates a frame that leaves space above each panel and at its right.
     pub fn with_space(
         n: usize,
         columns: usize,
@@ -167,17 +168,17 @@ impl Frame {
         i + self.columns >= self.n
     }
 
-    /// True for a panel with ticks at its ordinate.
+    /// True for a panel with ticks on its ordinate.
     pub fn has_ticks(&self, i: usize) -> bool {
         i.is_multiple_of(self.columns) || self.ordinates != Ordinates::Shared
     }
 
-    /// True for a panel with a label at its ordinate.
+    /// True for a panel with a label of its ordinate.
     pub fn has_label(&self, i: usize) -> bool {
         i.is_multiple_of(self.columns) || self.ordinates == Ordinates::Each
     }
 
-    /// Where the axes of a panel are.
+    /// Area of the axes of a panel.
     pub fn area(&self, i: usize) -> Area {
         let (row, column) = (i / self.columns, i % self.columns);
         let left = self.left(column);
@@ -189,7 +190,7 @@ impl Frame {
         }
     }
 
-    /// A layout with the size and margins of a panel, and no ticks at the abscissa where it is not
+    /// A layout with the size and margins of a panel, without ticks of the abscissa unless it is
     /// the lowest.
     pub fn fitted(&self, i: usize, layout: Layout) -> Layout {
         let (row, column) = (i / self.columns, i % self.columns);
@@ -204,7 +205,7 @@ impl Frame {
         layout.with_x_tick_format(TickFormat::Custom(Arc::new(|_| String::new())))
     }
 
-    /// The panels with the name of the abscissa, the labels of their ordinates and the titles.
+    /// Draws the panels with the name of the abscissa, the labels of their ordinates and the titles.
     pub fn drawn(
         &self,
         cells: Vec<(Vec<Plot>, Layout)>,
@@ -229,18 +230,18 @@ impl Frame {
             let (middle, y) = (area.left + 0.5 * area.width, area.top - SPACE - self.above);
             scene.add(draw::fitted(middle, y, marked(title), area.width + SPACE, None));
         }
-        // The widths of the cells add up to it except for rounding.
+        // The widths of the cells add up to it, up to rounding.
         scene.width = (scene.width + beside).round();
         scene
     }
 }
 
-/// A figure without a panel.
+/// A figure without panels.
 pub fn empty(id: &str, title: &str) -> String {
     svg::finish(id, title, Scene::new(WIDTH, 1.0))
 }
 
-/// The range of each panel, or for each the widest of its row.
+/// The range of each panel; if shared, the widest of its row.
 pub fn of_rows(own: Vec<(f64, f64)>, columns: usize, shared: bool) -> Vec<(f64, f64)> {
     if !shared {
         return own;

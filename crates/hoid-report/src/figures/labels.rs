@@ -1,13 +1,13 @@
 //! Text of labels: names of parameters as symbols, subscripts and superscripts.
 //!
-//! The library that draws knows no subscripts. They are marked by characters of the private use
-//! area of Unicode, which become tags in the finished SVG ([`tagged`]). What the readers of SVG
-//! agree on is little: they add up or replace the shifts of tags within tags, drop tags without
-//! text, trim spaces at the edges of a tag, and place each tag for itself where a text is centred.
-//! So the tags follow one after the other, each with text and with the whole step from the one
-//! before, and spaces at their edges do not break. Where a text with tags starts reports `svg`.
+//! The drawing library has no subscripts. They are marked by characters of the private use area of
+//! Unicode, which become tags in the finished SVG ([`tagged`]). SVG readers agree on little: they
+//! add up or replace the shifts of nested tags, drop tags without text, trim spaces at the edges of
+//! a tag, and position each tag separately in centred text. So the tags follow one after the other,
+//! each with text and with the whole step from the one before, and spaces at their edges are
+//! non-breaking. The start of a text with tags is given by `svg`.
 
-/// Stand in the text of labels for the start and end of a subscript and of a superscript; they
+/// Markers in the text of labels for the start and end of a subscript and of a superscript; they
 /// become tags.
 const SUB: char = '\u{e000}';
 const BACK: char = '\u{e001}';
@@ -25,7 +25,7 @@ pub enum Level {
 }
 
 impl Level {
-    /// How far below the line, in units of the figure.
+    /// Distance below the baseline, in units of the figure.
     fn below(self) -> i32 {
         match self {
             Self::Line => 0,
@@ -34,17 +34,17 @@ impl Level {
         }
     }
 
-    /// Size of the type, as a part of that of the line.
+    /// Font size relative to that of the line.
     pub fn size(self) -> f64 {
         if self == Self::Line { 1.0 } else { SMALLER }
     }
 }
 
-/// Size of subscripts in units of the figure, and next to that of the line.
+/// Font size of subscripts in units of the figure, and relative to that of the line.
 const SUBSCRIPT: &str = "12.2";
 const SMALLER: f64 = 12.2 / 13.0;
 
-/// Text of the user: a dollar sign would open a formula.
+/// Text of the user: a dollar sign would start a formula.
 fn literal(text: &str) -> String {
     text.replace('$', "\\$")
 }
@@ -65,8 +65,9 @@ pub fn panel_label(name: &str, unit: &str) -> String {
     literal(&format!("{}{unit}", names.join(", ")))
 }
 
-/// Text of a label with its subscripts and superscripts: `n_k^*`, `B_r(b_0^{d,0})`. After `_` or
-/// `^` comes one sign or several in braces; words such as `my_model` and `run_2` stay as they are.
+/// Text of a label with its subscripts and superscripts: `n_k^*`, `B_r(b_0^{d,0})`. `_` or `^` is
+/// followed by one character or several in braces; words such as `my_model` and `run_2` are
+/// unchanged.
 pub fn marked(text: &str) -> String {
     literal(&marks(text))
 }
@@ -103,7 +104,7 @@ fn marks(text: &str) -> String {
     result
 }
 
-/// The parts of a label and its position, none without text.
+/// The non-empty parts of a label and their positions.
 pub fn parts(text: &str) -> Vec<(Level, String)> {
     let mut parts: Vec<(Level, String)> = Vec::new();
     let mut level = Level::Line;
@@ -157,7 +158,7 @@ fn with_tags(text: &str) -> String {
     result
 }
 
-/// True for a text that will have tags.
+/// True for a text with subscripts or superscripts.
 pub fn has_tags(text: &str) -> bool {
     text.contains(SIGNS)
 }
@@ -167,7 +168,7 @@ pub fn plain(text: &str) -> String {
     text.replace(SIGNS, "")
 }
 
-/// A parameter with its subscript; other text as it is.
+/// A parameter with its subscript; other text unchanged.
 fn symbol(name: &str) -> String {
     let (letter, sub) = match name {
         "K_e" => ("K", "e"),

@@ -15,10 +15,10 @@ const GAP: f64 = 6.0;
 const BETWEEN: f64 = 14.0;
 const LONGEST: usize = 48;
 
-/// How an entry is shown.
+/// Sample of a legend entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sample {
-    /// A continuous line.
+    /// A solid line.
     Line,
     /// A dashed line.
     Dashed,
@@ -39,11 +39,11 @@ pub enum Sample {
 /// One entry.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
-    /// What it reports; see [`marked`] for subscripts.
+    /// Text of the entry; see [`marked`] for subscripts.
     pub name: String,
     /// Colour `#rrggbb`.
     pub colour: String,
-    /// What it shows.
+    /// Sample of the entry.
     pub sample: Sample,
 }
 
@@ -57,14 +57,14 @@ impl Entry {
     }
 }
 
-/// Adds the legend below the figure, which grows by it: in one row where that is wide enough, else
-/// in columns, else, with long names, in rows of as many entries as fit.
+/// Adds the legend below the figure, which becomes higher: in one row if the width suffices,
+/// otherwise in columns or, with long names, in rows of as many entries as fit.
 pub fn add_legend(scene: &mut Scene, entries: &[Entry]) {
     add_legend_by(scene, entries, 1);
 }
 
-/// The same with a whole multiple of `multiple` columns where there are several rows, so that
-/// entries of one kind stay together.
+/// The same with a multiple of `multiple` columns if there are several rows, so that entries of one
+/// kind stay together.
 pub fn add_legend_by(scene: &mut Scene, entries: &[Entry], multiple: usize) {
     if entries.is_empty() {
         return;

@@ -1,4 +1,4 @@
-//! Maps of a value over two orders as coloured cells, with the values printed where they fit.
+//! Maps of a function of two variables as coloured cells, with the values printed where they fit.
 
 use kuva::{
     prelude::Plot,
@@ -17,24 +17,24 @@ use super::{
     svg,
 };
 
-/// Height of a cell, and the least of a panel.
+/// Height of a cell, and the smallest height of a panel.
 const CELL: f64 = 26.0;
 const LEAST_HEIGHT: f64 = 78.0;
-/// Where the name of the ordinate is before its axis.
+/// Position of the name of the ordinate.
 const NAME_AT: f64 = 26.0;
-/// Between the names of places.
+/// Space between category names.
 const APART: f64 = 5.0;
 
 /// One map.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MapPanel {
-    /// Differences between the rows of panels, such as `P_n = 0.1`; that of the first of a row is
-    /// shown.
+    /// Name that distinguishes the rows of panels, such as `P_n = 0.1`; that of the first of a row
+    /// is shown.
     pub name: String,
-    /// Values by ordinate, the lowest first, and in each by abscissa. What is not finite or not
-    /// there is hatched.
+    /// Values by ordinate, the lowest first, and by abscissa. Non-finite or missing values are
+    /// hatched.
     pub values: Vec<Vec<f64>>,
-    /// Abscissa and ordinate, counted from zero, of the cell with the cross.
+    /// Indices of abscissa and ordinate, from zero, of the cell with the cross.
     pub marked: Option<(usize, usize)>,
 }
 
@@ -43,28 +43,27 @@ pub struct MapPanel {
 pub struct MapGrid {
     /// The panels by rows.
     pub panels: Vec<MapPanel>,
-    /// Panels in a row; one where it is zero. One column is as wide as a column of text, several as
-    /// a page.
+    /// Panels per row; zero counts as one. A single column has the width of a text column, several
+    /// have that of a page.
     pub columns: usize,
-    /// Text above each column, or above each panel; empty for none.
+    /// Title of each column, or of each panel; empty for none.
     pub titles: Vec<String>,
-    /// Name of the abscissa, such as `n_k^*`; after `_` or `^` comes one sign, or several in
-    /// braces.
+    /// Name of the abscissa, such as `n_k^*`; `_` or `^` is followed by one character, or several
+    /// in braces.
     pub abscissa: String,
-    /// Names of its places.
+    /// Category names of the abscissa.
     pub x_places: Vec<String>,
     /// Name of the ordinate.
     pub ordinate: String,
-    /// Names of its places from the lowest.
+    /// Category names of the ordinate, from the lowest.
     pub y_places: Vec<String>,
     /// Name and unit of the value, such as `VAF (%)`.
     pub value: String,
     /// Colours of the cells.
     pub colours: MapColours,
-    /// Values at the ends of the colours, beyond which they do not change; those of the data where
-    /// it is `None`.
+    /// Values at the ends of the colour map; those of the data if it is `None`.
     pub limits: Option<(f64, f64)>,
-    /// True when each row has colours and a bar of its own.
+    /// True if each row has its own colours and bar.
     pub bar_per_row: bool,
     /// Meaning of the cross, for the legend; empty for none.
     pub mark: String,
@@ -152,7 +151,7 @@ impl MapGrid {
         }
     }
 
-    /// The names of the places of an abscissa of this width: as many as are separate.
+    /// Category names of an abscissa of this width: as many as fit.
     fn x_names(&self, width: f64) -> Vec<String> {
         let names: Vec<String> = self.x_places.iter().map(|p| marked(p)).collect();
         let widest = names.iter().map(|n| draw::text_room(n, TEXT)).fold(0.0, f64::max);
@@ -161,7 +160,7 @@ impl MapGrid {
         names.into_iter().enumerate().map(shown).collect()
     }
 
-    /// The names of the places of the ordinate and its own.
+    /// Draws the name and the category names of the ordinate.
     fn add_ordinate(&self, scene: &mut Scene, area: Area) {
         let ny = self.y_places.len() as f64;
         for (k, place) in self.y_places.iter().enumerate() {
@@ -181,7 +180,7 @@ impl MapGrid {
         scene.add(draw::centred(x, middle, marked(&self.ordinate), Some(-90.0)));
     }
 
-    /// Draws the cells of a panel; true when one is missing.
+    /// Draws the cells of a panel; true if one is missing.
     fn draw(&self, scene: &mut Scene, panel: &MapPanel, area: Area, scale: &ColourScale) -> bool {
         let (nx, ny) = (self.x_places.len(), self.y_places.len());
         let (width, height) = (area.width / nx as f64, area.height / ny as f64);
@@ -219,7 +218,7 @@ impl MapGrid {
                     scene.add(text);
                 }
                 if is_marked {
-                    // Next to the number, or in the middle without a hint.
+                    // Next to the number, or in the middle if there is none.
                     let (at, half) = match decimals {
                         Some(_) => ((corner.0 + width - 4.6, corner.1 + 4.6), 2.2),
                         None => ((corner.0 + 0.5 * width, corner.1 + 0.5 * height), 5.0),
@@ -237,8 +236,8 @@ impl MapGrid {
         missing
     }
 
-    /// The decimals, at most two, with which the longest number fits into a cell: no more than
-    /// three digits need.
+    /// Number of decimals, at most two, with which the longest number fits into a cell: three
+    /// digits suffice.
     fn decimals(&self, width: f64) -> Option<usize> {
         let values = || self.panels.iter().flat_map(|p| p.values.iter().flatten());
         let finite = || values().copied().filter(|v| style::is_drawable(*v));

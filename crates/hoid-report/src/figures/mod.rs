@@ -1,4 +1,4 @@
-//! The figures of reports and studies, each as one SVG text.
+//! The figures of reports and studies, each as an SVG text.
 //!
 //! | function | figure |
 //! |---|---|
@@ -14,13 +14,13 @@
 //! | [`curves`] | any other curves, with bands, error bars, markers and stems |
 //! | [`FigureFormat`], [`with_width_mm`] | such a text as SVG, PDF or PNG, in its width on paper |
 //!
-//! Figures are 420 units wide, or 840 where panels are side by side, with 13-unit text: 7.5 pt in a
-//! column of 85 mm and on a page of 170 mm, subscripts 7.0 pt. Black dashes are the truth, dots
-//! batch fits. Colours are those of Okabe and Ito (*Color Universal Design*, 2008), on white: the
-//! hue is the method, its shade the level, black the truth; see [`Shade`]. In names and titles, `_`
-//! and `^` before a sign or braces make subscripts and superscripts. What is not finite is a gap.
-//! The same data give the same bytes. `id` must be different for figures that are on one page: it
-//! is the prefix of all ids inside the SVG.
+//! Figures are 420 units wide, or 840 with several columns of panels, with 13-unit text: 7.5 pt in
+//! a column of 85 mm and on a page of 170 mm, subscripts 7.0 pt. Dashed black lines are true
+//! values, dots are batch fits. Colours are those of Okabe and Ito (*Color Universal Design*,
+//! 2008), on white: the hue represents the method, its shade the level, black the truth; see
+//! [`Shade`]. In names and titles, `_` and `^` before a character or braces make subscripts and
+//! superscripts. Non-finite values are gaps. The same data give the same bytes. `id` must be
+//! different for figures on the same page: it is the prefix of all ids inside the SVG.
 
 mod axes;
 mod bode;

@@ -1,10 +1,10 @@
-//! The colours of all figures: the hue is the method, the shade of the hue the level (noise, sample
+//! The colours of all figures: the hue represents the method, its shade the level (noise, sample
 //! time, memory), black the truth.
 //!
 //! Hues are those of Okabe and Ito (*Color Universal Design*, 2008). Shades of one hue are spaced
 //! evenly in lightness `L*` (CIE 1976), light for the lowest level and dark for the highest, so
-//! that their order is kept in grey print as well. Where points are marked, each level has a mark
-//! of its own.
+//! that their order is preserved in greyscale. Where points are marked, each level has its own
+//! mark.
 
 use super::style::MODEL_COLOURS;
 
@@ -12,7 +12,7 @@ use super::style::MODEL_COLOURS;
 const LIGHTEST: f64 = 76.0;
 const DARKEST: f64 = 22.0;
 
-/// Form of the marks of a curve.
+/// Shape of the marks of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mark {
     Circle,
@@ -22,14 +22,14 @@ pub enum Mark {
     Down,
 }
 
-/// The item that gives a curve or box its colour.
+/// Method and level that determine the colour of a curve or box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shade {
-    /// Number of the method, which gives the hue: 0 (ARX) is blue, 1 (BJ) vermillion.
+    /// Index of the method, which determines the hue: 0 (ARX) is blue, 1 (BJ) vermillion.
     pub method: usize,
-    /// Number of the level from the lowest, which gives the lightness.
+    /// Index of the level from the lowest, which determines the lightness.
     pub level: usize,
-    /// How many levels there are; the hue itself where it is one or none.
+    /// Number of levels; with one or none the colour is the hue itself.
     pub levels: usize,
 }
 
@@ -43,7 +43,7 @@ impl Shade {
         }
     }
 
-    /// Its mark, that of the level.
+    /// The mark of the level.
     pub(super) fn mark(self) -> Mark {
         const MARKS: [Mark; 5] = [Mark::Circle, Mark::Square, Mark::Up, Mark::Diamond, Mark::Down];
         MARKS[self.level % MARKS.len()]
@@ -55,7 +55,7 @@ impl Shade {
     }
 }
 
-/// The colour `#rrggbb` of a level of a method; levels beyond the last are as dark as that.
+/// The colour `#rrggbb` of a level of a method; levels beyond the last have its colour.
 pub fn shade(method: usize, level: usize, levels: usize) -> String {
     let hue = MODEL_COLOURS[method % MODEL_COLOURS.len()];
     if levels < 2 {
@@ -66,7 +66,7 @@ pub fn shade(method: usize, level: usize, levels: usize) -> String {
     let hue = channels(hue);
     let end = if wanted > lightness(hue) { 255.0 } else { 0.0 };
     let mixed = |part: f64| hue.map(|c| c + part * (end - c));
-    // Lightness is monotonic in the part of white or black.
+    // Lightness is monotonic in the fraction of white or black.
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..40 {
         let middle = 0.5 * (low + high);
@@ -81,13 +81,13 @@ pub fn shade(method: usize, level: usize, levels: usize) -> String {
     format!("#{r:02X}{g:02X}{b:02X}")
 }
 
-/// True when white is prominent better than black on a colour `#rrggbb`: by contrast of luminance,
+/// True if white has more contrast than black on a colour `#rrggbb`: by contrast of luminance,
 /// below `L*` of 50.
 pub fn is_dark(colour: &str) -> bool {
     lightness(channels(colour)) < 50.0
 }
 
-/// The channels of `#rrggbb`; a part that is not a number is zero.
+/// The channels of `#rrggbb`; zero for a part that is not a number.
 fn channels(colour: &str) -> [f64; 3] {
     let part = |i: usize| {
         let digits = colour.get(1 + 2 * i..3 + 2 * i).unwrap_or("00");

@@ -1,31 +1,31 @@
 //! One quantity over time, and the range of its ordinate.
 //!
-//! An estimate that leaves its default range for a moment (T_L where K_e nearly vanishes) must not
-//! flatten all the rest. The ordinate therefore covers the truth, the batch fits and the estimates
-//! between their 10 and 90 % quantiles, and beyond that the quantiles of 1 and 99 % and the middle
-//! of the bands, as far as one and a half such ranges to either side. Where a truth is known and at
-//! least one method is near it, one that is far off does not flatten the others either: the
-//! ordinate ends at most two spans from the truth, a span being the range of the truth or a quarter
-//! of its size, and methods and batch fits beyond do not count. What lies outside is cut off at the
-//! axes, and [`TracePanel::beyond`] counts it.
+//! An estimate that leaves its normal range for a moment (T_L where K_e nearly vanishes) must not
+//! compress the scale of the rest. The ordinate therefore covers the truth, the batch fits and the
+//! estimates between their 10 and 90 % quantiles, and beyond that the quantiles of 1 and 99 % and
+//! the middle of the bands, up to one and a half such ranges to either side. If a true value is
+//! known and at least one method is near it, one that is far off does not determine the scale
+//! either: the ordinate ends at most two spans from the truth, a span being the range of the truth
+//! or a quarter of its size, and methods and batch fits beyond are ignored. Values outside are cut
+//! off at the axes, and [`TracePanel::beyond`] counts them.
 
 use hoid_numerics::statistics::{finite_sorted, quantile, quantile_of};
 
 use super::{axes::one_two_five, style};
 
-/// How far beyond its middle part an ordinate may reach, in ranges of that part.
+/// Largest extension of an ordinate beyond its middle part, in ranges of that part.
 const MORE: f64 = 1.5;
 
-/// How a curve is drawn.
+/// Style of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CurveKind {
     /// Estimate: a line in the colour of its method, with its band.
     Estimate,
-    /// Truth: a thin dashed black line.
+    /// True value: a thin dashed black line.
     Truth,
     /// Batch fit over a span: dashed, in the colour of its method.
     Batch,
-    /// A count that stays until the next row, in the colour of its method.
+    /// A count that is constant until the next row, in the colour of its method.
     Steps,
     /// Bound of the expected range: a thin black line, not in the legend.
     Bound,
@@ -34,16 +34,16 @@ pub enum CurveKind {
 /// One curve of a panel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TraceCurve {
-    /// How it is drawn.
+    /// Style.
     pub kind: CurveKind,
-    /// Number of its method, which gives the colour.
+    /// Index of its method, which determines the colour.
     pub method: usize,
-    /// Number of its level among those of the grid, which gives the shade; of no matter where the
-    /// grid has none.
+    /// Index of its level among those of the grid, which determines the shade; unused if the grid
+    /// has none.
     pub level: usize,
     /// Times in s, ascending.
     pub times_s: Vec<f64>,
-    /// One value for each time. What is not finite is a gap.
+    /// One value for each time. Non-finite values are gaps.
     pub values: Vec<f64>,
     /// Lower and upper edge of the band at each time; empty for none.
     pub band: Vec<(f64, f64)>,
@@ -52,22 +52,22 @@ pub struct TraceCurve {
 /// Range of the ordinate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Ordinate {
-    /// From quantiles, as the module states.
+    /// From quantiles, as described in the module.
     Robust,
-    /// This one.
+    /// A given range.
     Within(f64, f64),
-    /// Logarithmic, the quantiles of 1 and 99 %.
+    /// Logarithmic, between the quantiles of 1 and 99 %.
     Logarithmic,
 }
 
 /// Rows of a method that lie beyond the axes of a panel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Beyond {
-    /// Number of the method.
+    /// Index of the method.
     pub method: usize,
-    /// Rows with an estimate outside.
+    /// Number of rows with an estimate outside.
     pub outside: usize,
-    /// Rows with an estimate.
+    /// Number of rows with an estimate.
     pub rows: usize,
 }
 
@@ -75,11 +75,11 @@ pub struct Beyond {
 #[derive(Debug, Clone, PartialEq)]
 pub struct TracePanel {
     /// Name: `K_e` and the other parameters of the operator, `b0` and other coefficients are
-    /// written with subscripts, the rest as it is.
+    /// written with subscripts, others unchanged.
     pub name: String,
     /// Unit, empty for none.
     pub unit: String,
-    /// The curves, drawn in this order above all bands.
+    /// The curves, drawn in this order over all bands.
     pub curves: Vec<TraceCurve>,
     /// Range of the ordinate.
     pub ordinate: Ordinate,
@@ -90,7 +90,7 @@ impl TracePanel {
         self.curves.iter().flat_map(pick).collect()
     }
 
-    /// Range of the ordinate.
+    /// Returns the range of the ordinate.
     pub fn range(&self) -> (f64, f64) {
         match self.ordinate {
             Ordinate::Robust => self.robust_range(),
@@ -131,7 +131,7 @@ impl TracePanel {
         style::padded_range([low, high])
     }
 
-    /// Two spans to either side of the truth, when the middle of an estimate lies there.
+    /// Two spans to either side of the truth, if the middle of an estimate lies there.
     fn limit(&self) -> Option<(f64, f64)> {
         let of = |kind| self.curves.iter().filter(move |c| c.kind == kind);
         let truth = finite_sorted(of(CurveKind::Truth).flat_map(|c| c.values.iter().copied()));
@@ -142,7 +142,7 @@ impl TracePanel {
         of(CurveKind::Estimate).any(near).then_some((low, high))
     }
 
-    /// The methods with rows beyond the axes of the panel when it is alone.
+    /// The methods with rows beyond the axes of this panel by itself.
     pub fn beyond(&self) -> Vec<Beyond> {
         let (low, high) = self.range();
         let estimates = self.curves.iter().filter(|c| c.kind == CurveKind::Estimate);
@@ -191,7 +191,7 @@ pub(super) mod tests {
         }
         let with = panel(vec![curve(CurveKind::Estimate, values.clone())]);
         let (low, high) = with.range();
-        // At most one and a half ranges of the middle part below it, and 5 % of room.
+        // At most one and a half ranges of the middle part below it, and a margin of 5 %.
         assert!(low > 0.3 && high < quiet.1 + 0.1, "{low} {high}");
         let expected = Beyond {
             method: 0,
@@ -199,7 +199,7 @@ pub(super) mod tests {
             rows: 1000,
         };
         assert_eq!(with.beyond(), [expected]);
-        // The whole truth is always in.
+        // The range always includes the whole truth.
         let truth = vec![1.0, 1.0, -0.5, 1.0];
         let (low, _) = panel(vec![curve(CurveKind::Estimate, values), curve(CurveKind::Truth, truth)]).range();
         assert!(low < -0.5);
@@ -215,7 +215,7 @@ pub(super) mod tests {
         let far = curve(CurveKind::Estimate, vec![60.0; 100]);
         let (low, high) = panel(vec![near, far.clone(), truth()]).range();
         assert!(low > 9.0 && high < 13.0, "{low} {high}");
-        // Alone, it is what the figure is about.
+        // A single method determines the range.
         let (low, high) = panel(vec![far, truth()]).range();
         assert!(low < 11.25 && high > 60.0);
     }

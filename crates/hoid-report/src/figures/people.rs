@@ -1,5 +1,5 @@
-//! People by condition: each person a thin line through their estimates with their standard errors, and next to them
-//! the mean over people with its interval of 95 %.
+//! Persons by condition: each person a thin line through their estimates with their standard errors, and the mean over
+//! persons with its 95 % interval.
 
 use kuva::{prelude::Plot, render::render::Scene};
 
@@ -16,16 +16,16 @@ use super::{
 };
 
 const HEIGHT: f64 = 150.0;
-/// The names of the places below the axis, and a second row of them.
+/// Position of the category names below the axis, and of a second row of them.
 const NAMES_BELOW: f64 = 17.0;
 const SECOND: f64 = 12.0;
 /// Horizontal positions within a column: first and last person, and the mean.
 const PEOPLE: (f64, f64) = (0.18, 0.6);
 const MEAN: f64 = 0.78;
-/// More people than this are grey, without a legend.
+/// A larger number of persons is drawn in grey, without a legend.
 const COLOURED: usize = 6;
 
-/// An estimate of a person at a place, with its standard error.
+/// Estimate of a person in a category, with its standard error.
 pub type PersonAt = Option<(f64, Option<f64>)>;
 
 /// One quantity.
@@ -35,27 +35,26 @@ pub struct PeoplePanel {
     pub name: String,
     /// Its unit; empty for none.
     pub unit: String,
-    /// The people, and of each the places.
+    /// The estimates by person and category.
     pub people: Vec<Vec<PersonAt>>,
-    /// The means over people at the places, with the ends of their intervals.
+    /// The means over persons in each category, with the ends of their intervals.
     pub means: Vec<Option<(f64, (f64, f64))>>,
 }
 
-/// Panels of people with common places.
+/// Panels of persons with common categories.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PeopleGrid {
     /// The panels.
     pub panels: Vec<PeoplePanel>,
-    /// Names of the people.
+    /// Names of the persons.
     pub people: Vec<String>,
-    /// Names of the places, such as conditions.
+    /// Names of the categories, such as conditions.
     pub places: Vec<String>,
-    /// Differences between the places.
+    /// Name of the category axis.
     pub abscissa: String,
 }
 
-/// People by condition as one figure, two panels in a row where there are several. `title` is the text for screen
-/// readers.
+/// Persons by condition as one figure, two panels per row if there are several. `title` is the text for screen readers.
 pub fn people_by_condition(id: &str, title: &str, grid: &PeopleGrid) -> String {
     let n = grid.panels.len();
     if n == 0 || grid.places.is_empty() {
@@ -197,7 +196,7 @@ mod tests {
     #[test]
     fn marks_stand_at_the_places_of_their_numbers() {
         let svg = people_by_condition("p", "t", &grid());
-        // Ordinate from 0 to 11 with 5 % of room.
+        // Ordinate from 0 to 11 with a margin of 5 %.
         let y = |v: f64| 8.0 + HEIGHT * (11.55 - v) / 12.1;
         let width = style::WIDTH - style::LEFT - style::RIGHT;
         let x = |place: f64, part: f64| style::LEFT + 0.5 * width * (place + part);

@@ -1,8 +1,8 @@
-//! Places of numbers between the axes of a panel, linear or logarithmic.
+//! Positions of numbers between the axes of a panel, linear or logarithmic.
 
 use super::{frame::Area, style};
 
-/// Places of numbers between the axes of a panel.
+/// Positions of numbers between the axes of a panel.
 pub struct Scale {
     pub area: Area,
     pub x: (f64, f64),
@@ -12,12 +12,12 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// True for a number within the abscissa.
+    /// True for a number within the range of the abscissa.
     pub fn has_x(&self, x: f64) -> bool {
         (self.x.0..=self.x.1).contains(&x)
     }
 
-    /// True for a number that has a place on the ordinate or beyond its ends.
+    /// True for a number that has a position on the ordinate or beyond its ends.
     pub fn has_y(&self, y: f64) -> bool {
         style::is_drawable(y) && (y > 0.0 || !self.log_y)
     }
@@ -26,7 +26,7 @@ impl Scale {
         y.clamp(self.y.0, self.y.1)
     }
 
-    /// Beyond the axes the path is cut; without bound, numbers of 1e300 would be in the file.
+    /// Limits a value beyond the axes, where the path is clipped; otherwise numbers of 1e300 would be in the file.
     pub fn bounded(&self, y: f64) -> f64 {
         let (low, high) = self.y;
         let span = high - low;

@@ -1,11 +1,11 @@
-//! Long series drawn with few points: no peak is lost, and no gap is bridged.
+//! Reduction of long series to few points: peaks and gaps are preserved.
 
 use std::ops::Range;
 
-/// Columns that a line is reduced to in a figure of one column: one for each unit between its axes.
+/// Number of columns to which a line is reduced in a figure with one column: one for each unit between its axes.
 pub const COLUMNS: usize = 340;
 
-/// More runs than this are joined where the gap between them is narrower than a column.
+/// With more runs than this, those separated by gaps narrower than a column are joined.
 const MOST_RUNS: usize = 200;
 
 /// Indices of the smallest and the largest value of each column, in order; all indices of a short
@@ -14,8 +14,8 @@ pub fn thinned(values: &[f64]) -> Vec<usize> {
     thinned_run(values, 0..values.len(), COLUMNS)
 }
 
-/// As [`thinned`], for a part of a series; the whole has `parts` columns. Values that are not
-/// finite are passed over.
+/// As [`thinned`], for a part of a series that has `parts` columns in all. Non-finite values are
+/// skipped.
 pub fn thinned_run(values: &[f64], run: Range<usize>, parts: usize) -> Vec<usize> {
     let finite = |k: &usize| values[*k].is_finite();
     if values.len() <= 2 * parts {
@@ -66,7 +66,7 @@ fn columns(n: usize, run: &Range<usize>, parts: usize) -> impl Iterator<Item = R
         .filter(|c| !c.is_empty())
 }
 
-/// Those that differ from a neighbour, and both ends: a straight level needs no more.
+/// The indices whose value differs from a neighbour, and both ends: a constant level needs no more.
 pub fn without_level<T: PartialEq>(kept: &[usize], value: impl Fn(usize) -> T) -> Vec<usize> {
     let level = |i: usize| {
         let same = |a: usize| value(kept[a]) == value(kept[i]);
@@ -76,8 +76,8 @@ pub fn without_level<T: PartialEq>(kept: &[usize], value: impl Fn(usize) -> T) -
     needed.map(|(_, &k)| k).collect()
 }
 
-/// Runs of indices that are all known. For very many, those closer to each other than a column are
-/// one.
+/// Runs of indices with known values. If there are too many, those separated by less than a column
+/// are joined.
 pub fn runs(n: usize, known: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     let mut found: Vec<Range<usize>> = Vec::new();
     for k in (0..n).filter(|k| known(*k)) {
@@ -145,7 +145,7 @@ mod tests {
         assert_eq!(runs(5, |_| false), []);
         // Every second one: gaps far narrower than a column.
         assert_eq!(runs(100_000, |k| k % 2 == 0), vec![0..99_999]);
-        // The wide gap of the same series stays.
+        // The wide gap of the same series is preserved.
         assert_eq!(
             runs(100_000, |k| k % 2 == 0 && !(40_000..50_000).contains(&k)),
             vec![0..39_999, 50_000..99_999]

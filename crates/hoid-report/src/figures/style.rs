@@ -9,15 +9,15 @@ use kuva::{
 
 /// Width of every figure in units of the SVG.
 pub const WIDTH: f64 = 420.0;
-/// Space for tick labels and the label of the ordinate, the same in all figures so that panels
-/// align.
+/// Space for tick labels and the label of the ordinate, the same in all figures so that panels are
+/// aligned.
 pub const LEFT: f64 = 76.0;
 pub const RIGHT: f64 = 14.0;
 /// Space above the axes.
 pub const TOP: f64 = 10.0;
 /// Space below the axes for ticks and the label of the abscissa.
 pub const BOTTOM: f64 = 48.0;
-/// Space below the axes for ticks alone.
+/// Space below the axes for ticks only.
 pub const BOTTOM_WITHOUT_LABEL: f64 = 26.0;
 pub const TEXT: u32 = 13;
 
@@ -52,7 +52,7 @@ pub fn layout((x_low, x_high): (f64, f64), (y_low, y_high): (f64, f64), height: 
         .with_tick_format(TickFormat::Custom(Arc::new(tick)))
 }
 
-/// A tick as the shortest decimal: rounding noise of `0.1 + 0.2` is not shown.
+/// Label of a tick as the shortest decimal, without the rounding error of `0.1 + 0.2`.
 fn tick(value: f64) -> String {
     let text = format!("{value:.6}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
@@ -62,7 +62,7 @@ fn tick(value: f64) -> String {
     }
 }
 
-/// Line through points; those that are not finite are left out.
+/// Line through points; non-finite ones are omitted.
 pub fn line(points: impl IntoIterator<Item = (f64, f64)>, colour: &str, width: f64) -> LinePlot {
     let finite = |(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
     LinePlot::new()
@@ -71,12 +71,12 @@ pub fn line(points: impl IntoIterator<Item = (f64, f64)>, colour: &str, width: f
         .with_stroke_width(width)
 }
 
-/// True for values with a place on an axis: beyond this size the differences of numbers overflow.
+/// True for values that can be drawn: for larger ones the differences overflow.
 pub fn is_drawable(value: f64) -> bool {
     value.abs() < 1e100
 }
 
-/// Range of values with 5 % of room on both sides; a range of zero width becomes one around it.
+/// Range of values with a margin of 5 % on both sides; a range of zero width is extended.
 pub fn padded_range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for value in values.into_iter().filter(|v| is_drawable(*v)) {
@@ -94,7 +94,7 @@ pub fn padded_range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     (low - room, high + room)
 }
 
-/// Panels one above the other, each with its height.
+/// Panels stacked vertically, each with its height.
 pub fn stacked(panels: Vec<(Vec<Plot>, Layout, f64)>) -> Scene {
     let mut figure = Figure::new(panels.len(), 1)
         .with_cell_size(WIDTH, WIDTH)

@@ -12,7 +12,7 @@ use super::{
     svg,
 };
 
-/// The close-up shows this part of a record, when that has samples enough to be worth it.
+/// The close-up shows this fraction of a record, if that has enough samples.
 const CLOSE_UP: usize = 8;
 const SMALLEST_CLOSE_UP: usize = 50;
 
@@ -22,9 +22,9 @@ const LOWER: f64 = 190.0;
 /// Measured (grey), predicted (vermillion) and simulated (blue) output over time: the whole record
 /// above, its middle eighth below, where the prediction can be distinguished from the measurement.
 ///
-/// The ordinate covers the measured output with half its range to either side; what leaves that (an
-/// unstable model) is cut off. Long records are drawn by the smallest and largest sample of each
-/// column, so that no peak is lost.
+/// The ordinate covers the measured output plus half its range on either side; values beyond (of an
+/// unstable model) are cut off. Long records are drawn by the smallest and largest sample of each
+/// column, so that peaks are preserved.
 pub fn time_response(id: &str, record: &Record, validation: &Validation) -> String {
     let measured = record.output();
     let (low, high) = style::padded_range(measured.iter().copied());
@@ -32,7 +32,7 @@ pub fn time_response(id: &str, record: &Record, validation: &Validation) -> Stri
     let models = validation.simulated.iter().chain(&validation.predicted);
     let (wanted_low, wanted_high) = style::padded_range(measured.iter().chain(models).copied());
     let range = (wanted_low.max(low - half), wanted_high.min(high + half));
-    // Beyond the axes the path is clipped; without bound, numbers of 1e300 would be in the file.
+    // Beyond the axes the path is clipped; otherwise numbers of 1e300 would be in the file.
     let bounded = |v: f64| v.clamp(range.0 - half, range.1 + half);
 
     let panel = |from: usize, to: usize| -> (Vec<Plot>, (f64, f64)) {
@@ -50,7 +50,7 @@ pub fn time_response(id: &str, record: &Record, validation: &Validation) -> Stri
             trace(validation.first, &validation.predicted, VERMILLION, 0.9),
             trace(validation.first, &validation.simulated, BLUE, 1.2),
         ];
-        // One sample alone still needs an axis.
+        // A single sample still needs an axis.
         (plots, (record.time_s(from), record.time_s((to - 1).max(from + 1))))
     };
     let channel = record.output_channel();
@@ -80,7 +80,7 @@ pub fn time_response(id: &str, record: &Record, validation: &Validation) -> Stri
     svg::finish(id, "Measured, simulated and predicted output over time", scene)
 }
 
-/// True when the record is long enough for a close-up of its middle.
+/// True if the record is long enough for a close-up of its middle.
 pub fn has_close_up(record: &Record) -> bool {
     record.len() / CLOSE_UP >= SMALLEST_CLOSE_UP
 }

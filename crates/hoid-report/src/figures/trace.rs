@@ -21,11 +21,11 @@ use super::{
     svg,
 };
 
-/// Height between the axes of a panel.
+/// Height of the axes of a panel.
 const HEIGHT: f64 = 84.0;
 
 const DOTS: &str = "#444444";
-/// Changes whose names the legend has.
+/// Maximum number of changes named in the legend.
 const CHANGES_NAMED: usize = 6;
 
 /// Panels with a common time axis.
@@ -33,23 +33,23 @@ const CHANGES_NAMED: usize = 6;
 pub struct TraceGrid {
     /// The panels by rows.
     pub panels: Vec<TracePanel>,
-    /// Panels in a row; one where it is zero. One column is as wide as a column of text, several as
-    /// a page.
+    /// Panels per row; zero counts as one. A single column has the width of a text column, several
+    /// have that of a page.
     pub columns: usize,
-    /// Text above each column, or above each panel; empty for none.
+    /// Title of each column, or of each panel; empty for none.
     pub titles: Vec<String>,
-    /// Names of the methods, for the legend, which names those that are drawn; empty for none.
+    /// Names of the methods for the legend, which contains those that are drawn; empty for none.
     pub methods: Vec<String>,
-    /// Names of the levels of each method, such as those of the noise, from the lowest; empty for
-    /// none. They are shades of the colour of the method.
+    /// Names of the levels of each method, such as noise levels, from the lowest; empty for none.
+    /// They are shades of the colour of the method.
     pub levels: Vec<String>,
-    /// Spans that are shaded, s.
+    /// Shaded spans, s.
     pub shaded_s: Vec<(f64, f64)>,
     /// Times with a dotted line, s.
     pub marks_s: Vec<f64>,
-    /// Changes that were declared: when, s, and the change. Each has a dashed line, with its number in the first panel.
+    /// Declared changes: time, s, and text. Each has a dashed line, with its number in the first panel.
     pub changes: Vec<(f64, String)>,
-    /// True when panels of a row have one ordinate, which is labelled once.
+    /// True if the panels of a row share an ordinate, which is labelled once.
     pub shared_ordinates: bool,
 }
 
@@ -172,7 +172,7 @@ impl TracePanel {
     fn plots(&self, (low, high): (f64, f64), levels: usize, parts: usize) -> Vec<Plot> {
         let logarithmic = self.ordinate == Ordinate::Logarithmic;
         let half = 0.5 * (high - low);
-        // Beyond the axes the path is cut; without bound, numbers of 1e300 would be in the file.
+        // Beyond the axes the path is clipped; otherwise numbers of 1e300 would be in the file.
         let bounded = |v: f64| match logarithmic {
             true => v.clamp(low / 10.0, high * 10.0),
             false => v.clamp(low - half, high + half),
@@ -210,8 +210,8 @@ impl TraceCurve {
         shade(self.method, self.level, levels)
     }
 
-    /// The rows of a run that are drawn: none on the level of both neighbours. One row alone is as
-    /// long as its sample.
+    /// The drawn rows of a run: none with the value of both neighbours. A single row extends over
+    /// its sample.
     fn points(&self, run: Range<usize>, parts: usize, bounded: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
         let at = |k: usize| (self.times_s[k], bounded(self.values[k]));
         if run.len() == 1 {
@@ -288,7 +288,7 @@ mod tests {
         let broken = trace_panels("a", "t", &grid(values));
         assert_eq!((paths(&whole), paths(&broken)), (1, 4));
         assert!(!broken.contains("NaN") && !broken.contains("inf"));
-        // Nothing at all still has axes.
+        // Without data there are still axes.
         let nothing = trace_panels("a", "t", &grid(vec![f64::NAN; 50]));
         assert!(nothing.contains("time (s)") && !nothing.contains("NaN"));
     }

@@ -1,4 +1,4 @@
-//! Averages of the fits, chosen delays, what could not be estimated.
+//! Averages of the fits, chosen delays, and failed estimates.
 
 use minijinja::{Value, context};
 
@@ -8,8 +8,8 @@ use super::{
 };
 use crate::numbers;
 
-/// Columns of the table of averages: parameter and heading; what scales with u/e has no unit, as in the
-/// table of people.
+/// Columns of the table of averages: parameter and heading; quantities that scale with u/e have no
+/// unit, as in the table of people.
 const AVERAGED: [(&str, &str); 10] = [
     ("K_over_T_I", "K/T_I"),
     ("K", "K"),
@@ -76,7 +76,7 @@ impl GroupReport<'_> {
             .collect()
     }
 
-    /// Quantities that could not be estimated, and how often.
+    /// Quantities that could not be estimated, and their numbers.
     pub(super) fn failures(&self) -> Vec<Value> {
         let table = self.tables.estimates;
         let [subject, condition, estimator, status, reason] =

@@ -1,4 +1,4 @@
-//! Describing functions with the fits over them, and where they agree.
+//! Describing functions with the fits, and their agreement.
 
 use hoid_model::uncertainty::Estimate;
 use hoid_study::group::Person;
@@ -23,7 +23,7 @@ const FITS: [(&str, usize); 5] = [
 ];
 
 impl GroupReport<'_> {
-    /// Results of the describing functions, with standard errors, a row for each subject and
+    /// Results of the describing functions, with standard errors, one row for each subject and
     /// condition.
     pub(super) fn margins(&self) -> Vec<Value> {
         let Some(table) = self.tables.frequencies.map(|f| f.margins) else {
@@ -62,8 +62,8 @@ impl GroupReport<'_> {
             .collect()
     }
 
-    /// Bode points of the describing functions, a figure for each condition with a column for each
-    /// subject who tracked in it.
+    /// Bode points of the describing functions, one figure for each condition with a column for
+    /// each of its subjects.
     pub(super) fn describing_functions(&self) -> Vec<Value> {
         let figures = self.describing_figures().into_iter();
         figures
@@ -110,7 +110,7 @@ impl GroupReport<'_> {
                 curves,
             }
         };
-        // Not every subject need have tracked in every condition.
+        // Not every subject has runs in every condition.
         let columns = |condition: &str| -> Vec<BodeColumn> {
             let took_part = |subject: &&&str| !rows_of(lines, subject, condition).is_empty();
             let there = subjects.iter().filter(took_part);
@@ -132,8 +132,7 @@ impl GroupReport<'_> {
             .collect()
     }
 
-    /// Delay of a person, s, with which the phase between two lines is followed; 0 where it is not
-    /// known.
+    /// Delay of a person, s, for unwrapping the phase between two lines; 0 if unknown.
     fn delay_s(&self, subject: &str, condition: &str) -> f64 {
         let of = |p: &&Person| p.subject == subject && p.condition == condition;
         let person = self.summary.people.iter().find(of);
@@ -148,7 +147,7 @@ impl GroupReport<'_> {
         let (estimators, omega) = (texts(table, "estimator"), reals(table, "omega_rad_s"));
         let rows = rows_of(table, subject, condition);
         let curve = |(estimator, method): (&str, usize)| {
-            // A point more on either side, so that the curve reaches over the lines.
+            // One more point on either side, so that the curve covers the lines.
             let inside = |i: &&usize| estimators[**i] == estimator && (0.9 * low..=1.1 * high).contains(&omega[**i]);
             let at: Vec<usize> = rows.iter().filter(inside).copied().collect();
             let pick = |name: &str| at.iter().map(|i| reals(table, name)[*i]).collect::<Vec<f64>>();
@@ -174,7 +173,7 @@ impl GroupReport<'_> {
         FITS.into_iter().filter_map(curve).collect()
     }
 
-    /// Where fits and describing function agree, a row for each subject, condition and estimator.
+    /// Agreement of fits and describing function, one row for each subject, condition and estimator.
     pub(super) fn agreement(&self) -> Vec<Value> {
         let Some(table) = self.tables.frequencies.map(|f| f.agreement) else {
             return Vec::new();

@@ -1,4 +1,4 @@
-//! Recursive estimates by condition and subject, and how fast they follow a change.
+//! Recursive estimates by condition and subject, and their response to a change.
 
 use minijinja::{Value, context};
 
@@ -14,8 +14,8 @@ use crate::{
 /// Recursions in the order of the colours: as everywhere, RLS blue and RPEM vermillion.
 const METHODS: [(&str, &str); 3] = [("RLS", "ARX (RLS)"), ("RPEM", "BJ (RPEM)"), ("PHYSICAL", "physical")];
 
-/// A figure: panels by name and unit, and the columns of RLS and of the others. The runs of a group do not report the
-/// units of e and u, so that gains have none.
+/// A figure: panels by name and unit, and the columns of RLS and of the others. The runs of a group do not have units
+/// of e and u, so that gains have none.
 type Row = (&'static str, &'static str, &'static str, &'static str);
 
 const OPERATOR: [Row; 5] = [
@@ -75,7 +75,7 @@ fn with_unit(name: &str, unit: &str) -> String {
     }
 }
 
-/// The levels of a recursion are not known better than to three digits.
+/// Formats the level of a recursion, with three digits.
 fn short(value: f64) -> String {
     numbers::significant(value, 3)
 }
@@ -103,7 +103,7 @@ impl GroupReport<'_> {
             .collect()
     }
 
-    /// The columns of the averages of traces whose name starts so, without the figure at their end.
+    /// The columns of the averages of traces with this prefix, without the statistic at their end.
     fn columns(&self, prefix: &str) -> Vec<&str> {
         let names = self.tables.traces.columns.iter().map(|column| column.name.as_str());
         names
@@ -138,8 +138,8 @@ impl GroupReport<'_> {
         columns.map(row).collect()
     }
 
-    /// How fast the recursions follow a change and how noisy they are: a row for each subject,
-    /// condition and parameter, three cells a recursion.
+    /// Settling times and noise of the recursions after a change: one row for each subject,
+    /// condition and parameter, three cells for each recursion.
     pub(super) fn settling(&self) -> Vec<Value> {
         let table = self.tables.settling;
         let [subject, condition, estimator, parameter] =
@@ -187,8 +187,7 @@ impl GroupReport<'_> {
         rows
     }
 
-    /// When the task of a condition changes, s: as the manifest states, or at the seam of joined
-    /// runs.
+    /// Time of the task change in a condition, s: from the manifest, or at the seam of joined runs.
     fn change_s(&self, condition: &str) -> Option<f64> {
         let known = self.manifest.conditions.get(condition).and_then(|facts| facts.change_s);
         let table = self.tables.settling;
@@ -247,7 +246,7 @@ impl GroupReport<'_> {
         trace_panels(id, &format!("Estimates over time, condition {condition}"), &grid)
     }
 
-    /// One recursion of a subject and condition; none if it has no number.
+    /// One recursion of a subject and condition; none if it has no values.
     fn curve(
         &self,
         (subject, condition, method): (&str, &str, &str),

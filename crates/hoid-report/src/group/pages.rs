@@ -1,4 +1,4 @@
-//! The pages of a finished group, made of the tables in its directory and written next to them.
+//! The pages of a finished group, made from the tables in its directory and written to it.
 
 use std::{
     collections::BTreeSet,
@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{ReportError, page};
 
-/// Runs whose preparation and trouble the pages list.
+/// Maximum number of runs whose preparation and problems are listed.
 const MOST_LISTED: usize = 24;
 
 /// The tables in the directory of a group.
@@ -25,7 +25,7 @@ struct Tables {
     traces: OutputTable,
     settling: OutputTable,
     responses: OutputTable,
-    /// Lines, margins and agreement, where there was a periodic excitation.
+    /// Lines, margins and agreement, if there is a periodic excitation.
     frequencies: Option<[OutputTable; 3]>,
 }
 
@@ -71,7 +71,7 @@ impl Tables {
     }
 }
 
-/// The describing functions of a finished group with the operators through them, a figure for each
+/// The describing functions of a finished group with the fitted operators, one figure for each
 /// condition: its name and the SVG text. None if no condition has a periodic excitation.
 ///
 /// # Errors
@@ -88,11 +88,11 @@ pub fn group_figures(manifest: &Manifest, out: &Path) -> Result<Vec<(String, Str
     Ok(report.describing_figures())
 }
 
-/// Writes the page of the group and one for each subject into the directory of its tables; `path`
-/// is where the manifest was read.
+/// Writes the page of the group and one for each subject to the directory of its tables; `path` is
+/// that of the manifest.
 ///
 /// # Errors
-/// [`ReportError::Io`], [`ReportError::Study`] for tables that do not exist and pages that cannot be written;
+/// [`ReportError::Io`], [`ReportError::Study`] for missing tables and pages that cannot be written;
 /// [`ReportError::Template`] for a defect of this crate.
 pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
     let read = Tables::read(out)?;
@@ -144,13 +144,12 @@ pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result
     Ok(pages)
 }
 
-/// Characters of a subject in the name of a page: with a number after them a name that every file
-/// system takes.
+/// Maximum number of characters of a subject in the name of a page: with a number after them, the
+/// name is valid on every file system.
 const LONGEST_NAME: usize = 80;
 
-/// The name of the page of each subject: letters and digits, a number after it where another
-/// subject has the name already. File systems that do not distinguish S1 from s1 are counted as
-/// well.
+/// The name of the page of each subject: letters and digits, with a number if another subject has
+/// the same name, also on file systems that ignore case.
 fn page_names(subjects: &[&str]) -> Vec<String> {
     let mut taken = BTreeSet::new();
     let name_of = |subject: &&str| {
@@ -168,8 +167,8 @@ fn page_names(subjects: &[&str]) -> Vec<String> {
     subjects.iter().map(name_of).collect()
 }
 
-/// Processing applied to the runs and the problems of their sampling: a row for all files of which
-/// the same is reported.
+/// Preparation of the runs and problems of their sampling: one row for all files with the same
+/// text.
 fn account(preparation: &OutputTable, trouble: &OutputTable) -> Vec<(String, String)> {
     let mut rows: Vec<(String, String)> = Vec::new();
     for (table, what) in [(preparation, "preparation"), (trouble, "sampling trouble")] {

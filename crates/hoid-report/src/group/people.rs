@@ -1,8 +1,8 @@
-//! The verdict on a group, what was not read, and the operator of each person in each condition with
-//! its errors.
+//! The verdict on a group, the unreadable runs, and the operator of each person in each condition
+//! with its errors.
 //!
-//! A parameter that the data determine is given with its standard error. One that they do not is in
-//! parentheses; where its interval is open above, `> x` states from where on.
+//! A determined parameter is given with its standard error. Others are in parentheses; if the
+//! interval is open above, `> x` gives its lower end.
 
 use hoid_ident::family::Parameter;
 use hoid_model::{VerdictLevel, uncertainty::Estimate};
@@ -12,8 +12,8 @@ use minijinja::{Value, context};
 use super::report::GroupReport;
 use crate::numbers;
 
-/// Names and headings of the parameters, in the order of the table. The runs of a group do not report the units of e
-/// and u, so that what scales with u/e has none.
+/// Names and headings of the parameters, in the order of the table. The runs of a group do not have units of e and u,
+/// so that quantities that scale with u/e have none.
 const COLUMNS: [(&str, &str); 13] = [
     ("K_over_T_I", "K/T_I"),
     ("K_I", "K_I"),
@@ -30,18 +30,18 @@ const COLUMNS: [(&str, &str); 13] = [
     ("zeta_nm", "zeta_nm"),
 ];
 
-/// The headline table as text: a row for each person and condition.
+/// The main table as text: one row for each person and condition.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PeopleTable {
     /// Headings of its columns.
     pub headings: Vec<String>,
     /// Cells of its rows.
     pub rows: Vec<Vec<String>>,
-    /// Where the columns of parameters start; the last column is the verdict.
+    /// Index of the first column of parameters; the last column is the verdict.
     pub parameters: usize,
 }
 
-/// The people that there are results of, with columns for what they have.
+/// The people with results, with columns for their parameters.
 pub fn people_table<'a>(people: impl Iterator<Item = &'a Person>) -> PeopleTable {
     let people: Vec<&Person> = people.filter(|p| p.verdict.is_some()).collect();
     let columns: Vec<(&str, &str)> = COLUMNS
@@ -98,7 +98,7 @@ fn estimate(e: &Estimate) -> String {
     }
 }
 
-/// Value, standard error, and in brackets the interval.
+/// Value, standard error, and the interval in brackets.
 fn estimate_within(e: &Estimate, interval: Option<(f64, f64)>) -> String {
     let ends = interval.map(|(low, high)| {
         format!(
@@ -130,8 +130,8 @@ impl GroupReport<'_> {
         people.iter().filter(|p| self.shows(&p.subject))
     }
 
-    /// The verdict on the group: level, reasons, notes; of one subject the reasons about them are
-    /// with their operators.
+    /// The verdict on the group: level, reasons, notes; for a single subject the reasons are listed
+    /// with the operators.
     pub(super) fn verdict(&self) -> Value {
         if self.subject.is_some() {
             return Value::UNDEFINED;

@@ -1,4 +1,4 @@
-//! Results of a page about a group: manifest, tables, and all subjects or one.
+//! The page about a group: manifest, tables, and all subjects or one.
 
 use hoid_study::group::{GroupSummary, Manifest};
 
@@ -7,20 +7,20 @@ use super::tables::GroupTables;
 /// The page.
 #[derive(Debug)]
 pub struct GroupReport<'a> {
-    /// The analysed data.
+    /// Manifest of the group.
     pub manifest: &'a Manifest,
     /// Failures, people and the overall verdict.
     pub summary: &'a GroupSummary,
-    /// The results.
+    /// Tables of results.
     pub tables: GroupTables<'a>,
-    /// The processing and its inputs, as name and value.
+    /// Inputs and processing, as name and value.
     pub settings: Vec<(String, String)>,
-    /// One subject alone, or all.
+    /// A single subject; none for all.
     pub subject: Option<&'a str>,
 }
 
 impl GroupReport<'_> {
-    /// True for a subject that is on the page.
+    /// True for a subject of the page.
     pub(super) fn shows(&self, subject: &str) -> bool {
         self.subject.is_none_or(|only| only == subject)
     }

@@ -9,26 +9,26 @@ pub struct GroupTables<'a> {
     pub estimates: &'a OutputTable,
     /// Averages over runs.
     pub averages: &'a OutputTable,
-    /// Delays and T_n that were chosen beforehand, a row a subject and condition.
+    /// Delays and T_n chosen in advance, one row per subject and condition.
     pub delays: &'a OutputTable,
     /// Averages of traces.
     pub traces: &'a OutputTable,
-    /// Settling times and noise of the recursions, where a condition changes.
+    /// Settling times and noise of the recursions, if a condition has a change.
     pub settling: &'a OutputTable,
     /// Averages of the frequency responses of the fits.
     pub responses: &'a OutputTable,
-    /// Describing functions, where the manifest names an excitation.
+    /// Describing functions, if the manifest gives an excitation.
     pub frequencies: Option<FrequencyTables<'a>>,
 }
 
 /// The tables of the describing functions.
 #[derive(Debug, Clone, Copy)]
 pub struct FrequencyTables<'a> {
-    /// A row a line.
+    /// One row per line.
     pub lines: &'a OutputTable,
-    /// Crossover, margins, noise and verdict, a row a subject and condition.
+    /// Crossover, margins, noise and verdict, one row per subject and condition.
     pub margins: &'a OutputTable,
-    /// How far each estimator is from it.
+    /// Distance of each estimator.
     pub agreement: &'a OutputTable,
 }
 
@@ -48,7 +48,7 @@ pub(super) fn reals<'a>(table: &'a OutputTable, name: &str) -> &'a [f64] {
     }
 }
 
-/// The rows of a table that are about a subject and condition.
+/// The rows of a table for a subject and condition.
 pub(super) fn rows_of(table: &OutputTable, subject: &str, condition: &str) -> Vec<usize> {
     let (s, c) = (texts(table, "subject"), texts(table, "condition"));
     (0..s.len())

@@ -1,4 +1,4 @@
-//! Batch fits that a recursive estimate is compared with.
+//! Batch fits for comparison with a recursive estimate.
 
 use hoid_ident::{Estimator, Fit, IdentError};
 use hoid_model::{Orders, Record};
@@ -8,8 +8,8 @@ use hoid_track::{StartAt, Trace};
 /// A batch fit and its span, s.
 pub type BatchFit = ((f64, f64), Fit);
 
-/// The orders of a trace; where it tracks the delay, with the median of its report on the delay in
-/// a span, s.
+/// The orders of a trace; if it tracks the delay, with the median of its estimated delay in a span,
+/// s.
 fn orders_within(trace: &Trace, (from, to): (f64, f64)) -> Orders {
     let orders = trace.options().orders;
     if trace.options().method.track_delay_s().is_none() {
@@ -32,8 +32,8 @@ fn orders_within(trace: &Trace, (from, to): (f64, f64)) -> Orders {
     }
 }
 
-/// A fit of a span of a record with the structure and the orders of a trace; where the trace tracks
-/// the delay, with its report on it there.
+/// A fit of a span of a record with the structure and the orders of a trace; if the trace tracks
+/// the delay, with its estimate there.
 ///
 /// # Errors
 /// The errors of the fit.
@@ -46,9 +46,9 @@ pub fn batch_fit(trace: &Trace, record: &Record, (from, to): (f64, f64)) -> Resu
     Ok(((from, to), estimator.fit(&[record.span(from, to)?])?))
 }
 
-/// The batch fits that a page compares a trace with, where none are named: that of the start, and
-/// one of the last third of the record; none for a method that starts itself; with the reason where the
-/// last third cannot be fitted.
+/// The default batch fits for comparison with a trace: the start fit, and one of the last third of
+/// the record; none for a method that starts by itself; with the reason if the last third cannot be
+/// fitted.
 pub fn default_batch_fits(trace: &Trace, record: &Record) -> (Vec<BatchFit>, Option<IdentError>) {
     let mut all = Vec::new();
     if let (Some(start), StartAt::Span(Some((from, to)))) = (trace.start(), &trace.options().start)
@@ -57,7 +57,7 @@ pub fn default_batch_fits(trace: &Trace, record: &Record) -> (Vec<BatchFit>, Opt
         all.push(((span.time_s(0), span.time_s(span.len())), start.clone()));
     }
     if trace.options().method.starts_itself() {
-        // It has no orders to fit with: its noise model is long and its delay is its own.
+        // It has no orders for a batch fit: its noise model is long and it tracks its own delay.
         return (all, None);
     }
     let last_third = (

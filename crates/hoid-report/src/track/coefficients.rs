@@ -14,7 +14,7 @@ pub struct Coefficient {
 }
 
 impl Coefficient {
-    /// From its name.
+    /// Parses its name.
     pub fn parse(name: &str) -> Option<Self> {
         let mut letters = name.chars();
         let letter = letters.next()?;
@@ -22,7 +22,7 @@ impl Coefficient {
         Some(Self { letter, index })
     }
 
-    /// The panel it belongs to: with `joined`, f1 is at home with a1.
+    /// The coefficient whose panel it shares: if `joined`, f1 shares that of a1.
     pub fn home(self, joined: bool) -> Self {
         match self.letter {
             'f' if joined => Self { letter: 'a', ..self },
@@ -40,7 +40,7 @@ impl Coefficient {
     }
 }
 
-/// The entries of a trace, in the order of theta.
+/// The coefficients of a trace, in the order of theta.
 pub fn of_trace(trace: &Trace) -> Vec<Coefficient> {
     trace
         .parameter_names()
@@ -49,8 +49,8 @@ pub fn of_trace(trace: &Trace) -> Vec<Coefficient> {
         .collect()
 }
 
-/// The entries of a fit, in the order of theta; none for a grey box, whose parameters are not
-/// coefficients.
+/// The coefficients of a fit, in the order of theta; none for a grey-box model, whose parameters
+/// are not coefficients.
 pub fn of_fit(fit: &Fit) -> Vec<Coefficient> {
     if fit.is_grey_box() {
         return Vec::new();
@@ -61,7 +61,7 @@ pub fn of_fit(fit: &Fit) -> Vec<Coefficient> {
         .collect()
 }
 
-/// True when some traces have their poles in A and others in F: then a1 and f1 are the same.
+/// True if some traces have their poles in A and others in F: then a1 and f1 are the same.
 pub fn joined(traces: &[&Trace]) -> bool {
     let orders = |t: &&&Trace| t.options().orders;
     traces.iter().any(|t| orders(&t).na > 0 && orders(&t).nf == 0)

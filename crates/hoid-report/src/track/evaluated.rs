@@ -29,7 +29,7 @@ pub fn of_name(operator: &OperatorEstimate, name: &str) -> Option<Estimate> {
     operator.rows().into_iter().find(|r| r.0 == name).map(|r| r.2)
 }
 
-/// Names of the parameters that are shown; tau_e only where a method tracks it.
+/// Names of the displayed parameters; tau_e only if a method tracks it.
 pub fn operator_names(traces: &[Evaluated<'_>]) -> Vec<&'static str> {
     let mut names = OPERATOR_COLUMNS.to_vec();
     if traces

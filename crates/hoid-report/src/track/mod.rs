@@ -1,6 +1,6 @@
 //! One self-contained HTML page about recursive estimates over a record: parameters over time with
-//! 95 % bands, batch fits and, where the record shows it, the truth; innovations; standard errors;
-//! steps that were shortened.
+//! 95 % bands, batch fits and, if the record contains them, the true values; innovations; standard
+//! errors; shortened steps.
 
 mod batch_fits;
 mod coefficients;

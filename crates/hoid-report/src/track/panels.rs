@@ -1,4 +1,4 @@
-//! The figures of the page from traces.
+//! The figures of the page, from traces.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ use crate::{
     numbers::Z_95,
 };
 
-/// Which number of an estimate is drawn.
+/// Number of an estimate to draw.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Shown {
     Value,
@@ -122,8 +122,8 @@ fn grid(traces: &[Evaluated<'_>], record: &Record, panels: Vec<TracePanel>) -> T
     }
 }
 
-/// Quantities that people determine: gain and phase at the frequencies of the traces, crossover and phase margin with
-/// the controlled element, and the level of the remnant; `None` where neither was requested.
+/// Quantities of the loop: gain and phase at the frequencies of the traces, crossover and phase margin with the
+/// controlled element, and the level of the remnant; `None` if neither was requested.
 pub fn response_grid(traces: &[Evaluated<'_>], record: &Record) -> Option<TraceGrid> {
     let mut panels = Vec::new();
     let mut add = |name: String, unit: &str, of: &dyn Fn(&Trace, usize) -> Option<Estimate>| {
@@ -177,7 +177,7 @@ pub fn response_grid(traces: &[Evaluated<'_>], record: &Record) -> Option<TraceG
     Some(grid(traces, record, panels))
 }
 
-/// Standard deviation of the innovations, as it is tracked.
+/// Tracked standard deviation of the innovations.
 fn remnant_panel(traces: &[Evaluated<'_>], record: &Record) -> TracePanel {
     let level = |(method, t): (usize, &Evaluated<'_>)| TraceCurve {
         kind: CurveKind::Estimate,
@@ -241,14 +241,14 @@ fn ordinate(shown: Shown) -> Ordinate {
     }
 }
 
-/// The coefficients, one panel each; where some methods have the poles in A and others in F, they
+/// The coefficients, one panel each; if some methods have the poles in A and others in F, they
 /// share a panel.
 pub fn coefficient_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
     grid(traces, record, coefficient_panels(traces, record, Shown::Value))
 }
 
-/// Standard errors over time, of the operator's parameters when they are what all methods move,
-/// else of the coefficients.
+/// Standard errors over time, of the parameters of the operator if all methods estimate these,
+/// otherwise of the coefficients.
 pub fn error_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
     let panels = if of_operator(traces) {
         operator_panels(traces, record, Shown::Error)
@@ -258,7 +258,7 @@ pub fn error_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
     grid(traces, record, panels)
 }
 
-/// True when all methods move the parameters of the operator.
+/// True if all methods estimate the parameters of the operator.
 pub fn of_operator(traces: &[Evaluated<'_>]) -> bool {
     traces.iter().all(|t| t.section.trace.options().method.is_physical())
 }
@@ -277,7 +277,7 @@ fn coefficient_panels(traces: &[Evaluated<'_>], record: &Record, shown: Shown) -
         }
         for line in &t.section.batch {
             for (coefficient, (_, estimate)) in of_fit(line.fit).into_iter().zip(line.fit.parameters()) {
-                // A coefficient that no trace has makes no panel.
+                // A coefficient that no trace has gets no panel.
                 if let Some([_, batch, _]) = curves.get_mut(&coefficient.home(joined)) {
                     batch.extend(batch_curve(method, (line.from_s, line.to_s), estimate, shown));
                 }
@@ -302,7 +302,7 @@ fn coefficient_panels(traces: &[Evaluated<'_>], record: &Record, shown: Shown) -
     curves.into_iter().map(panel).collect()
 }
 
-/// Innovations with twice their standard deviation to either side, one panel for each method.
+/// Innovations with twice their standard deviation on either side, one panel for each method.
 pub fn innovation_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
     let panel = |(method, t): (usize, &Evaluated<'_>)| {
         let trace = t.section.trace;
@@ -333,7 +333,7 @@ pub fn innovation_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
     grid(traces, record, panels)
 }
 
-/// Steps shortened so far; `None` when there are none.
+/// Number of shortened steps over time; `None` if there are none.
 pub fn shortened_grid(traces: &[Evaluated<'_>], record: &Record) -> Option<TraceGrid> {
     let most = traces.iter().map(|t| t.section.trace.counts().shortened).max()?;
     if most == 0 {

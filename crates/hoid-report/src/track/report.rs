@@ -17,29 +17,29 @@ use crate::{
     fit_summary, page, tables as of_fits,
 };
 
-/// Most traces of a page: more curves over each other cannot be distinguished.
+/// Maximum number of traces of a page: more curves cannot be distinguished.
 const MOST_TRACES: usize = 4;
 
-/// Subject of the page.
+/// Content of the page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackReport<'a> {
     /// Heading of the page.
     pub title: String,
-    /// The processing and its inputs, as name and value: command, versions, record, seed.
+    /// Inputs and processing, as name and value: command, versions, record, seed.
     pub settings: Vec<(String, String)>,
-    /// The record that was tracked. Columns with the names of the operator's parameters (`K_e`,
-    /// `T_L`, `K_e_dot`, `omega_nm`, `zeta_nm`, `tau_e`) are the truth, as in every simulation.
+    /// The tracked record. Columns with the names of the parameters of the operator (`K_e`, `T_L`,
+    /// `K_e_dot`, `omega_nm`, `zeta_nm`, `tau_e`) are the true values, as in every simulation.
     pub record: &'a Record,
-    /// One to four estimates of that record, drawn over each other.
+    /// One to four estimates of that record, drawn together.
     pub traces: Vec<TraceSection<'a>>,
-    /// Verdict on the traces, on top of the page.
+    /// Verdict on the traces, at the top of the page.
     pub verdict: Option<Verdict>,
     /// Remarks for the reader, such as warnings of the command.
     pub notes: Vec<String>,
 }
 
 impl<'a> TrackReport<'a> {
-    /// The page about a recording that was tracked, with batch fits to compare.
+    /// The page about a tracked recording, with batch fits for comparison.
     pub fn of_tracked(tracked: &'a Tracked, batch: &'a [BatchFit]) -> Self {
         let options = tracked.trace.options();
         let line = |((from_s, to_s), fit): &'a BatchFit| BatchLine {
@@ -110,7 +110,7 @@ impl TrackReport<'_> {
         page::render("track.html", values)
     }
 
-    /// The parameters of the operator over time, one panel each, for figures of one's own with
+    /// The parameters of the operator over time, one panel each, for custom figures with
     /// [`figures::trace_panels`].
     ///
     /// # Errors
@@ -178,7 +178,7 @@ impl TrackReport<'_> {
     }
 }
 
-/// For a caption: rows of each panel and method that lie beyond the axes.
+/// For a caption: rows of each panel and method beyond the axes.
 fn beyond(grid: &TraceGrid) -> Vec<Value> {
     let of = |panel: &figures::TracePanel| -> Vec<Value> {
         let label = tables::symbol_of(&panel.name);

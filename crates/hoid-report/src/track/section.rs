@@ -1,4 +1,4 @@
-//! One recursive estimate of a page and the batch fits next to it.
+//! One recursive estimate of a page and its batch fits.
 
 use hoid_ident::Fit;
 use hoid_track::Trace;
@@ -10,7 +10,7 @@ pub struct TraceSection<'a> {
     pub name: String,
     /// The estimate.
     pub trace: &'a Trace,
-    /// Batch fits to compare it with.
+    /// Batch fits for comparison.
     pub batch: Vec<BatchLine<'a>>,
 }
 

@@ -18,10 +18,10 @@ use crate::{
     numbers::{DASH, fixed, plain},
 };
 
-/// Time from which errors count, s: the start of a recursion from nothing is left out.
+/// Time from which errors are evaluated, s: the start-up of a recursion is excluded.
 const ERRORS_FROM_S: f64 = 10.0;
 
-/// One row per method: description, forgetting, where it started.
+/// One row per method: description, forgetting, start.
 pub fn methods(traces: &[Evaluated<'_>], record: &Record) -> Vec<Value> {
     let row = |t: &Evaluated<'_>| {
         let trace = t.section.trace;
@@ -50,8 +50,8 @@ pub fn methods(traces: &[Evaluated<'_>], record: &Record) -> Vec<Value> {
     traces.iter().map(row).collect()
 }
 
-/// One row a method: how many samples were taken, left out, shortened, and which rows do not
-/// convert.
+/// One row per method: numbers of used, omitted and shortened samples, and rows that cannot be
+/// converted.
 pub fn counts(traces: &[Evaluated<'_>]) -> Vec<Value> {
     let row = |t: &Evaluated<'_>| {
         let trace = t.section.trace;
@@ -72,7 +72,7 @@ pub fn counts(traces: &[Evaluated<'_>]) -> Vec<Value> {
     traces.iter().map(row).collect()
 }
 
-/// One row a change that was declared.
+/// One row per declared change.
 pub fn changes(trace: &Evaluated<'_>) -> Vec<Value> {
     let pair = |[before, after]: [f64; 2], digits| format!("{} → {}", fixed(before, digits), fixed(after, digits));
     let row = |(t, c): &(f64, Change)| {
@@ -91,15 +91,15 @@ pub fn changes(trace: &Evaluated<'_>) -> Vec<Value> {
     trace.section.trace.changes().iter().map(row).collect()
 }
 
-/// A reason why rows do not convert.
+/// A reason why rows cannot be converted.
 struct Reason {
     rows: usize,
     first_s: f64,
     text: String,
 }
 
-/// The reasons, the most frequent first. Those that differ in their numbers alone are one, in the
-/// words of the first.
+/// The reasons, the most frequent first. Those that differ only in their numbers are combined, with
+/// the text of the first.
 fn reasons(trace: &Evaluated<'_>) -> Vec<Reason> {
     // No kind for rows before the first estimate.
     let mut found: Vec<(Option<Discriminant<NotConvertible>>, Reason)> = Vec::new();
@@ -116,13 +116,13 @@ fn reasons(trace: &Evaluated<'_>) -> Vec<Reason> {
         }
     }
     let mut reasons: Vec<Reason> = found.into_iter().map(|f| f.1).collect();
-    // Stable: equals stay in the order of time.
+    // Stable sort: equal counts stay in the order of time.
     reasons.sort_by_key(|r| std::cmp::Reverse(r.rows));
     reasons
 }
 
-/// Share of innovations larger than twice their standard deviation, from the time on at which the
-/// estimate moves.
+/// Share of innovations larger than twice their standard deviation, from the first update of the
+/// estimate on.
 fn outside(trace: &Evaluated<'_>) -> Option<f64> {
     let trace = trace.section.trace;
     let rows = trace
@@ -137,8 +137,8 @@ fn outside(trace: &Evaluated<'_>) -> Option<f64> {
     (!moving.is_empty()).then(|| moving.iter().filter(|m| **m).count() as f64 / moving.len() as f64)
 }
 
-/// One row a parameter of the operator, one column a method: root of the mean squared relative
-/// error in %. `None` without a truth.
+/// One row per parameter of the operator, one column per method: RMS relative error in %. `None`
+/// without true values.
 pub fn errors(traces: &[Evaluated<'_>], record: &Record) -> Option<Value> {
     let last_s = record.time_s(record.len() - 1);
     let from_s = if last_s > ERRORS_FROM_S {
@@ -195,7 +195,7 @@ fn percent(share: f64) -> String {
 }
 
 /// The batch fits of one method: at the end of each span the recursive estimate, the fit and the
-/// truth.
+/// true value.
 pub fn batch(trace: &Evaluated<'_>, record: &Record) -> Vec<Value> {
     trace
         .section
@@ -251,7 +251,7 @@ fn span(trace: &Evaluated<'_>, record: &Record, line: &BatchLine<'_>) -> Value {
     context! { span, at => format!("{} s", fixed(at_s, 2)), rows, remarks, has_truth => record.channel("K_e").is_some() }
 }
 
-/// Name of a parameter, a coefficient, or several of them, for the page.
+/// Symbol of a parameter, a coefficient, or several of them, for the page.
 pub fn symbol_of(name: &str) -> Value {
     let one = |name: &str| match Coefficient::parse(name) {
         Some(c) => format!("<i>{}</i><sub>{}</sub>", c.letter, c.index),

@@ -1,14 +1,14 @@
-//! Treatment of the runs of a person in a condition, and with one run.
+//! Analysis of the runs of a person in a condition, jointly and one by one.
 //!
-//! All runs of a person in a condition come first. Where nothing changes within them the family of operators is fitted
-//! to all of them at once ([`hoid_ident::family`]): the operator of the person. nk, and for Box-Jenkins nd and T_n, are
-//! one choice for all of them too (`run_orders`). In addition there is a Box-Jenkins model of all runs with initial
-//! states of each, the delay that fits best, and the greatest order of the noise model that the manifest allows. In a
-//! closed loop a noise model that is too small biases the operator, and one run is too short for a great one.
+//! All runs of a person in a condition come first. If nothing changes within them, the family of operators is fitted
+//! jointly to all of them ([`hoid_ident::family`]): the operator of the person. nk, and for Box-Jenkins nd and T_n, are
+//! also chosen once for all of them (`run_orders`). In addition there is a Box-Jenkins model of all runs with initial
+//! states of each, the delay that fits best, and the highest order of the noise model that the manifest allows. In a
+//! closed loop a noise model of too low order biases the operator, and a single run is too short for a high order.
 //!
-//! With the chosen orders, ARX and Box-Jenkins models are fitted to the sub-batches of each run and to the whole of it,
+//! With the chosen orders, ARX and Box-Jenkins models are fitted to the sub-batches of each run and to the whole run,
 //! and the recursions start from the fit of the first sub-batch; the family is fitted to the whole run with the form of
-//! the person. A row reports what was estimated in which window; what fails is a row with its reason.
+//! the person. A row gives the estimated quantity and its window; a failure is a row with its reason.
 
 use std::path::Path;
 
@@ -40,11 +40,11 @@ pub(super) const RECORD: &str = "record";
 /// Name of the table of people.
 pub(super) const PEOPLE: &str = "people";
 
-/// Statement of all runs of a person in a condition about each.
+/// Results of all runs of a person in a condition that the analysis of each run uses.
 pub(super) struct FromCell {
     arx: Result<Orders, String>,
     box_jenkins: Result<Orders, String>,
-    /// The form of the operator, where there is one.
+    /// The form of the operator, if there is one.
     form: Option<Form>,
 }
 
@@ -89,7 +89,7 @@ pub(super) fn analyse(manifest: &Manifest, base: &Path, entry: &RunEntry, from_c
     }
 }
 
-/// Analyses all runs of a person in a condition at once.
+/// Analyses all runs of a person in a condition jointly.
 pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>) -> RunTables {
     let all = RunEntry {
         run: ALL.to_owned(),
@@ -108,13 +108,13 @@ pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>
     let late_samples = analysis.rows.condition.offset_samples;
     let people = match (&cell.changes, runs.is_empty()) {
         (Some(reason), _) => vec![Person::without(cell.key(), PersonStatus::Changes, reason)],
-        // The run of a file that cannot be read reports it.
+        // For a file that cannot be read, its run reports the error.
         (None, true) => vec![Person::without(
             cell.key(),
             PersonStatus::Failed,
             "no run could be read",
         )],
-        // Only where u is late are there others.
+        // They differ only if u is late.
         (None, false) if late_samples != 0.0 => {
             let (entries, paired) = read(Pairing::InTheLoop);
             analysis.family_together(manifest, cell.key(), &entries, &paired)
@@ -125,7 +125,7 @@ pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>
     if let Some(first) = records.first() {
         let tau_s = people[0].parameter("tau_e").map(|tau| tau.value);
         let nk = tau_s.map(|tau_s| run_orders::nk_of(tau_s, first.sample_time().s(), late_samples));
-        // Their names were checked with the manifest.
+        // Their names have been checked with the manifest.
         for structure in analysis.settings.structures().unwrap_or_default() {
             if let Err(reason) = run_orders::choose(analysis.settings, &records, structure, nk, &mut analysis.rows) {
                 analysis.rows.failed(None, label_of(structure), &reason);
@@ -141,7 +141,7 @@ pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>
     tables
 }
 
-/// The analysis of a run: how it is done, and what it has found so far.
+/// The analysis of a run: its settings and its results so far.
 struct RunAnalysis<'a> {
     settings: &'a AnalysisSettings,
     rows: RunRows<'a>,
@@ -166,7 +166,7 @@ impl<'a> RunAnalysis<'a> {
         for (name, value) in of_record.into_iter().chain(change) {
             self.rows.row(Some(windows[2]), RECORD, name, Estimate::fixed(value));
         }
-        // Names of structures and recursions were checked with the manifest.
+        // Names of structures and recursions have been checked with the manifest.
         for structure in self.settings.polynomials().unwrap_or_default() {
             let label = label_of(structure);
             let orders = match from_cell.orders(structure) {
@@ -198,12 +198,12 @@ impl<'a> RunAnalysis<'a> {
         }
     }
 
-    /// A recursion over the run: one that starts itself gets no information, another has the orders of the cell and
-    /// starts from a fit of the first window.
+    /// Applies a recursion to the run: one that starts by itself gets no prior information, another has the orders of
+    /// the cell and starts from a fit of the first window.
     fn track(&mut self, run: &Run, windows: &[Window; 3], method: &Method, from_cell: &FromCell) {
         let label = traces::label_of(method);
         let mut tracking = Tracking {
-            // The run is repaired and at its rate.
+            // The run is repaired and has its final rate.
             rate: Decimation::Off,
             every: run.samples(self.settings.trace_every as f64).round().max(1.0) as usize,
             ..Tracking::of(TrackRequest::of(method.clone()))
@@ -237,7 +237,7 @@ impl<'a> RunAnalysis<'a> {
         }
     }
 
-    /// Box-Jenkins of all runs.
+    /// Fits a Box-Jenkins model to all runs.
     fn box_jenkins_together(&mut self, records: &[Record]) {
         const LABEL: &str = "BJ, all runs";
         let structure = Structure::BoxJenkins;
@@ -252,7 +252,7 @@ impl<'a> RunAnalysis<'a> {
         }
     }
 
-    /// The family of all runs: the people that it is of.
+    /// Fits the family to all runs, and returns the people of the fit.
     fn family_together(
         &mut self,
         manifest: &Manifest,
@@ -282,7 +282,7 @@ impl<'a> RunAnalysis<'a> {
         }
     }
 
-    /// The family of one run, in the form of the person.
+    /// Fits the family to one run, in the form of the person.
     fn family_of_run(&mut self, record: Result<Record, String>, form: Form) {
         let fit = record.and_then(|record| {
             let estimator = family_fits::estimator_of_run(self.settings, &self.rows.condition, form)?;

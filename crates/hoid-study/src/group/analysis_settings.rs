@@ -47,10 +47,10 @@ pub struct AnalysisSettings {
     pub response_at_rad_s: Vec<f64>,
 }
 
-/// The structures that a group may fit.
+/// Structures that can be fitted to a group.
 const POLYNOMIALS: [Structure; 2] = [Structure::Arx, Structure::BoxJenkins];
 
-/// The form that held-out runs choose.
+/// Selection of the form by held-out runs.
 const AUTO: &str = "auto";
 
 /// The names of the forms, for the schema.
@@ -85,19 +85,19 @@ impl Default for AnalysisSettings {
 }
 
 impl AnalysisSettings {
-    /// The recursions with their defaults.
+    /// The recursions with their default options.
     ///
     /// # Errors
-    /// A name that no method has.
+    /// An unknown name of a method.
     pub(super) fn recursions(&self) -> Result<Vec<Method>, String> {
         let of = |name: &String| hoid_survey::method(name).map_err(|error| format!("analysis.methods: {error}"));
         self.methods.iter().map(of).collect()
     }
 
-    /// The polynomial models that are fitted, in their default order.
+    /// The polynomial models to fit, in their default order.
     ///
     /// # Errors
-    /// A name of another structure, or of none.
+    /// An unknown or unsupported structure.
     pub(super) fn polynomials(&self) -> Result<Vec<Structure>, String> {
         let names = POLYNOMIALS.map(Structure::name);
         if let Some(name) = self.polynomials.iter().find(|name| !names.contains(&name.as_str())) {
@@ -110,7 +110,8 @@ impl AnalysisSettings {
         Ok(POLYNOMIALS.into_iter().filter(asked).collect())
     }
 
-    /// The structures whose orders are needed: of the polynomial models, and of the recursions that start from one.
+    /// The structures whose orders are needed: those of the polynomial models, and of the recursions that start from
+    /// one.
     ///
     /// # Errors
     /// As [`Self::polynomials`] and [`Self::recursions`].
@@ -124,10 +125,10 @@ impl AnalysisSettings {
         Ok(POLYNOMIALS.into_iter().filter(needed).collect())
     }
 
-    /// How the family is fitted, the form left to the data or given.
+    /// Estimator of the family, with the form given or selected from the data.
     ///
     /// # Errors
-    /// A form, a prior or a parameter that there is not.
+    /// An unknown form, prior or parameter.
     pub(super) fn family(&self) -> Result<FamilyEstimator, String> {
         let mut estimator = FamilyEstimator::default();
         if self.form != AUTO {
@@ -145,7 +146,7 @@ impl AnalysisSettings {
         Ok(estimator)
     }
 
-    /// Why the settings have no meaning.
+    /// The reason why the settings are invalid.
     pub(super) fn check(&self) -> Result<(), String> {
         self.structures()?;
         self.family()?;

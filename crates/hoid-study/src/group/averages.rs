@@ -1,4 +1,4 @@
-//! Over the runs of a subject and condition: means with their errors, the chosen delays, mean
+//! Averages over the runs of a subject and condition: means with their errors, chosen delays, mean
 //! traces.
 
 use std::collections::BTreeMap;
@@ -31,7 +31,7 @@ impl Averages {
         }
     }
 
-    /// Mean, spread and error over the runs.
+    /// Mean, spread and standard error over the runs.
     pub fn table(&self) -> OutputTable {
         let mut rows = Rows::new(&schema(
             text(&["subject", "condition", "window", "estimator", "parameter"]).chain(real(&[
@@ -65,7 +65,7 @@ impl Averages {
     }
 }
 
-/// Delays and T_n that were chosen beforehand (Table 3): a row for each subject and condition.
+/// Delays and T_n chosen in advance (Table 3): one row for each subject and condition.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Delays(BTreeMap<(String, String), BTreeMap<&'static str, f64>>);
 
@@ -109,10 +109,10 @@ impl Delays {
     }
 }
 
-/// Statistics of a parameter over the runs at one time.
+/// Statistics of a parameter over the runs at each time.
 const FIGURES: [&str; 6] = ["runs", "mean", "sd", "lower_quartile", "median", "upper_quartile"];
 
-/// Traces of all runs at equal times.
+/// Traces of all runs at common times.
 #[derive(Debug, Clone, Default)]
 pub(super) struct TraceAverages {
     names: Vec<String>,
@@ -156,7 +156,7 @@ impl TraceAverages {
         }
     }
 
-    /// Times of an estimator's rows and the medians of a parameter over the runs.
+    /// Times of the rows of an estimator, and the medians of a parameter over the runs.
     pub fn medians(&self, key: &[String; 3], name: &str) -> (Vec<f64>, Vec<f64>) {
         let at = self.names.iter().position(|known| known == name);
         let (Some(times), Some(at)) = (self.values.get(key), at) else {
@@ -168,8 +168,8 @@ impl TraceAverages {
             .unzip()
     }
 
-    /// Median, quartiles, mean and standard deviation over the runs at each time; of a standard
-    /// error the median variance.
+    /// Median, quartiles, mean and standard deviation over the runs at each time; for a standard
+    /// error the median of the variances.
     pub fn table(&self) -> OutputTable {
         let mut rows = Rows::new(&Self::schema(&self.names));
         for (key, times) in &self.values {

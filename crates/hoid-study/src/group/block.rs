@@ -5,7 +5,7 @@ use super::manifest::{Manifest, RunEntry};
 /// All runs of a person in a condition.
 pub(super) struct Cell<'a> {
     pub runs: Vec<&'a RunEntry>,
-    /// Why it has no operator of its own: the behaviour of the person changes within the runs.
+    /// Reason why it has no operator of its own: the behaviour of the person changes within the runs.
     pub changes: Option<String>,
 }
 
@@ -22,7 +22,7 @@ pub(super) enum Block<'a> {
     Cell(Cell<'a>),
 }
 
-/// The runs that count, and then the cells that they are of.
+/// The runs that count, followed by their cells.
 pub(super) fn blocks(manifest: &Manifest) -> Vec<Block<'_>> {
     let runs: Vec<&RunEntry> = manifest.runs.iter().filter(|run| run.counts).collect();
     let mut cells: Vec<Cell<'_>> = Vec::new();

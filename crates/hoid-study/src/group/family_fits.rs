@@ -1,5 +1,5 @@
-//! The family of operators fitted to the runs of a person in a condition, and to each run with the
-//! form of all of them.
+//! Fits of the family of operators to the runs of a person in a condition jointly, and to each run
+//! with their common form.
 
 use hoid_analysis::{Excitation, Identification, Identified};
 use hoid_ident::family::{FamilyEstimator, FamilyFit};
@@ -19,7 +19,7 @@ pub(super) const OF_RUN: &str = "family";
 /// Label of the fit of all runs.
 pub(super) const OF_ALL: &str = "family, all runs";
 
-/// How all runs of a person in a condition are identified: as `hoid identify` does it.
+/// Identification of all runs of a person in a condition, as by `hoid identify`.
 pub(super) fn identification(
     manifest: &Manifest,
     condition: &str,
@@ -37,7 +37,7 @@ pub(super) fn identification(
     })
 }
 
-/// How one run is fitted.
+/// Estimator of one run.
 fn estimator(settings: &AnalysisSettings, condition: &ConditionSettings) -> Result<FamilyEstimator, String> {
     Ok(FamilyEstimator {
         excitation: condition.excitation.clone(),
@@ -46,7 +46,7 @@ fn estimator(settings: &AnalysisSettings, condition: &ConditionSettings) -> Resu
     })
 }
 
-/// The same for one run of a person whose form is known: nothing is individual in one run.
+/// Estimator of one run of a person whose form is known: there are no individual parameters in one run.
 pub(super) fn estimator_of_run(
     settings: &AnalysisSettings,
     condition: &ConditionSettings,
@@ -59,7 +59,7 @@ pub(super) fn estimator_of_run(
     })
 }
 
-/// The people of a fit: one, or one for each run where some parameters are individual.
+/// The people of a fit: one, or one for each run if some parameters are individual.
 pub(super) fn people_of_fit(
     key: (&str, &str),
     runs: &[&RunEntry],
@@ -77,7 +77,7 @@ pub(super) fn people_of_fit(
         .collect()
 }
 
-/// The run that a recording is, with its span where the run was cut at a fault.
+/// The run of a recording, with its span if the run was cut at a fault.
 fn run_of(runs: &[&RunEntry], recording: &str) -> String {
     let of = |entry: &&RunEntry| {
         let span = recording.strip_prefix(&entry.file.display().to_string())?;
@@ -86,7 +86,7 @@ fn run_of(runs: &[&RunEntry], recording: &str) -> String {
     runs.iter().find_map(of).unwrap_or_else(|| recording.to_owned())
 }
 
-/// Parameters, loop and response of a fit of records that were put next to each other.
+/// Parameters, loop and response of a fit of aligned records.
 pub(super) fn rows_of_fit(rows: &mut RunRows<'_>, window: Window, label: &str, fit: &FamilyFit, record: &Record) {
     let of = fit.operator(0);
     for parameter in of.parameters.iter().filter(|p| p.value.is_finite()) {

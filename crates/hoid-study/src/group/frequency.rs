@@ -1,23 +1,23 @@
 //! Describing functions of a group, by Fourier coefficients at the lines of the excitation (see
 //! [`hoid_ident::frequency`]).
 //!
-//! For each subject and each condition whose excitation the manifest names: the describing function
-//! over the runs that can be read, its verdict, and crossover and margins with the controlled
-//! element, all as `hoid describe` has them ([`describe_runs`]). They are next to the parametric
-//! fits and assume nothing of their structure.
+//! For each subject and each condition with an excitation in the manifest: the describing function
+//! over the readable runs, its verdict, and crossover and margins with the controlled element, all
+//! as by `hoid describe` ([`describe_runs`]). They complement the parametric fits and assume
+//! nothing of their structure.
 //!
-//! How far a fit is from it: with `H_j` the describing function at line j, `s_j` its standard error
+//! The distance of a fit: with `H_j` the describing function at line j, `s_j` its standard error
 //! and `F_j` the median response of the fits over the runs, the distance is
 //! `sqrt(sum |F_j - H_j|^2/s_j^2 / sum |H_j|^2/s_j^2)`, the deviation relative to H with the lines
-//! weighted as they are known, and in errors `sqrt(mean |F_j - H_j|^2/s_j^2)`. The errors of a line
-//! are known from its few runs alone; each is drawn towards the median of all lines,
+//! weighted by their precision, and in standard errors `sqrt(mean |F_j - H_j|^2/s_j^2)`. The error
+//! of a line is estimated from few runs; each is shrunk towards the median of all lines,
 //! `r_j^2 <- (nu r_j^2 + 4 r~^2)/(nu + 4)` with `r = s/|H|` and `nu = 2 (runs - 1)` (moderated
-//! variances, Smyth 2004), else the one that is small by chance would decide. Both come from the
-//! same runs, so that a fit without bias is nearer than one error. Where the controlled element is
-//! known, a fit agrees when its crossover is within 10 % and its phase margin within 5 deg of those
-//! of the describing function: about what two experiments with the same person differ by; else when
-//! its distance is below 10 %. Where the task changes within the run, both are averages over what
-//! changes, in different ways, and nothing is reported.
+//! variances, Smyth 2004), otherwise one that is small by chance would dominate. Both come from the
+//! same runs, so that a fit without bias is closer than one error. If the controlled element is
+//! known, a fit agrees if its crossover is within 10 % and its phase margin within 5 deg of those
+//! of the describing function: about the difference between two experiments with the same person;
+//! otherwise if its distance is below 10 %. If the task changes within the run, both are different
+//! averages over the change, and no agreement is reported.
 
 use std::path::Path;
 
@@ -35,7 +35,7 @@ use super::{
 };
 use crate::{columns::Rows, statistics::median};
 
-/// Results of the describing functions: a row a line, and a row a subject and condition.
+/// Results of the describing functions: one row per line, and one per subject and condition.
 pub(super) struct Frequencies {
     pub lines: OutputTable,
     pub margins: OutputTable,
@@ -72,19 +72,19 @@ const AGREEMENT: [&str; 6] = [
     "distance_in_errors",
 ];
 
-/// Largest difference of a crossover, of a phase margin, and of a response where there is no
-/// crossover, for agreement.
+/// Largest difference of the crossover, of the phase margin, and of a response without crossover,
+/// for agreement.
 const AGREES: (f64, f64, f64) = (10.0, 5.0, 10.0);
 
-/// The tables while they are filled.
+/// The tables in progress.
 struct Tables {
     lines: Rows,
     margins: Rows,
     agreement: Rows,
 }
 
-/// Describing functions of all subjects and conditions with an excitation, and how far the fits are
-/// from them; none if the manifest names none.
+/// Describing functions of all subjects and conditions with an excitation, and the distances of the
+/// fits from them; none if the manifest gives no excitation.
 pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAverages) -> Option<Frequencies> {
     manifest.conditions.values().find(|facts| facts.excitation.is_some())?;
     let with_errors: Vec<String> = MARGINS
@@ -127,7 +127,7 @@ pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAvera
         let runs: Vec<Run> = of_cell
             .filter_map(|r| read_run(manifest, base, r, Pairing::Recorded).ok())
             .collect();
-        // A ratio of samples knows no hold: what the input was moved for it is taken back.
+        // A ratio of samples does not include the hold: the shift of the input for it is reversed.
         let late_samples = runs.first().map_or(0.0, |run| {
             run.samples(facts.offset_samples) + run.input_lead_s / run.record.sample_time().s()
         });
@@ -258,8 +258,8 @@ fn of_records(
     Ok(())
 }
 
-/// Distance between a describing function and a fit in percent and in errors; of one run, which has
-/// no errors, with equal weights in percent alone.
+/// Distance between a describing function and a fit, in percent and in standard errors; for a
+/// single run, which has no errors, with equal weights and in percent only.
 fn distance(found: &DescribingFunction, response: &MedianResponse) -> (f64, f64) {
     const PRIOR: f64 = 4.0;
     let relative = |line: &Line| line.standard_error.map(|s| s * s / line.response.norm_sqr());

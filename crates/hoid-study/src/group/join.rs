@@ -1,7 +1,7 @@
-//! The tables of a group from those of its runs.
+//! The tables of a group, from those of its runs.
 //!
-//! The traces of 1000 runs do not belong in memory: they are averaged for one person in one
-//! condition after the other.
+//! The traces of 1000 runs do not fit into memory: they are averaged for one person in one
+//! condition at a time.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -39,14 +39,14 @@ impl Writers {
     }
 }
 
-/// A run among those of a person in a condition.
+/// A run of a person in a condition.
 struct RunOfCell {
     block: usize,
-    /// When the task changes, s.
+    /// Time of the task change, s.
     change_s: Option<f64>,
 }
 
-/// Makes the tables from the parts: Parquet, and CSV next to it where `csv` is set.
+/// Writes the tables from the parts: Parquet, and also CSV if `csv` is set.
 pub(super) fn join(
     manifest: &Manifest,
     base: &Path,
@@ -89,7 +89,7 @@ pub(super) fn join(
     responses.finish()?;
 
     for (table, schema) in reading::schemas() {
-        // What a person looks through first: CSV in any case.
+        // Tables that users examine first: always CSV.
         let writer = |csv: bool| TableWriter::create(&table_path(directory, table, csv), &schema);
         let mut writers = Writers(vec![writer(false)?, writer(true)?]);
         for (block, _) in blocks.iter().enumerate().filter(|(_, of)| matches!(of, Block::Run(_))) {
@@ -150,7 +150,7 @@ pub(super) fn join(
     Ok(())
 }
 
-/// When the task of a run changes, s, from its estimates.
+/// Time of the task change of a run, s, from its estimates.
 fn change_s(estimates: &OutputTable) -> Option<f64> {
     let names = texts(estimates, "parameter");
     let row = names.iter().position(|name| name == "change_s")?;

@@ -109,13 +109,12 @@ impl Manifest {
     /// Reads and checks a manifest.
     ///
     /// # Errors
-    /// [`StudyError::Plan`] with the file, the line where there is one, and the remedy;
-    /// [`StudyError::Io`].
+    /// [`StudyError::Plan`] with the file, the line if known, and the remedy; [`StudyError::Io`].
     pub fn read(path: &Path) -> Result<Self, StudyError> {
         Self::parse(&hoid_io::read_settings(path)?, &path.display().to_string())
     }
 
-    /// A manifest from its text; `path` is for messages.
+    /// Parses a manifest; `path` is for messages.
     ///
     /// # Errors
     /// As [`Manifest::read`].
@@ -183,11 +182,11 @@ impl Manifest {
         self.analysis.check()
     }
 
-    /// A manifest of the files in a directory that match a pattern, in the order of their names;
-    /// and the names of those that do not.
+    /// Creates a manifest of the files in a directory that match a pattern, in the order of their
+    /// names; also returns the names of those that do not match.
     ///
     /// # Errors
-    /// [`StudyError::Io`] when the directory cannot be read, [`StudyError::NoRuns`] when nothing
+    /// [`StudyError::Io`] if the directory cannot be read, [`StudyError::NoRuns`] if no file
     /// matches.
     pub fn of_directory(directory: &Path, pattern: &Pattern) -> Result<(Self, Vec<String>), StudyError> {
         let mut names = hoid_io::file_names(directory)?;
@@ -238,16 +237,16 @@ impl Manifest {
         Ok((manifest, others))
     }
 
-    /// Treatment of the runs of a condition.
+    /// Returns the preparation of the runs of a condition.
     ///
     /// # Errors
-    /// The key that has no meaning, and why.
+    /// The invalid key and the reason.
     pub fn preparation(&self, condition: &str) -> Result<Preparation, String> {
         let of_condition = self.conditions.get(condition).and_then(|facts| facts.prepare.as_ref());
         self.prepare.preparation(of_condition)
     }
 
-    /// Decimation of the runs of a condition because of a high rate.
+    /// Returns the decimation of the runs of a condition due to a high rate.
     ///
     /// # Errors
     /// As [`Manifest::preparation`].
@@ -256,7 +255,7 @@ impl Manifest {
         self.prepare.by_rate(of_condition)
     }
 
-    /// The manifest as TOML.
+    /// Returns the manifest as TOML.
     pub fn text(&self) -> String {
         toml::to_string_pretty(self).unwrap_or_default()
     }

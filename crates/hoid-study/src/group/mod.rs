@@ -1,4 +1,4 @@
-//! Recorded runs of several subjects: from a folder of files to a group result.
+//! Analysis of recorded runs of several subjects: from a directory of files to a group result.
 //!
 //! | module | contents |
 //! |---|---|
@@ -22,9 +22,9 @@
 //! | `averages` | means over the runs, chosen delays, averages of traces |
 //! | `join` | the tables of the group from those of its runs |
 //!
-//! Each run is a part on disk, as a block of a study is, and so are the findings in all runs of a person in a
-//! condition, which comes first: a group that was stopped continues, and of a run nothing stays in memory but its
-//! estimates and responses; traces are averaged for one person in one condition after the other.
+//! Each run is a part on disk, like a block of a study, and so are the joint results of all runs of a person in a
+//! condition, which come first: a stopped group continues, and only the estimates and responses of a run remain in
+//! memory; traces are averaged for one person in one condition at a time.
 
 mod analysis;
 mod analysis_settings;

@@ -1,7 +1,7 @@
-//! Names of files as patterns: `{subject}_{condition}_{run}*.csv`.
+//! Patterns of file names: `{subject}_{condition}_{run}*.csv`.
 //!
-//! A name in braces represents one or more characters, as few as possible, `*` for any number of
-//! them; everything else represents itself.
+//! A name in braces matches one or more characters, as few as possible, `*` any number of them; all
+//! other characters match themselves.
 
 use std::fmt;
 
@@ -19,7 +19,7 @@ enum Part {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pattern(Vec<Part>);
 
-/// Values of the names in braces in one file name.
+/// Values of the placeholders in a file name.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FileNameParts {
     /// `{subject}`.
@@ -43,11 +43,11 @@ impl fmt::Display for Pattern {
 }
 
 impl Pattern {
-    /// Reads a pattern.
+    /// Parses a pattern.
     ///
     /// # Errors
-    /// [`StudyError::Pattern`] for braces that are not closed, other names, one that is duplicated,
-    /// two names without a text between them, or a pattern without `{run}`.
+    /// [`StudyError::Pattern`] for unclosed braces, unknown or duplicate names, two adjacent names,
+    /// or a pattern without `{run}`.
     pub fn new(text: &str) -> Result<Self, StudyError> {
         let bad = |reason: String| StudyError::Pattern {
             pattern: text.to_owned(),

@@ -1,12 +1,11 @@
-//! The operator of a person in a condition: what the family ([`hoid_ident::family`]) finds in all
-//! their runs together, and its row in the table `people`.
+//! The operator of a person in a condition: the joint fit of the family ([`hoid_ident::family`]) to
+//! all their runs, and its row in the table `people`.
 //!
 //! A row has the form, for each parameter its value, standard error of these runs (`_se`) and of the person
-//! (`_se_person`), interval of 95 %
-//! (`_low`, `_high`), whether the data determine it (`_determined`) and how much of it is prior
-//! (`_prior_share`), crossover and phase margin with the controlled element and their errors and
-//! intervals, the figures of the fit and its verdict. Parameters that no person has, have no columns. Where some parameters are
-//! individual, a person has a row for each run.
+//! (`_se_person`), 95 % interval (`_low`, `_high`), whether the data determine it (`_determined`) and the share of the
+//! prior (`_prior_share`), crossover and phase margin with the controlled element and their errors and intervals, the
+//! statistics of the fit and its verdict. Parameters that no person has, have no columns. If some parameters are
+//! individual, a person has one row for each run.
 
 use hoid_ident::family::{FamilyFit, OperatorOfRecord, Parameter};
 use hoid_io::{ColumnValues, OutputTable, TableSchema};
@@ -15,7 +14,7 @@ use hoid_model::{ContinuousTransferFunction, VerdictLevel, operator_family::PARA
 use super::tables::{joined, numbers, parted, real, schema, text, texts};
 use crate::columns::Rows;
 
-/// Name of the run that is all of them.
+/// Name of the run that represents all runs.
 pub(super) const ALL: &str = "all";
 
 /// Outcome of a fit.
@@ -38,17 +37,17 @@ hoid_model::named_choice!(PersonStatus, "status of a person", 3, {
 /// A row of the table `people`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Person {
-    /// Who.
+    /// Subject.
     pub subject: String,
-    /// In which condition.
+    /// Condition.
     pub condition: String,
-    /// `all`, or the run whose individual parameters these are.
+    /// `all`, or the run to which the individual parameters belong.
     pub run: String,
-    /// How many runs were fitted together.
+    /// Number of runs fitted jointly.
     pub runs: usize,
-    /// Outcome of it.
+    /// Outcome of the fit.
     pub status: PersonStatus,
-    /// Why there is no result; empty if there is one.
+    /// Reason why there is no result; empty if there is one.
     pub reason: String,
     /// The form of the operator.
     pub form: String,
@@ -56,28 +55,28 @@ pub struct Person {
     pub parameters: Vec<Parameter>,
     /// Crossover frequency with the controlled element, rad/s.
     pub crossover_rad_s: Option<Estimate>,
-    /// Its interval of 95 %, Student's: the errors rest on few runs.
+    /// Its 95 % interval by Student's t, since the errors are based on few runs.
     pub crossover_interval: Option<(f64, f64)>,
     /// Phase margin, deg.
     pub phase_margin_deg: Option<Estimate>,
-    /// Its interval, likewise.
+    /// Its 95 % interval, likewise.
     pub phase_margin_interval: Option<(f64, f64)>,
     /// chi^2 at the lines of the excitation, and its degrees of freedom.
     pub chi2: Option<(f64, usize)>,
-    /// Clustered over model-based variances.
+    /// Ratio of clustered to model-based variances.
     pub kappa: Option<f64>,
     /// Order nd of the noise model.
     pub noise_order: Option<usize>,
     /// Verdict on the result.
     pub verdict: Option<VerdictLevel>,
-    /// Findings against it.
+    /// Findings of the verdict.
     pub reasons: Vec<String>,
     /// Additional notes.
     pub notes: Vec<String>,
 }
 
 impl Person {
-    /// A person without a result, and why.
+    /// A person without a result, and the reason.
     pub(super) fn without((subject, condition): (&str, &str), status: PersonStatus, reason: &str) -> Self {
         Self {
             subject: subject.to_owned(),
@@ -132,17 +131,17 @@ impl Person {
         }
     }
 
-    /// Whether it is of all runs together; where some parameters are individual there is a row for each run.
+    /// True for the row of all runs; if some parameters are individual, there is one row for each run.
     pub fn is_of_all_runs(&self) -> bool {
         self.run == ALL
     }
 
-    /// A parameter by its name.
+    /// Returns a parameter by its name.
     pub fn parameter(&self, name: &str) -> Option<&Parameter> {
         self.parameters.iter().find(|p| p.name == name)
     }
 
-    /// Person and place: `P03 in fo`.
+    /// Person and condition: `P03 in fo`.
     pub fn name(&self) -> String {
         let of_run = if self.is_of_all_runs() {
             String::new()
@@ -248,7 +247,7 @@ impl Person {
     }
 }
 
-/// Person and place, as text.
+/// Person and condition, as text.
 pub(super) fn cell_name(subject: &str, condition: &str) -> String {
     if condition.is_empty() {
         subject.to_owned()
@@ -257,7 +256,7 @@ pub(super) fn cell_name(subject: &str, condition: &str) -> String {
     }
 }
 
-/// The table, with columns for the parameters that its people have.
+/// The table, with columns for the parameters of its people.
 pub(super) fn people_table(people: &[Person]) -> OutputTable {
     let used = |name: &&str| people.iter().any(|p| p.parameter(name).is_some());
     let names = PARAMETERS.map(|(name, _)| name);
@@ -290,7 +289,7 @@ fn people_schema(parameters: &[&str]) -> TableSchema {
     )
 }
 
-/// The people of a table; a row whose status is unknown is none.
+/// The people of a table; rows with an unknown status are skipped.
 pub(super) fn people_of(table: &OutputTable) -> Vec<Person> {
     let rows = match table.column("subject") {
         Some(ColumnValues::Text(values)) => values.len(),
@@ -340,7 +339,7 @@ mod tests {
         let table = people_table(&[person.clone(), failed.clone()]);
         assert_eq!(people_of(&table), [person.clone(), failed.clone()]);
         assert_eq!((person.name().as_str(), failed.name().as_str()), ("P in c, run 3", "Q"));
-        // No one has a lead: no columns of it.
+        // No person has a lead: no columns for it.
         assert!(table.column("T_L").is_none() && table.column("T_I_low").is_some());
         person.parameters.clear();
         assert!(people_table(&[person]).column("tau_e").is_none());

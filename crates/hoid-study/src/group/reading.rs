@@ -1,4 +1,4 @@
-//! Reading the runs of a group as the manifest states, and the processing of them.
+//! Reading and preparation of the runs of a group according to the manifest.
 
 use std::path::Path;
 
@@ -15,16 +15,16 @@ use super::{
 };
 use crate::columns::Rows;
 
-/// How the output is put next to the input.
+/// Alignment of the output with the input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Pairing {
-    /// As recorded, and as `[prepare]` moves channels.
+    /// As recorded, with the offsets of `[prepare]`.
     Recorded,
-    /// With `offset_samples` of the condition taken back too: u next to the e that it answers.
+    /// Also with `offset_samples` of the condition reversed: u aligned with the e that it answers.
     InTheLoop,
 }
 
-/// The record in a file, and the processing of it; the condition may have a preparation of its own.
+/// Reads and prepares a record; the condition may have its own preparation.
 fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing) -> Result<CheckedRecord, String> {
     let reading = &manifest.read;
     let text = |error: hoid_io::IoError| error.to_string();
@@ -84,7 +84,7 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
         record: longest.unwrap_or_else(|| read.record.clone()),
         ..read
     };
-    // Faults are found in the samples that were recorded.
+    // Faults are detected in the recorded samples.
     let (record, done) = manifest
         .by_rate(condition)?
         .of(read.record)
@@ -99,17 +99,17 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
     })
 }
 
-/// A record that was read and repaired, with the faults found.
+/// A record that was read and repaired, with its faults.
 pub(super) struct CheckedRecord {
     read: ReadRecord,
     faults: Vec<Fault>,
-    /// Amount by which its rate was lowered after what counts samples as they were recorded.
+    /// Factor by which its rate was reduced after the steps that count recorded samples.
     factor: usize,
     recorded: Recorded,
 }
 
-/// The tables of the account: the processing of the runs, one step a row, and the problems of their
-/// sampling, one finding a row.
+/// The tables of the account: preparation steps of the runs, one per row, and problems of their
+/// sampling, one per row.
 pub(super) fn schemas() -> [(&'static str, TableSchema); 2] {
     let schema = |names: &[&str]| {
         let column = |name: &&str| ColumnSchema {
@@ -148,10 +148,10 @@ pub(super) fn schemas() -> [(&'static str, TableSchema); 2] {
     ]
 }
 
-/// A file by its name in the manifest, and what was read of it.
+/// A file by its name in the manifest, and the result of reading it.
 pub(super) type ReadFile<'a> = (&'a Path, Result<CheckedRecord, String>);
 
-/// The file of a run, and the one that is joined after it.
+/// The file of a run, and the one joined after it.
 pub(super) fn read_files<'a>(
     manifest: &Manifest,
     base: &Path,
@@ -167,29 +167,29 @@ pub(super) fn read_files<'a>(
         .collect()
 }
 
-/// A run, read and prepared as the manifest states.
+/// A run, read and prepared according to the manifest.
 pub(super) struct Run {
     pub record: Record,
-    /// Where the second file starts, s, for a run that is joined of two.
+    /// Time of the seam, s, for a run joined from two files.
     pub seam_s: Option<f64>,
-    /// Amount by which its rate was lowered: so many samples of the recording are one.
+    /// Factor by which its rate was reduced: the number of recorded samples per sample.
     pub factor: usize,
-    /// Amount by which a sample of the input is taken later than that of the output next to it, s.
+    /// Time by which a sample of the input is later than that of the output in the same row, s.
     pub input_lead_s: f64,
-    /// Recorded run for an identification; none for a run that is joined of two, whose task changes at the seam.
+    /// Recorded run for an identification; none for a run joined from two files, whose task changes at the seam.
     pub recorded: Option<Recorded>,
 }
 
-/// A run as it was recorded and prepared, its faults and its rate with it.
+/// A recorded and prepared run, with its faults and its rate.
 #[derive(Clone)]
 pub(super) struct Recorded {
     pub record: Record,
-    /// Processing applied to it.
+    /// Steps applied to it.
     pub account: Account,
 }
 
 impl Run {
-    /// A number of samples of the recording, in samples of the run.
+    /// Converts a number of recorded samples to samples of the run.
     pub fn samples(&self, recorded: f64) -> f64 {
         recorded / self.factor as f64
     }
@@ -200,7 +200,7 @@ pub(super) fn read_run(manifest: &Manifest, base: &Path, entry: &RunEntry, pairi
     run_of(read_files(manifest, base, entry, pairing))
 }
 
-/// The run in one file, or joined of two.
+/// The run of one file, or joined from two.
 pub(super) fn run_of(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
     let mut run: Option<Run> = None;
     for (_, read) in files {
@@ -232,8 +232,8 @@ pub(super) fn run_of(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
     run.ok_or_else(|| "no file is named".to_owned())
 }
 
-/// Processing applied to the files of a run and the problems of them; nothing for one that cannot
-/// be read, which its estimates show.
+/// Steps applied to the files of a run, and their problems; nothing for a file that cannot be read,
+/// which its estimates report.
 pub(super) fn account(entry: &RunEntry, files: &[ReadFile<'_>]) -> [(&'static str, OutputTable); 2] {
     let [(steps_name, steps), (trouble_name, trouble)] = schemas();
     let (mut steps, mut trouble) = (Rows::new(&steps), Rows::new(&trouble));

@@ -1,11 +1,11 @@
 //! Frequency responses of the fits of whole runs, on one grid of frequencies, and their medians
 //! over the runs.
 //!
-//! The grid is `omega = 10^(k/32)` rad/s from 0.1 to 40, as far as the sampling goes: 32 points a
-//! decade, so that a straight line between two of them is within 0.01 rad of the phase of a delay
-//! of half a second at 10 rad/s. A response is that from e to u in the pairing of the manifest,
-//! `H e^{j omega Ts offset}`, as the describing function next to it. Phases are followed from the
-//! lowest frequency on.
+//! The grid is `omega = 10^(k/32)` rad/s from 0.1 to 40, up to the limit of the sampling: 32 points
+//! per decade, so that linear interpolation is within 0.01 rad of the phase of a delay of half a
+//! second at 10 rad/s. A response is that from e to u with the alignment of the manifest,
+//! `H e^{j omega Ts offset}`, like that of the describing function. Phases are unwrapped from the
+//! lowest frequency.
 
 use std::collections::BTreeMap;
 
@@ -38,7 +38,7 @@ pub(super) fn responses_schema() -> TableSchema {
     ])))
 }
 
-/// Phases in deg, each on the branch that is nearest to the one before it.
+/// Unwrapped phases in deg, each on the branch nearest to the previous one.
 pub(super) fn followed_phases_deg(response: &[Complex64]) -> Vec<f64> {
     let mut turn = 0.0;
     let mut last: Option<Complex64> = None;
@@ -65,13 +65,13 @@ pub(super) struct MedianResponse {
 }
 
 impl MedianResponse {
-    /// The response at a frequency, by straight lines over log omega; none beyond the grid.
+    /// Interpolates the response linearly over log omega; none beyond the grid.
     pub fn at(&self, omega_rad_s: f64) -> Option<Complex64> {
         let [decibel, degrees] = self.decibel_and_degrees(omega_rad_s)?;
         Some(Complex64::from_polar(10f64.powf(decibel / 20.0), degrees.to_radians()))
     }
 
-    /// The same as gain and phase.
+    /// The response as gain in dB and phase in deg.
     pub fn decibel_and_degrees(&self, omega_rad_s: f64) -> Option<[f64; 2]> {
         let k = self.omega_rad_s.partition_point(|omega| *omega <= omega_rad_s);
         let (low, high) = (k.checked_sub(1)?, k);
@@ -110,7 +110,7 @@ impl ResponseAverages {
         }
     }
 
-    /// The estimators of a subject and condition and their median responses.
+    /// The estimators of a subject and condition with their median responses.
     pub fn medians(&self, subject: &str, condition: &str) -> Vec<(&str, MedianResponse)> {
         let of_cell = self
             .0
@@ -166,7 +166,7 @@ mod tests {
 
     #[test]
     fn phases_are_followed_and_the_median_is_read_between_the_points() {
-        // A delay of half a second turns by 20 rad up to 40 rad/s.
+        // A delay of half a second has a phase of 20 rad at 40 rad/s.
         let omega = grid(0.01);
         assert_eq!((omega.len(), grid(0.1).len()), (84, 80));
         let response: Vec<Complex64> = omega.iter().map(|w| Complex64::from_polar(2.0, -0.5 * w)).collect();

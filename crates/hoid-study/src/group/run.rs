@@ -1,5 +1,5 @@
-//! The analysis of a group in a directory: blocks over threads, parts on disk, the tables of the
-//! group at the end.
+//! Analysis of a group in a directory: blocks over threads, parts on disk, and finally the tables
+//! of the group.
 
 use std::{
     path::{Path, PathBuf},
@@ -23,7 +23,7 @@ use crate::{
     seal::{OnDisk, notes_on, on_disk, write_block},
 };
 
-/// Analyses the runs that count. `base` is the directory from which the files are named.
+/// Analyses the runs that count. File names are relative to `base`.
 ///
 /// # Errors
 /// As [`crate::run`](fn@crate::run).
@@ -70,7 +70,7 @@ pub fn run_group(
             true
         }
     });
-    // What is chosen for all runs of a person in a condition comes before each of them.
+    // The joint choices for all runs of a person in a condition come before each of them.
     let is_cell = |i: &usize| matches!(blocks[*i], Block::Cell(_));
     let (cells, runs): (Vec<usize>, Vec<usize>) = open.partition(is_cell);
     let notes: Vec<String> = found.note_on_seals().into_iter().chain(notes_on(&damaged)).collect();
@@ -127,7 +127,7 @@ pub fn run_group(
     })
 }
 
-/// No recording lies where the tables and parts are written.
+/// Checks that no recording lies where the tables and parts are written.
 fn check_directory(manifest: &Manifest, base: &Path, directory: &Path) -> Result<(), StudyError> {
     let files = manifest
         .runs
@@ -141,8 +141,7 @@ fn check_directory(manifest: &Manifest, base: &Path, directory: &Path) -> Result
     Ok(())
 }
 
-/// SHA-256 of the manifest and of the files that count; the run of one that cannot be read reports
-/// it.
+/// SHA-256 of the manifest and of the files that count; an unreadable file is reported by its run.
 fn hash(manifest: &Manifest, base: &Path) -> String {
     let mut hasher = Sha256::new();
     hasher.update(manifest.text().as_bytes());
@@ -154,7 +153,7 @@ fn hash(manifest: &Manifest, base: &Path) -> String {
     hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Makes the directory ready, or finds what it holds.
+/// Prepares the directory, or reads what it holds.
 fn prepare(manifest: &Manifest, directory: &Path, record: &RunRecord, resume: bool) -> Result<RunRecord, StudyError> {
     let shown = || directory.display().to_string();
     if let Some(found) = RunRecord::read(directory)? {

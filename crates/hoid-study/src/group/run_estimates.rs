@@ -1,5 +1,5 @@
-//! Results of a finished group for each of its runs, read back from its tables: the operator in the form of the person,
-//! root mean squares, and responses.
+//! Results of a finished group for each run, read from its tables: the operator in the form of the person, RMS values,
+//! and responses.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -28,10 +28,10 @@ pub struct RunEstimates {
 }
 
 impl RunEstimates {
-    /// From the tables in the directory of a finished group.
+    /// Reads the tables in the directory of a finished group.
     ///
     /// # Errors
-    /// [`StudyError::Io`] for tables that do not exist.
+    /// [`StudyError::Io`] for missing tables.
     pub fn read(directory: &Path) -> Result<Self, StudyError> {
         let table = |name: &str| read_table(&table_path(directory, name, false));
         Ok(Self::of(&table("estimates")?, &table("responses")?))
@@ -80,13 +80,13 @@ impl RunEstimates {
         self.runs.get(&key).map_or(&[], Vec::as_slice)
     }
 
-    /// A parameter, `crossover_rad_s`, `phase_margin_deg`, `rms_e` or `rms_u` of a run.
+    /// Returns a parameter, `crossover_rad_s`, `phase_margin_deg`, `rms_e` or `rms_u` of a run.
     pub fn parameter(&self, [subject, condition, run]: [&str; 3], name: &str) -> Option<Estimate> {
         let key = [subject, condition, run].map(str::to_owned);
         self.parameters.get(&key)?.get(name).copied()
     }
 
-    /// Gain in dB and phase in deg of the operator of a run, or of all runs (`None`); none beyond 0.1 to 40 rad/s.
+    /// Gain in dB and phase in deg of the operator of a run, or of all runs (`None`); none outside 0.1 to 40 rad/s.
     pub fn response(&self, [subject, condition]: [&str; 2], run: Option<&str>, omega_rad_s: f64) -> Option<[f64; 2]> {
         let key = [subject, condition, run.unwrap_or(ALL)].map(str::to_owned);
         self.responses.get(&key)?.decibel_and_degrees(omega_rad_s)

@@ -1,12 +1,12 @@
-//! The orders and the delay of the ARX and Box-Jenkins models, chosen beforehand.
+//! Orders and delay of the ARX and Box-Jenkins models, chosen in advance.
 //!
-//! A single run determines the delay of a person badly: the loss of a model of second order is flat
-//! over nk, has several minima, of which a sample more or less takes another, and often falls
-//! towards the end of the range. The delay is therefore one for all runs of a person in a condition,
-//! that of their operator in the family: `nk = round(tau_e/Ts) + 1`, with the samples by which u is
-//! recorded late. Where there is no such operator, every nk in the range is fitted to all runs at
-//! once on each of two sub-batches, and nk is the average of the two best, rounded. nd is the
-//! greater of the orders that BIC prefers on the sub-batches of all runs.
+//! A single run determines the delay of a person poorly: the loss of a second-order model is flat
+//! over nk, has several minima, of which another is selected with a sample more or less, and often
+//! decreases towards the end of the range. The delay is therefore common to all runs of a person in
+//! a condition, that of their operator in the family: `nk = round(tau_e/Ts) + 1`, plus the samples
+//! by which u is recorded late. If there is no such operator, every nk in the range is fitted
+//! jointly to all runs on each of two sub-batches, and nk is the rounded mean of the two best. nd
+//! is the larger of the orders that BIC selects on the sub-batches of all runs.
 
 use hoid_ident::{Estimator, OrderRanges, choose_orders, order_selection::Criterion};
 use hoid_io::OutputTable;
@@ -25,13 +25,13 @@ pub(super) fn label_of(structure: Structure) -> &'static str {
     if structure == Structure::Arx { "ARX" } else { "BJ" }
 }
 
-/// nk of a delay in s, of u that is recorded late by some samples.
+/// nk of a delay in s, if u is recorded late by `late_samples`.
 pub(super) fn nk_of(delay_s: f64, sample_time_s: f64, late_samples: f64) -> usize {
     (delay_s / sample_time_s + late_samples).round().max(0.0) as usize + 1
 }
 
-/// The orders of a structure for all runs, with the delay that is known or searched; where it is
-/// searched, a row has that of each sub-batch.
+/// Orders of a structure for all runs, with a known or estimated delay; if it is estimated, there
+/// is a row for that of each sub-batch.
 pub(super) fn choose(
     settings: &AnalysisSettings,
     records: &[Record],
@@ -84,7 +84,7 @@ pub(super) fn choose(
     Ok(())
 }
 
-/// The operator's orders with the delays of the manifest.
+/// Orders of the operator with the delays of the manifest.
 pub(super) fn ranges(settings: &AnalysisSettings, record: &Record, structure: Structure) -> OrderRanges {
     let (least, most) = settings.delay_s;
     let samples = |delay_s: f64| (delay_s / record.sample_time().s()).round() as usize + 1;
@@ -93,7 +93,7 @@ pub(super) fn ranges(settings: &AnalysisSettings, record: &Record, structure: St
     ranges
 }
 
-/// The orders that were chosen, from the estimates of a person in a condition; why there are none.
+/// The chosen orders, from the estimates of a person in a condition; or the reason why there are none.
 pub(super) fn chosen(estimates: &OutputTable, structure: Structure) -> Result<Orders, String> {
     let [window, estimator, parameter, reason] =
         ["window", "estimator", "parameter", "reason"].map(|name| texts(estimates, name));

@@ -1,5 +1,5 @@
-//! The estimates of one run as rows: coefficients, operator, responses, and what failed with its
-//! reason.
+//! The estimates of one run as rows: coefficients, operator, responses, and failures with their
+//! reasons.
 
 use hoid_ident::{Fit, frequency::Crossover};
 use hoid_io::{OutputTable, TableSchema};
@@ -25,12 +25,12 @@ pub(super) struct RunTables {
     pub estimates: OutputTable,
     pub responses: OutputTable,
     pub traces: OutputTable,
-    /// By the name of the table: of a run the processing applied to its files and the problems of
-    /// their sampling; of all runs at once the person.
+    /// Tables by name: for a run, the steps applied to its files and the problems of their
+    /// sampling; for all runs jointly, the person.
     pub account: Vec<(&'static str, OutputTable)>,
 }
 
-/// One estimate a row, in long form.
+/// One estimate per row, in long form.
 pub(super) fn estimates_schema() -> TableSchema {
     schema(
         text(&["subject", "condition", "run", "window"])
@@ -41,13 +41,13 @@ pub(super) fn estimates_schema() -> TableSchema {
     )
 }
 
-/// The tables of a run while they are filled.
+/// The tables of a run in progress.
 pub(super) struct RunRows<'a> {
     entry: &'a RunEntry,
     /// Known properties of its condition.
     pub condition: ConditionSettings,
-    /// Amount by which a sample of the input is taken later than that of the output next to it, s: a ratio of samples
-    /// has it as a phase, which is taken back.
+    /// Time by which a sample of the input is later than that of the output in the same row, s: a ratio of samples
+    /// contains it as a phase, which is removed.
     pub input_lead_s: f64,
     element: Option<ContinuousTransferFunction>,
     columns: TraceColumns,
@@ -72,7 +72,7 @@ impl<'a> RunRows<'a> {
         }
     }
 
-    /// Converts options that count samples of the recording to samples of a run.
+    /// Converts options that count recorded samples to samples of a run.
     pub fn at_the_rate_of(&mut self, run: &Run) {
         self.condition.offset_samples = run.samples(self.condition.offset_samples);
         self.input_lead_s = run.input_lead_s;
@@ -108,7 +108,7 @@ impl<'a> RunRows<'a> {
         self.operator_rows(window, label, fit.operator());
     }
 
-    /// The operator of a fit, or why it has none.
+    /// The operator of a fit, or the reason why it has none.
     pub fn operator_rows(&mut self, window: Window, label: &str, operator: Result<OperatorEstimate, NotConvertible>) {
         match operator {
             Ok(operator) => {
@@ -121,7 +121,7 @@ impl<'a> RunRows<'a> {
     }
 
     /// Frequency response of the fit of the whole run, and crossover and phase margin with the
-    /// controlled element, where that is known.
+    /// controlled element, if known.
     pub fn response_rows(&mut self, window: Window, label: &str, fit: &Fit, sample_time_s: f64) {
         if window.name != WHOLE {
             return;
@@ -150,7 +150,7 @@ impl<'a> RunRows<'a> {
         }
     }
 
-    /// Response of a model of u that is `advance_s` late, on the grid.
+    /// Response on the grid of a model whose u is late by `advance_s`.
     pub fn responses_of(
         &mut self,
         label: &str,
@@ -177,7 +177,7 @@ impl<'a> RunRows<'a> {
         (omega, response)
     }
 
-    /// The controlled element, where it is known.
+    /// The controlled element, if known.
     pub fn element(&self) -> Option<&ContinuousTransferFunction> {
         self.element.as_ref()
     }
@@ -201,7 +201,7 @@ impl<'a> RunRows<'a> {
         }
     }
 
-    /// A number that was estimated in a window, or of the whole run.
+    /// A number estimated in a window, or for the whole run.
     pub fn row(&mut self, window: Option<Window>, estimator: &str, parameter: &str, estimate: Estimate) {
         self.begin(window, estimator);
         self.estimates.text("parameter", parameter);
@@ -218,7 +218,7 @@ impl<'a> RunRows<'a> {
         self.estimates.text("reason", reason);
     }
 
-    /// Findings against a recursion over the whole run; of one that is trustworthy nothing.
+    /// Findings of a recursion over the whole run; none if it is trustworthy.
     pub fn judged(&mut self, estimator: &str, verdict: &Verdict) {
         if verdict.level == VerdictLevel::Trustworthy {
             return;
@@ -229,7 +229,7 @@ impl<'a> RunRows<'a> {
         self.estimates.text("reason", &reasons.join("; "));
     }
 
-    /// Quantities that could not be estimated, and why.
+    /// Quantities that could not be estimated, and the reason.
     pub fn failed(&mut self, window: Option<Window>, estimator: &str, reason: &str) {
         self.begin(window, estimator);
         self.estimates.text("status", "failed");

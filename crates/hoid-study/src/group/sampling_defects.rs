@@ -1,30 +1,30 @@
-//! Defects of the sampling that a virtual experiment can have.
+//! Sampling defects of a virtual experiment.
 
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
 use hoid_model::Record;
 use hoid_numerics::statistics::root_mean_square;
 
-/// A defect of the sampling, as recorded data have it.
+/// A sampling defect that occurs in recorded data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SamplingDefect {
-    /// Times that scatter by a fifth of a sample.
+    /// Times with jitter of a fifth of a sample.
     Jitter,
     /// One row of two hundred is missing.
     Missing,
     /// One row of two hundred is duplicated.
     Repeated,
-    /// A clock that runs slow by 0.2 %.
+    /// A clock that is slow by 0.2 %.
     SlowClock,
-    /// A stick that goes no further than one and a half standard deviations of u.
+    /// A stick that saturates at 1.5 standard deviations of u.
     Saturated,
-    /// A stick with 8 bits over its range.
+    /// A stick quantised to 8 bits over its range.
     Quantised,
-    /// A recorder that writes the same values for half a second, once.
+    /// A recorder that once writes the same values for half a second.
     Stalled,
 }
 
 impl SamplingDefect {
-    /// All of them.
+    /// All defects.
     pub const ALL: [Self; 7] = [
         Self::Jitter,
         Self::Missing,
@@ -35,7 +35,7 @@ impl SamplingDefect {
         Self::Stalled,
     ];
 
-    /// True if the times of the rows are no longer even.
+    /// True if the times of the rows become uneven.
     pub(super) fn is_uneven(self) -> bool {
         matches!(self, Self::Jitter | Self::Missing | Self::Repeated)
     }
@@ -54,8 +54,8 @@ impl SamplingDefect {
     }
 }
 
-/// t and the named columns of a run as a recorder with these defects would have written them.
-/// `noise` are normal deviates, one a sample.
+/// t and the given columns of a run as recorded with these defects. `noise` are normal deviates,
+/// one per sample.
 pub(super) fn recorded(record: &Record, names: &[&str], defects: &[SamplingDefect], noise: &[f64]) -> OutputTable {
     let has = |defect: SamplingDefect| defects.contains(&defect);
     let n = record.len();
@@ -65,7 +65,7 @@ pub(super) fn recorded(record: &Record, names: &[&str], defects: &[SamplingDefec
         t.iter_mut().for_each(|t| *t *= 0.998);
     }
     if has(SamplingDefect::Jitter) {
-        // Less than half a sample, so that the order stays.
+        // Less than half a sample, so that the order is kept.
         t.iter_mut()
             .zip(noise)
             .for_each(|(t, z)| *t += (0.2 * z).clamp(-0.45, 0.45) * ts);
@@ -79,7 +79,7 @@ pub(super) fn recorded(record: &Record, names: &[&str], defects: &[SamplingDefec
         let step = 8.0 * sd / 256.0;
         u.iter_mut().for_each(|u| *u = (*u / step).round() * step);
     }
-    // Where the values of each row come from; the times continue.
+    // Source of the values of each row; the times continue.
     let held = |k: usize| {
         let stall = n / 3..n / 3 + (0.5 / ts) as usize;
         if has(SamplingDefect::Stalled) && stall.contains(&k) {
@@ -89,7 +89,7 @@ pub(super) fn recorded(record: &Record, names: &[&str], defects: &[SamplingDefec
         }
     };
     let mut rows: Vec<usize> = (0..n).collect();
-    // One in two hundred by a deviate that is drawn in any case.
+    // One in two hundred, by a deviate that is always drawn.
     let rare = |k: usize| (noise[k] * 1e6).abs() as u64 % 200;
     if has(SamplingDefect::Missing) {
         rows.retain(|k| *k == 0 || rare(*k) != 0);

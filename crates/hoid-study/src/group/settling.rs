@@ -1,14 +1,13 @@
-//! How fast the recursions follow a change at a known instant, and how noisy they are, by subject,
+//! Settling times of the recursions after a change at a known instant, and their noise, by subject,
 //! condition and parameter.
 //!
-//! For a recorded person the truth is not known: the levels before and after the change are those
-//! of the recursion itself, the medians over the second half of its rows before, and of those after
-//! the change, of the median over the runs. The settling times are those when the median has first
-//! covered 50 and 90 % of the step, as in the studies; the noise is the deviation of one run around
-//! its own level after the change, `1.4826` times the median absolute deviation, and its median
-//! over the runs. There is no time where the step is smaller than the noise, so that there is
-//! nothing to settle to, and none if the share was covered when the change came: then it was not
-//! the change that moved the estimate.
+//! For a recorded person the true values are not known: the levels before and after the change are
+//! those of the recursion itself, the medians over the second half of its rows before, and of those
+//! after the change, of the median over the runs. The settling times are those at which the median
+//! first covers 50 and 90 % of the step, as in the studies; the noise is the deviation of one run
+//! around its own level after the change, `1.4826` times the median absolute deviation, and its
+//! median over the runs. There is no settling time if the step is smaller than the noise, and none
+//! if the share was already covered at the change: then the estimate moved for another reason.
 
 use std::collections::BTreeMap;
 
@@ -20,7 +19,7 @@ use super::{
 };
 use crate::{columns::Rows, statistics::median};
 
-/// From the median absolute deviation to the standard deviation of a normal distribution.
+/// Factor from the median absolute deviation to the standard deviation of a normal distribution.
 const MAD: f64 = 1.4826;
 
 const KEYS: [&str; 4] = ["subject", "condition", "estimator", "parameter"];
@@ -34,18 +33,18 @@ const FIGURES: [&str; 7] = [
     "noise",
 ];
 
-/// Results of single runs: instants of the change, and the noise of each parameter.
+/// Results of single runs: times of the change, and the noise of each parameter.
 #[derive(Debug, Clone, Default)]
 struct OfRuns {
     change_s: Vec<f64>,
     noise: BTreeMap<String, Vec<f64>>,
 }
 
-/// Collected over the runs with a change.
+/// Results of the runs with a change.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Settling(BTreeMap<[String; 3], OfRuns>);
 
-/// Rows of a stretch in its second half.
+/// Rows in the second half of an interval.
 fn second_half(times: &[f64], from_s: f64, to_s: f64) -> Vec<usize> {
     let inside: Vec<usize> = (0..times.len())
         .filter(|i| times[*i] > from_s && times[*i] <= to_s)
@@ -140,7 +139,7 @@ impl Step {
         }
     }
 
-    /// Time from the change until a share of the step is covered; none if it was before.
+    /// Time from the change until a share of the step is covered; none if it was covered before.
     fn settled_s(&self, times: &[f64], values: &[f64], change_s: f64, share: f64) -> Option<f64> {
         let covered = |v: f64| (v - self.before) / (self.after - self.before) >= share;
         let (before, after): (Vec<_>, Vec<_>) = times.iter().zip(values).partition(|(t, _)| **t <= change_s);

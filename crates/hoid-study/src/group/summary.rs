@@ -1,4 +1,4 @@
-//! Report of a finished group: what failed, the people, and one verdict on all of it.
+//! Summary of a finished group: failures, people, and an overall verdict.
 //!
 //! | finding | weight | when |
 //! |---|---|---|
@@ -10,7 +10,8 @@
 //! | `fits-failed` | note | other fits, which are rows with their reasons |
 //! | `condition-changes` | note | a condition that changes within its runs has no operator |
 //!
-//! One person whose data carry no information makes the group doubtful and not undetermined: the others remain valid.
+//! One person whose data carry no information makes the group doubtful, not undetermined: the results of the others
+//! remain valid.
 
 use std::path::Path;
 
@@ -28,34 +29,34 @@ use crate::{StudyError, directory::table_path};
 /// A run that could not be read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunFailure {
-    /// Who.
+    /// Subject.
     pub subject: String,
-    /// In which condition.
+    /// Condition.
     pub condition: String,
-    /// Which run.
+    /// Run.
     pub run: String,
-    /// Why.
+    /// Reason.
     pub reason: String,
 }
 
-/// Report of a finished group.
+/// Summary of a finished group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroupSummary {
-    /// Runs that count.
+    /// Number of runs that count.
     pub runs: usize,
-    /// The entries of them that could not be read.
+    /// The runs that could not be read.
     pub failures: Vec<RunFailure>,
-    /// The people, by their first runs in the manifest.
+    /// The people, in the order of their first runs in the manifest.
     pub people: Vec<Person>,
-    /// Reliability of all of it.
+    /// Overall verdict.
     pub verdict: Verdict,
 }
 
 impl GroupSummary {
-    /// From the tables in the directory of a finished group.
+    /// Reads the tables in the directory of a finished group.
     ///
     /// # Errors
-    /// [`StudyError::Io`] for tables that do not exist.
+    /// [`StudyError::Io`] for missing tables.
     pub fn read(manifest: &Manifest, directory: &Path) -> Result<Self, StudyError> {
         let table = |name: &str| read_table(&table_path(directory, name, false));
         let (people, estimates) = (people_of(&table(PEOPLE)?), table("estimates")?);
@@ -71,7 +72,7 @@ impl GroupSummary {
     }
 }
 
-/// The runs that were not read, and how many other estimates failed.
+/// The unreadable runs, and the number of other failed estimates.
 fn failures(estimates: &OutputTable) -> (Vec<RunFailure>, usize) {
     let [subject, condition, run, estimator, status, reason] =
         ["subject", "condition", "run", "estimator", "status", "reason"].map(|name| texts(estimates, name));
@@ -168,7 +169,7 @@ mod tests {
         assert_eq!(judged(2, 0, &[person(Trustworthy)]).level, Trustworthy);
         assert_eq!(judged(2, 1, &[person(Trustworthy)]).level, Doubtful);
         assert_eq!(judged(2, 2, &[]).level, NotDetermined);
-        // One of two people does not move.
+        // The task of one of two people does not change.
         let both = [person(Trustworthy), person(NotDetermined)];
         let verdict = judged(2, 0, &both);
         assert_eq!(verdict.level, Doubtful);
@@ -181,7 +182,7 @@ mod tests {
             (verdict.level, verdict.findings()[0].kind),
             (Doubtful, "condition-failed")
         );
-        // Where all conditions change nothing was asked of the family.
+        // If the task changes in all conditions, the family is not fitted.
         let changes = Person::without(("Q", "d"), PersonStatus::Changes, "at 40 s");
         assert_eq!(judged(2, 0, &[changes]).level, Trustworthy);
     }

@@ -41,7 +41,7 @@ pub(super) fn numbers<'a>(table: &'a OutputTable, name: &str) -> &'a [f64] {
     }
 }
 
-/// A separator between sentences in one cell.
+/// Separator between sentences in a cell.
 const BETWEEN: &str = " | ";
 
 /// Sentences in one cell.
@@ -49,7 +49,7 @@ pub(super) fn joined<'a>(sentences: impl Iterator<Item = &'a str>) -> String {
     sentences.collect::<Vec<_>>().join(BETWEEN)
 }
 
-/// The sentences of a cell.
+/// Splits a cell into its sentences.
 pub(super) fn parted(cell: &str) -> Vec<String> {
     cell.split(BETWEEN)
         .filter(|sentence| !sentence.is_empty())

@@ -3,7 +3,7 @@
 //!
 //! The covariance of the errors of two coefficients is their correlation times both standard
 //! errors; pages show it for RPEM. The response at a frequency between the lines of the excitation
-//! is determined where single parameters are not.
+//! is determined even if single parameters are not.
 
 use hoid_io::TableSchema;
 use hoid_model::PolynomialModel;
@@ -16,16 +16,16 @@ use super::{
 };
 use crate::columns::{OPERATOR, Rows};
 
-/// Most coefficients of a polynomial in the tables.
+/// Maximum number of coefficients of a polynomial in the tables.
 const MOST_ND: usize = 20;
 
 /// Coefficients of RPEM whose correlations are kept.
 const CORRELATED: [&str; 4] = ["f1", "f2", "b0", "b1"];
 
-/// Which columns the traces have.
+/// Columns of the traces.
 #[derive(Debug, Clone)]
 pub(super) struct TraceColumns {
-    /// Those with a standard error: coefficients of RLS and of Box-Jenkins models, and the
+    /// Columns with a standard error: coefficients of RLS and of Box-Jenkins models, and the
     /// operator.
     pub parameters: Vec<String>,
     /// Correlations, and the response at the frequencies of the manifest.
@@ -62,13 +62,13 @@ impl TraceColumns {
             .collect()
     }
 
-    /// Those whose settling times are computed.
+    /// Columns whose settling times are computed.
     pub fn of_settling(&self) -> Vec<String> {
         let responses = self.others.iter().filter(|name| !name.starts_with("correlation"));
         self.parameters.iter().chain(responses).cloned().collect()
     }
 
-    /// The table: one kept point of a recursion a row.
+    /// The table: one stored point of a recursion per row.
     pub fn schema(&self) -> TableSchema {
         let pairs: Vec<String> = self
             .parameters
@@ -94,7 +94,7 @@ pub(super) fn label_of(method: &Method) -> String {
     method.name().to_uppercase()
 }
 
-/// The rows of a trace from where it moves: before, it is the fit that it starts from.
+/// The rows of a trace from its first update on: before, it is the fit from which it starts.
 pub(super) fn moving(trace: &Trace) -> impl Iterator<Item = usize> + '_ {
     let from_s = trace.updated_from_s() - 0.5 * trace.sample_time().s();
     (0..trace.len()).filter(move |k| trace.times_s()[*k] >= from_s)
@@ -148,7 +148,7 @@ fn write_response(rows: &mut Rows, columns: &TraceColumns, trace: &Trace, k: usi
     }
 }
 
-/// The values of each coefficient and of the operator in a window, where they move.
+/// The values of each coefficient and of the operator in a window, from the first update on.
 pub(super) fn values_within(trace: &Trace, from_s: f64, to_s: f64) -> Vec<(String, Vec<f64>)> {
     let names = trace.parameter_names().into_iter().chain(OPERATOR.map(str::to_owned));
     let mut columns: Vec<(String, Vec<f64>)> = names.map(|name| (name, Vec::new())).collect();

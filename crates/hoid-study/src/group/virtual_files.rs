@@ -1,5 +1,5 @@
-//! The files of a virtual experiment: a table a run, `truth.csv`, and `group.toml` last, so that a
-//! directory with it is whole.
+//! The files of a virtual experiment: one table per run, `truth.csv`, and `group.toml` last, so
+//! that a directory that contains it is complete.
 
 use std::path::Path;
 
@@ -15,17 +15,17 @@ use super::{
 };
 use crate::{StudyError, columns::Rows};
 
-/// An experiment that is being written.
+/// Writer of the files of an experiment.
 pub(super) struct VirtualFiles<'a> {
     directory: &'a Path,
-    /// Columns of a run other than t.
+    /// Columns of a run, except t.
     columns: &'a [&'a str],
     defects: &'a [SamplingDefect],
     runs: Vec<RunEntry>,
 }
 
 impl<'a> VirtualFiles<'a> {
-    /// Refuses a directory that holds an experiment.
+    /// Refuses a directory that contains an experiment.
     ///
     /// # Errors
     /// [`StudyError::ExperimentThere`].
@@ -38,7 +38,7 @@ impl<'a> VirtualFiles<'a> {
         Ok(())
     }
 
-    /// Makes the directory.
+    /// Creates the directory.
     ///
     /// # Errors
     /// [`StudyError::Io`].

@@ -1,10 +1,10 @@
-//! A virtual experiment with people like people: persons drawn over the family of operators.
+//! A virtual experiment with persons drawn from the family of operators.
 //!
 //! Each subject is a person for each controlled element ([`hoid_sim::people`]): parameters from
-//! published ranges, a remnant like people's, a stick that drifts. The kinds of remnant go round
-//! over the subjects. Files have the columns t, e, u, d, y of recorded experiments; `truth.csv` has
-//! the true parameters of each run with its crossover and margin. An empty T_I of a form with a lag
-//! is an infinite one.
+//! published ranges, a realistic remnant, a stick with drift. The kinds of remnant alternate over
+//! the subjects. Files have the columns t, e, u, d, y of recorded experiments; `truth.csv` has the
+//! true parameters of each run with its crossover and margin. An empty T_I of a form with a lag is
+//! infinite.
 
 use std::path::Path;
 
@@ -21,28 +21,28 @@ use super::{
 };
 use crate::{StudyError, columns::Rows};
 
-/// Scenario to be simulated.
+/// Experiment to simulate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PeopleExperiment {
     /// Number of subjects.
     pub subjects: u64,
-    /// The controlled element: a condition each.
+    /// Controlled elements, one condition each.
     pub plants: Vec<Plant>,
-    /// Form of their operators; `None` for those that people have on each element.
+    /// Form of their operators; `None` for the typical form for each element.
     pub form: Option<Form>,
-    /// Kinds of remnant, subject after subject.
+    /// Kinds of remnant, alternating over the subjects.
     pub remnants: Vec<RemnantKind>,
-    /// Runs of each subject and condition.
+    /// Number of runs of each subject and condition.
     pub runs: u64,
     /// Spread of the parameters between the runs of a subject.
     pub between_runs: f64,
-    /// Identity.
+    /// Population from which the persons are drawn.
     pub population: Population,
     /// Time between two samples.
     pub sample_time: SampleTime,
     /// Seed of all random streams.
     pub seed: u64,
-    /// Defects of the sampling.
+    /// Sampling defects.
     pub defects: Vec<SamplingDefect>,
 }
 
@@ -64,9 +64,9 @@ impl Default for PeopleExperiment {
     }
 }
 
-/// Columns of a file other than t.
+/// Columns of a file, except t.
 const COLUMNS: [&str; 4] = ["e", "u", "d", "y"];
-/// Other true statements.
+/// Other true values.
 const OTHERS: [&str; 7] = [
     "crossover_rad_s",
     "phase_margin_deg",
@@ -76,13 +76,13 @@ const OTHERS: [&str; 7] = [
     "offset_u",
     "sample_time_s",
 ];
-/// Streams of the defects: no person has this number.
+/// Random streams of the defects: no person has this number.
 const DEFECTS: u64 = u64::MAX / 2;
 
-/// Simulates the experiment into a directory: a file a run, `truth.csv`, `group.toml`.
+/// Simulates the experiment into a directory: one file per run, `truth.csv`, `group.toml`.
 ///
 /// # Errors
-/// [`StudyError::Virtual`] for an experiment without meaning, [`StudyError::ExperimentThere`],
+/// [`StudyError::Virtual`] for an invalid experiment, [`StudyError::ExperimentThere`],
 /// [`StudyError::Io`].
 pub fn simulate_people(
     experiment: &PeopleExperiment,
@@ -91,7 +91,7 @@ pub fn simulate_people(
 ) -> Result<Manifest, StudyError> {
     experiment.check()?;
     VirtualFiles::refuse_another(directory)?;
-    // No one is written before everybody is found.
+    // All persons are drawn before any file is written.
     let mut people = Vec::new();
     for subject in 1..=experiment.subjects {
         for (place, plant) in (0..).zip(&experiment.plants) {
@@ -123,7 +123,7 @@ pub fn simulate_people(
         (plant.to_string(), facts)
     };
     let analysis = AnalysisSettings {
-        // Remnants like people's are not a lag of first order.
+        // Realistic remnants are not first-order lags.
         nd: (1, 6),
         ..AnalysisSettings::default()
     };

@@ -1,12 +1,12 @@
-//! A virtual experiment: subjects, conditions and runs of simulated subjects, with the truth next
-//! to the files.
+//! A virtual experiment: subjects, conditions and runs of simulated subjects, with their true
+//! parameters.
 //!
 //! The gain K_e, the lead T_L, omega_nm, zeta_nm and the noise level of subject s are those of the
 //! condition times `exp(a z)`, z a normal deviate of the subject, a the spread between subjects
-//! (0.15 is 15 %); in each run each of them is multiplied by `exp(b z)` again, b the spread between
-//! runs. The delay differs by whole samples. A loop that would be unstable is drawn again, from the
-//! next deviates. Deviates come from the random stream (seed, subject, run), remnants from the
-//! streams that `hoid simulate` uses.
+//! (0.15 is 15 %); in each run each of them is again multiplied by `exp(b z)`, b the spread between
+//! runs. The delay differs by whole samples. An unstable loop is drawn again, from the next
+//! deviates. Deviates come from the random stream (seed, subject, run), remnants from the streams
+//! that `hoid simulate` uses.
 
 use std::path::Path;
 
@@ -28,14 +28,14 @@ use crate::{
     columns::{OPERATOR, Rows},
 };
 
-/// Scenario to be simulated.
+/// Experiment to simulate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VirtualExperiment {
     /// Number of subjects.
     pub subjects: u64,
     /// Conditions.
     pub conditions: Vec<Condition>,
-    /// Runs of each subject and condition.
+    /// Number of runs of each subject and condition.
     pub runs: u64,
     /// Spread of the parameters between subjects.
     pub between_subjects: f64,
@@ -43,23 +43,23 @@ pub struct VirtualExperiment {
     pub between_runs: f64,
     /// Order of the remnant.
     pub remnant_order: usize,
-    /// Noise level before it is spread.
+    /// Noise level before the spread is applied.
     pub noise_level: f64,
     /// Seed of all random streams.
     pub seed: u64,
-    /// Defects of the sampling.
+    /// Sampling defects.
     pub defects: Vec<SamplingDefect>,
 }
 
 /// Random streams of the subjects: no cell of a study has this number.
 const SUBJECTS: u64 = u64::MAX;
-/// Draws after which a spread is too large for stable loops.
+/// Number of draws after which the spread is too large for stable loops.
 const MOST_DRAWS: usize = 100;
 
-/// Simulates the experiment into a directory: a file a run, `truth.csv`, `group.toml`.
+/// Simulates the experiment into a directory: one file per run, `truth.csv`, `group.toml`.
 ///
 /// # Errors
-/// [`StudyError::Virtual`] for an experiment without meaning, [`StudyError::ExperimentThere`],
+/// [`StudyError::Virtual`] for an invalid experiment, [`StudyError::ExperimentThere`],
 /// [`StudyError::Io`].
 pub fn simulate_group(
     experiment: &VirtualExperiment,
@@ -108,10 +108,10 @@ pub fn simulate_group(
     )
 }
 
-/// Largest number of runs of a virtual experiment: a file each.
+/// Maximum number of runs of a virtual experiment, one file each.
 const MOST_RUNS: u64 = 100_000;
 
-/// Checks the number of files that an experiment would write.
+/// Checks the number of files of an experiment.
 pub(super) fn check_number(factors: &[u64]) -> Result<(), StudyError> {
     let runs = factors.iter().try_fold(1_u64, |all, n| all.checked_mul(*n));
     if runs.is_some_and(|runs| runs <= MOST_RUNS) {
@@ -151,7 +151,7 @@ impl VirtualExperiment {
         Ok(())
     }
 
-    /// The person of a run, and the run; the first subject and run are 1, a cell is a place in
+    /// The person of a run, and the run; subject and run count from 1, a cell is an index of
     /// `conditions`.
     ///
     /// # Errors
@@ -175,8 +175,8 @@ impl VirtualExperiment {
         let of_run = deviates(1 + cell * 1_000_000 + run);
         let mut reason = String::new();
         for draw in 0..MOST_DRAWS {
-            // The subject is drawn again when none of their runs can be stable, the run before
-            // that.
+            // The subject is drawn again if none of their runs is stable, after new draws of the
+            // run.
             let (s, r) = (&of_subject[6 * (draw / 10)..], &of_run[6 * draw..]);
             let factor = |i: usize| (self.between_subjects * s[i] + self.between_runs * r[i]).exp();
             let mut scenario = Scenario::condition(condition);
@@ -212,7 +212,7 @@ impl VirtualExperiment {
         })
     }
 
-    /// Normal deviates for the defects of a run, one a sample.
+    /// Normal deviates for the defects of a run, one per sample.
     fn sampling_noise(&self, subject: u64, cell: u64, run: u64, samples: usize) -> Vec<f64> {
         RunSeed {
             seed: self.seed,

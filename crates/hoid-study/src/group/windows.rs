@@ -1,10 +1,10 @@
-//! The spans of a run that are estimated apart.
+//! The spans of a run that are estimated separately.
 
 use hoid_model::Record;
 
 use super::analysis_settings::AnalysisSettings;
 
-/// Name of the span that is the whole run.
+/// Name of the span of the whole run.
 pub(super) const WHOLE: &str = "whole";
 
 /// A span of the run with its name.

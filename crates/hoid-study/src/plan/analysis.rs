@@ -1,5 +1,5 @@
-//! Estimators of a plan that are run as `hoid identify` runs them, their verdict included: the operator of a
-//! person, one whose gains change, instrumental variables.
+//! Estimators of a plan that are run as by `hoid identify`, with their verdict: the operator of a person, one with
+//! changing gains, instrumental variables.
 //!
 //! Their options are those of the registry of estimators.
 
@@ -32,7 +32,7 @@ const ELSEWHERE: [&str; 10] = [
     "max_iterations",
 ];
 
-/// The methods with their options as plans have them.
+/// The methods with their options in plans.
 pub(super) fn methods() -> Vec<MethodSpec> {
     let in_plan = |spec: MethodSpec| {
         let name = match spec.name {
@@ -47,7 +47,7 @@ pub(super) fn methods() -> Vec<MethodSpec> {
     estimators().into_iter().filter_map(in_plan).collect()
 }
 
-/// Estimator that runs as `hoid identify` runs it, with its defaults and without a prior; `None` for another method.
+/// Estimator run as by `hoid identify`, with its defaults and without a prior; `None` for another method.
 pub(super) fn of_method(method: &str, changes: bool) -> Option<ResolvedRequest> {
     let estimator = match method {
         TIME_VARYING => CHANGE,
@@ -96,7 +96,7 @@ pub(super) fn with_orders(
     })
 }
 
-/// A parameter that is held or bounded and that the model does not have, with those that it has.
+/// A held or bounded parameter that the model does not have, with those that it has.
 pub(super) fn unknown_parameter(asked: &ResolvedRequest) -> Option<(&str, Vec<String>)> {
     let ResolvedRequest::Change(how) = asked else {
         return None;
@@ -109,7 +109,7 @@ pub(super) fn unknown_parameter(asked: &ResolvedRequest) -> Option<(&str, Vec<St
     Some((unknown, names))
 }
 
-/// Columns of its own parameters; those of polynomials are known by their orders.
+/// Columns of its own parameters; those of polynomials follow from their orders.
 pub(crate) fn parameters(asked: &ResolvedRequest) -> Vec<String> {
     match asked {
         ResolvedRequest::Operator(how) => {
@@ -118,7 +118,7 @@ pub(crate) fn parameters(asked: &ResolvedRequest) -> Vec<String> {
         }
         ResolvedRequest::Change(how) => {
             let mut names = how.estimator.names();
-            // What is not a parameter of the fit, but a product of some that change.
+            // Not a parameter of the fit, but a product of some that change.
             let all = how.estimator.form.parameters(how.estimator.neuromuscular).into_iter();
             let products = all.filter(|name| matches!(*name, "K" | "K_e_dot"));
             names.extend(products.flat_map(|name| [1, 2].map(|end| format!("{name}{end}"))));

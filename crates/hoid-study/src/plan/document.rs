@@ -97,7 +97,7 @@ impl Plan {
         Self::parse(&text, &path.display().to_string())
     }
 
-    /// A plan from its text; `path` is for messages.
+    /// Parses a plan; `path` is for messages.
     ///
     /// # Errors
     /// [`StudyError::Plan`].
@@ -213,10 +213,10 @@ impl Plan {
         Ok(plan)
     }
 
-    /// The plan with another number of replications.
+    /// Sets the number of replications.
     ///
     /// # Errors
-    /// [`StudyError::Plan`] for none.
+    /// [`StudyError::Plan`] if it is zero.
     pub fn with_replications(mut self, replications: u64) -> Result<Self, StudyError> {
         if !(1..=MOST_REPLICATIONS).contains(&replications) {
             return Err(StudyError::Plan {
@@ -241,7 +241,7 @@ impl Plan {
         Ok(self)
     }
 
-    /// Whether the study has an end, and its parts a place.
+    /// Checks the size of the study.
     fn check_size(&self) -> Result<(), String> {
         let estimates = |cell: &Cell| u128::from(cell.replications) * self.estimators_of(cell).count() as u128;
         let estimates: u128 = self.cells.iter().map(estimates).sum();
@@ -260,7 +260,7 @@ impl Plan {
         Ok(())
     }
 
-    /// The text of the plan as it was read.
+    /// Returns the text of the plan as read.
     pub fn text(&self) -> &str {
         &self.text
     }
@@ -274,7 +274,7 @@ impl Plan {
         hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
-    /// The estimators that take the records of a cell, with their numbers.
+    /// The estimators that are applied to the records of a cell, with their indices.
     pub fn estimators_of<'a>(&'a self, cell: &'a Cell) -> impl Iterator<Item = (usize, &'a EstimatorCell)> {
         self.estimators
             .iter()
@@ -282,7 +282,7 @@ impl Plan {
             .filter(|(_, estimator)| estimator.takes(&cell.scenario))
     }
 
-    /// Estimates of the whole study: one a replication and estimator.
+    /// Number of estimates of the whole study: one per replication and estimator.
     pub fn estimates(&self) -> u64 {
         let of = |cell: &Cell| cell.replications * self.estimators_of(cell).count() as u64;
         self.cells.iter().map(of).sum()
@@ -345,7 +345,7 @@ fn tables_of<'a>(
         .collect()
 }
 
-/// A table without axes unchanged.
+/// Reads a table without axes.
 fn single(table: &Spanned<DeTable<'_>>, text: &str, whole: &[&str]) -> Result<Variant, PlanProblem> {
     let mut all = variants(table, text, whole)?;
     match (all.pop(), all.is_empty()) {
@@ -381,7 +381,7 @@ fn is_noise_free(resolved: &ResolvedScenario) -> bool {
     }
 }
 
-/// The problem of a scenario with the line of the plan.
+/// Converts an error of a scenario, with the line of the plan.
 fn of_scenario(error: ScenarioFileError, variant: &Variant) -> PlanProblem {
     match error {
         ScenarioFileError::Syntax { line, reason, .. } => PlanProblem {

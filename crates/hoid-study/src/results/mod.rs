@@ -1,7 +1,7 @@
-//! Reading a finished study back: rows of its summary, values of its replications, traces.
+//! Reading of a finished study: rows of its summary, values of its replications, traces.
 //!
-//! The description of a cell and an estimator comes from the plan that is next to the tables, numbers come from the
-//! tables. Rows are found by their description:
+//! The description of a cell and an estimator comes from the plan in the directory, numbers come from the tables. Rows
+//! are found by their description:
 //!
 //! ```no_run
 //! use hoid_study::{Query, Results};

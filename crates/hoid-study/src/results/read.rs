@@ -17,8 +17,8 @@ impl Results {
     /// Reads the directory of a finished study; tables as Parquet or CSV.
     ///
     /// # Errors
-    /// [`StudyError::NoStudy`] and [`StudyError::Unfinished`] for a directory without one or with a
-    /// part of one, [`StudyError::OtherStudy`] when its plan was changed since,
+    /// [`StudyError::NoStudy`] and [`StudyError::Unfinished`] for a directory without a study or
+    /// with an incomplete one, [`StudyError::OtherStudy`] if its plan has been changed,
     /// [`StudyError::Table`] for a table that lacks a column or does not fit the plan,
     /// [`StudyError::Io`] for one that cannot be read.
     pub fn read(directory: &Path) -> Result<Self, StudyError> {

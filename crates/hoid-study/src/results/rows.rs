@@ -9,13 +9,13 @@ use crate::Statistics;
 pub struct SummaryRow {
     /// Number of the cell.
     pub cell: u64,
-    /// Name of the scenario.
+    /// The condition on which it is based; empty for none.
     pub scenario: String,
     /// The condition from which it started, empty for none.
     pub condition: String,
     /// Order m0 of the simulated remnant.
     pub remnant_order: usize,
-    /// Demanded noise level, not a number where the gain was given.
+    /// Specified noise level; not a number if the gain was given.
     pub noise_level: f64,
     /// Time constant T_n of the simulated remnant, s.
     pub t_n_s: f64,
@@ -38,11 +38,11 @@ pub struct SummaryRow {
     /// The quantity: a column of the table of fits, `bias_<column>`, a rate or a settling time of
     /// median traces.
     pub quantity: String,
-    /// Statistics over the replications; the outliers themselves are not kept.
+    /// Statistics over the replications, without the outliers themselves.
     pub statistics: Statistics,
-    /// Values beyond the whiskers.
+    /// Number of values beyond the whiskers.
     pub outliers: usize,
-    /// True value, not a number where there is none.
+    /// True value; not a number if there is none.
     pub truth: f64,
     /// Mean of the absolute values.
     pub absolute_mean: f64,
@@ -64,16 +64,16 @@ pub struct TraceStatistics {
     pub mean: Vec<f64>,
     /// Standard deviation.
     pub sd: Vec<f64>,
-    /// Quantile of 25 %.
+    /// Lower quartile.
     pub lower_quartile: Vec<f64>,
     /// Median.
     pub median: Vec<f64>,
-    /// Quantile of 75 %.
+    /// Upper quartile.
     pub upper_quartile: Vec<f64>,
 }
 
 impl TraceStatistics {
-    /// Monte Carlo error of the median of a point, taken as that of a normal sample of the same
+    /// Monte Carlo error of the median of a point, computed as for a normal sample with the same
     /// interquartile range.
     pub fn error_of_median(&self, point: usize, replications: u64) -> f64 {
         match replications {

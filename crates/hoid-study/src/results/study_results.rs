@@ -1,4 +1,4 @@
-//! A finished study in memory, and its rows by query.
+//! A finished study in memory, with selection of its rows by query.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -13,7 +13,7 @@ use crate::{
 /// A finished study.
 #[derive(Debug, Clone)]
 pub struct Results {
-    /// The plan, with the replications that were run.
+    /// The plan, with the actual number of replications.
     pub plan: Plan,
     /// Each cell with each of its estimators, in the order of the tables.
     pub(super) pairs: Vec<CellEstimator>,
@@ -29,9 +29,9 @@ pub(super) struct CellEstimator {
     pub(super) cell: usize,
     pub(super) estimator: usize,
     pub(super) key: RowKey,
-    /// Row of the summary of each quantity.
+    /// Row of the summary for each quantity.
     pub(super) rows: BTreeMap<String, usize>,
-    /// Rows of the table of fits, one a replication.
+    /// Rows of the table of fits, one per replication.
     pub(super) fits: Vec<usize>,
 }
 
@@ -58,8 +58,8 @@ impl Results {
         }
     }
 
-    /// The rows of the summary that a query describes, in the order of the table. A query without
-    /// quantity takes all of them.
+    /// The rows of the summary that a query selects, in the order of the table. A query without a
+    /// quantity selects all quantities.
     pub fn find(&self, query: &Query) -> Vec<&SummaryRow> {
         let mut found = Vec::new();
         for pair in self.pairs.iter().filter(|pair| query.matches(&pair.key)) {
@@ -75,7 +75,7 @@ impl Results {
         found.into_iter().map(|row| &self.rows[row]).collect()
     }
 
-    /// The row of the summary that a query describes; none when there are none or several.
+    /// The row of the summary that a query selects; none if there is not exactly one.
     pub fn one(&self, query: &Query) -> Option<&SummaryRow> {
         match self.find(query).as_slice() {
             [row] => Some(row),
@@ -83,10 +83,10 @@ impl Results {
         }
     }
 
-    /// The values of a quantity replication by replication, cells and estimators in the order of
-    /// the table; missing items is not a number. `bias_<column>` is computed from the column and
-    /// its true value; `failed`, `not_convertible`, `converged` and `diverged` are 0 or 1. Empty
-    /// when the query names no quantity, or one that the table of fits does not have.
+    /// The values of a quantity by replication, cells and estimators in the order of the table;
+    /// missing values are not a number. `bias_<column>` is computed from the column and its true
+    /// value; `failed`, `not_convertible`, `converged` and `diverged` are 0 or 1. Empty if the
+    /// query has no quantity, or one that the table of fits does not have.
     pub fn values(&self, query: &Query) -> Vec<f64> {
         let Some(quantity) = query.quantity() else {
             return Vec::new();
@@ -109,12 +109,12 @@ impl Results {
         values
     }
 
-    /// The summary of the traces of an estimator, named by its label.
+    /// The summary of the traces of an estimator, by its label.
     pub fn traces(&self, cell: u64, estimator: &str) -> Option<&TraceSummary> {
         self.traces.get(&(cell, estimator.to_owned()))
     }
 
-    /// The cells in which a query describes anything.
+    /// The cells of the rows that a query selects.
     pub fn cells(&self, query: &Query) -> Vec<&Cell> {
         let mut found: Vec<usize> = self
             .pairs
@@ -126,12 +126,12 @@ impl Results {
         found.into_iter().map(|i| &self.plan.cells[i]).collect()
     }
 
-    /// How many estimators in how many cells a query describes, whatever their quantities.
+    /// Number of pairs of cell and estimator that a query selects, for any quantity.
     pub fn count(&self, query: &Query) -> usize {
         self.pairs.iter().filter(|pair| query.matches(&pair.key)).count()
     }
 
-    /// Whether there are values of the quantity of a query.
+    /// True if there are values of the quantity of a query.
     pub fn has_quantity(&self, query: &Query) -> bool {
         let column = query
             .quantity()
@@ -139,7 +139,7 @@ impl Results {
         column.is_some_and(|column| self.fits.contains_key(column))
     }
 
-    /// The first estimator that a query describes.
+    /// The first estimator that a query selects.
     pub fn estimator(&self, query: &Query) -> Option<&EstimatorCell> {
         let pair = self.pairs.iter().find(|pair| query.matches(&pair.key));
         pair.map(|pair| &self.plan.estimators[pair.estimator])

@@ -1,4 +1,4 @@
-//! Results without runs, so that what reads results is tested in milliseconds.
+//! Synthetic results without runs, for fast tests of code that reads results.
 
 use std::collections::BTreeMap;
 
@@ -13,9 +13,9 @@ use crate::{
 };
 
 impl Results {
-    /// Results of a plan without running it. `data` gives the relative error of what has a truth,
-    /// else the value; traces step when the truth does, have the relative error of replication 0 in
-    /// whole % and quartiles 1 % of the true value away.
+    /// Results of a plan without running it. `data` gives the relative error of quantities with a
+    /// true value, otherwise the value; traces step with the true value, have the relative error of
+    /// replication 0 in whole % and quartiles at a distance of 1 % of the true value.
     pub fn synthetic(plan: Plan, data: &dyn Fn(&Cell, &EstimatorCell, &str, u64) -> f64) -> Self {
         const WITH_TRUTH: [&str; 14] = [
             "a1",

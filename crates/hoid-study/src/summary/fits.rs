@@ -104,7 +104,7 @@ pub(crate) fn write_fits(
                     let truth = true_value(cell, estimator, name);
                     put(name, values, truth);
                     if truth.is_finite() && truth != 0.0 {
-                        // The lead of another form is another quantity.
+                        // The lead of another form is a different quantity.
                         let meant = |lead: &bool| *lead || !name.starts_with("T_L");
                         let error = |v: f64| 100.0 * (v - truth) / truth;
                         let of_each = values.iter().zip(&found.leads);
@@ -186,14 +186,14 @@ struct Collected<'a> {
 #[derive(Clone, Default)]
 struct OfEstimator {
     values: Vec<Vec<f64>>,
-    /// Whether each has the form of the simulated scenario, a gain with a lead, or none to choose.
+    /// True if the form is that of the simulated scenario, a gain with a lead, or not selected.
     leads: Vec<bool>,
     count: usize,
     failed: usize,
     not_convertible: usize,
     converged: usize,
     diverged: usize,
-    /// Fits of each level of the verdict.
+    /// Number of fits of each verdict level.
     levels: [usize; LEVELS.len()],
 }
 

@@ -1,5 +1,4 @@
-//! Common parts of both summaries: the columns of the settings, and how much is in memory at a
-//! time.
+//! Common parts of both summaries: the columns of the settings, and the memory limit.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -17,7 +16,7 @@ pub(super) const BUDGET: usize = 1 << 25;
 /// Parts of each cell: its position and their numbers.
 pub(crate) type PartsOfCell<'a> = BTreeMap<usize, Vec<(&'a Path, u64)>>;
 
-/// Columns that report which cell and which estimator a row is about.
+/// Columns that identify the cell and the estimator of a row.
 pub(super) fn setting_columns(plan: &Plan) -> Vec<(String, ColumnKind)> {
     use ColumnKind::{Real, Text, Whole};
     let mut columns: Vec<(String, ColumnKind)> = Vec::new();

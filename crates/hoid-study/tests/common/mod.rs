@@ -1,5 +1,5 @@
-//! What tests of groups look at: files and columns of tables.
-// Each file of tests uses its own part of this.
+//! Helpers of the group tests: files and columns of tables.
+// Each test file uses a part of this module.
 #![allow(dead_code, clippy::unwrap_used)]
 
 use std::{collections::BTreeMap, fs, path::Path};

@@ -300,7 +300,7 @@ fn only_gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(vec![gain, others])
 }
 
-/// A size of the bias in C2 less that in C1, for the zero and for the neuromuscular parameters.
+/// Bias measure in C2 minus that in C1, for the zero and for the neuromuscular parameters.
 pub(super) fn conditions(
     size: &dyn Fn(Setting, &str) -> Result<Value, String>,
     orders: &[usize],

@@ -216,8 +216,7 @@ fn second_order_worst(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(vec![part])
 }
 
-/// Biases of a remnant parameter as the text retrieves it, with the exact retrieval shown next to
-/// it.
+/// Biases of a remnant parameter retrieved as in the text, and by the exact retrieval.
 fn remnant(
     evidence: &Evidence<'_>,
     name: &str,

@@ -1,21 +1,21 @@
-//! A statement of the text and its requirements to be tested.
+//! A statement of the text and how it is tested.
 
 use super::{evidence::Evidence, rules::Part};
 
 /// A statement of the text.
 #[derive(Debug, Clone)]
 pub struct Claim {
-    /// Its name, of which there is one.
+    /// Its unique name.
     pub id: &'static str,
-    /// Subject of it.
+    /// Its subject.
     pub theme: Theme,
-    /// The statement, quoted or put shortly.
+    /// The statement, quoted or abbreviated.
     pub statement: &'static str,
     /// Section and figures.
     pub place: &'static str,
-    /// How it is measured here.
+    /// How it is measured.
     pub measure: &'static str,
-    /// The plans that it needs.
+    /// The plans required for the test.
     pub plans: &'static [&'static str],
     pub(super) source: Source,
 }
@@ -29,7 +29,7 @@ pub enum Theme {
     BatchBj,
     /// The order of the noise model.
     RemnantOrder,
-    /// Where searches start.
+    /// The starts of searches.
     InitialConditions,
     /// Recursive estimates.
     Recursive,
@@ -40,7 +40,7 @@ pub enum Theme {
 }
 
 impl Theme {
-    /// A heading.
+    /// Heading of the subject.
     pub fn title(self) -> &'static str {
         match self {
             Self::BatchArx => "Batch fits of ARX models",
@@ -54,11 +54,11 @@ impl Theme {
     }
 }
 
-/// Where the numbers of a claim come from.
+/// Origin of the numbers of a claim.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Source {
     /// Measured from the results of studies.
     Data(fn(&Evidence<'_>) -> Result<Vec<Part>, String>),
-    /// Not measured, and why.
+    /// Not measured, with the reason.
     Untested(&'static str),
 }

@@ -1,16 +1,16 @@
-//! The results of studies as evidence: figures of a cell with their Monte Carlo errors.
+//! The results of studies as evidence: statistics of a cell with their Monte Carlo errors.
 //!
 //! - *Bias of a median trace*: mean over a span of the relative error of the median over
-//!   replications. Were all times of a run in error alike, its error would be the mean over the
-//!   span of that of a median, 0.93 IQR / sqrt(M) (of a normal sample 1.253 s / sqrt(M), IQR =
-//!   1.349 s). A bootstrap over runs gave for the span of 30.72 s: 0.3 to 0.57 of it where all
-//!   parameters forget in 2.56 s (RLS and RPEM), and 0.33 to 0.45 for K_e, T_L and K_e_dot where b
-//!   alone does (RLS); 0.46 to 1.5 for the others there. So half of it is taken in the first two
+//!   replications. If the errors at all times of a run were fully correlated, its error would be
+//!   the mean over the span of that of a median, 0.93 IQR / sqrt(M) (of a normal sample 1.253 s /
+//!   sqrt(M), IQR = 1.349 s). A bootstrap over runs gave for the span of 30.72 s: 0.3 to 0.57 of it
+//!   if all parameters forget in 2.56 s (RLS and RPEM), and 0.33 to 0.45 for K_e, T_L and K_e_dot
+//!   if only b does (RLS); 0.46 to 1.5 for the others there. So half of it is used in the first two
 //!   cases, all of it in the last.
 //! - *Settling of a median trace*: time after t_M at which it has covered 90 % of its own step,
-//!   from its mean over the 10.24 s before t_M to its mean over the last 15.36 s: an estimate with
-//!   a bias settles at its own value. Its error is half of anything between the settling of the
-//!   median plus and minus its own error, and at least half the step of the kept times.
+//!   from its mean over the 10.24 s before t_M to its mean over the last 15.36 s: a biased estimate
+//!   settles at its own value. Its error is half the difference between the settling times of the
+//!   median plus and minus its own error, and at least half the interval of the stored times.
 
 use std::collections::BTreeMap;
 
@@ -26,12 +26,12 @@ use super::{
     value::Value,
 };
 
-/// Spans of the levels between which a trace steps, s: before the change and at the end.
+/// Spans of the levels before the change and at the end, s.
 const BEFORE_S: f64 = 10.24;
 
 const AFTER_S: f64 = 15.36;
 
-/// The second span of the batch fits of section V.B starts here, s.
+/// Start of the second span of the batch fits of section V.B, s.
 const LAST_SPAN_FROM_S: f64 = 51.2;
 
 /// The results of studies, by the names of their plans.
@@ -39,7 +39,7 @@ const LAST_SPAN_FROM_S: f64 = 51.2;
 pub struct Evidence<'a>(BTreeMap<&'a str, &'a Results>);
 
 impl<'a> Evidence<'a> {
-    /// No studies yet.
+    /// Creates an empty set.
     pub fn new() -> Self {
         Self::default()
     }
@@ -52,7 +52,7 @@ impl<'a> Evidence<'a> {
     /// The results of a plan.
     ///
     /// # Errors
-    /// The reason when it was not run.
+    /// The reason if it was not run.
     pub(super) fn study(&self, name: &str) -> Result<Study<'a>, String> {
         let results = self
             .0
@@ -62,14 +62,14 @@ impl<'a> Evidence<'a> {
     }
 }
 
-/// The numbers of a study; what it does not have is an error with the reason.
+/// The numbers of a study; a missing one is an error with its reason.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Study<'a> {
     results: &'a Results,
 }
 
 impl<'a> Study<'a> {
-    /// The values of a quantity of one estimator in one cell, replication by replication.
+    /// The values of a quantity of one estimator in one cell, by replication.
     pub fn sample(&self, query: &Query) -> Result<Vec<f64>, String> {
         let name = &self.results.plan.name;
         match self.results.count(query) {
@@ -82,7 +82,7 @@ impl<'a> Study<'a> {
         Ok(self.results.values(query))
     }
 
-    /// True parameters in the cell that a query describes, after the change.
+    /// True parameters in the cell that a query selects, after the change.
     pub fn truth(&self, query: &Query) -> Result<TrueState, String> {
         let cells = self.results.cells(query);
         let cell = cells.first().ok_or_else(|| format!("no cell has {query}"))?;
@@ -99,7 +99,7 @@ impl<'a> Study<'a> {
         Ok(mean_of(&self.sample(query)?))
     }
 
-    /// Median of the magnitude: the error that one estimate typically has.
+    /// Median of the magnitude: the typical error of one estimate.
     pub fn typical(&self, query: &Query) -> Result<Value, String> {
         Ok(median_of(&magnitudes(&self.sample(query)?)))
     }
@@ -110,14 +110,14 @@ impl<'a> Study<'a> {
         Ok(jackknife(&samples?, f))
     }
 
-    /// Median over replications of the difference of two quantities, first less second.
+    /// Median over replications of the difference of two quantities, first minus second.
     pub fn difference(&self, first: &Query, second: &Query) -> Result<Value, String> {
         let (a, b) = (self.sample(first)?, self.sample(second)?);
         Ok(median_of(&a.iter().zip(&b).map(|(a, b)| a - b).collect::<Vec<_>>()))
     }
 
-    /// Share of hits of a quantity of 0 and 1 over all replications of all that a query describes.
-    /// None or all of n hits has an error of 1.5 / n: its limit of 95 % is 3 / n.
+    /// Share of ones of a quantity of 0 and 1 over all replications of all rows that a query
+    /// selects. For none or all of n the error is 1.5 / n: its 95 % limit is 3 / n.
     pub fn share(&self, query: &Query) -> Result<Value, String> {
         if self.results.count(query) == 0 || !self.results.has_quantity(query) {
             return Err(format!(
@@ -135,7 +135,7 @@ impl<'a> Study<'a> {
         let Some(bands) = traces.parameters.get(parameter) else {
             return Ok(NOTHING);
         };
-        // The median of the few runs that convert carries no information about the others.
+        // The median of the few runs that can be converted carries no information about the others.
         if OPERATOR.contains(&parameter)
             && self.mean(&query.clone().quantity_of("share_not_convertible"))?.value > ENOUGH
         {
@@ -163,7 +163,7 @@ impl<'a> Study<'a> {
 
     /// Mean over a span of the interquartile range of the traces of a parameter over the runs, % of
     /// the true value of the last state. Its error is that of the range of a normal sample, 1.166
-    /// of it over sqrt(M), as if all times of the span were in error alike.
+    /// of it over sqrt(M), assuming fully correlated errors over the span.
     pub fn trace_range(&self, query: &Query, parameter: &str, (from_s, to_s): (f64, f64)) -> Result<Value, String> {
         let (traces, truth) = self.trace(query, parameter)?;
         let Some(bands) = traces.parameters.get(parameter) else {
@@ -258,8 +258,8 @@ impl<'a> Study<'a> {
     }
 }
 
-/// Whether the estimate of a parameter forgets within a small part of the span: gains do so with b,
-/// others when all parameters do.
+/// True if the estimate of a parameter forgets within a small part of the span: gains do so with b,
+/// others if all parameters do.
 fn forgets(estimator: &EstimatorCell, parameter: &str) -> bool {
     const LONGEST_S: f64 = 5.0;
     const TEXT_SAMPLE_TIME_S: f64 = 0.01;

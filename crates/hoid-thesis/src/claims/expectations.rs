@@ -1,5 +1,5 @@
-//! The five expectations of the recursive Box-Jenkins estimator with which Part II ends (6.2.2),
-//! held against what Part I and its setting give.
+//! The five expectations of the recursive Box-Jenkins estimator at the end of Part II (6.2.2),
+//! compared with the results of Part I and its setting.
 
 use super::{
     claim::{Claim, Source, Theme},
@@ -15,7 +15,7 @@ const PLACE: &str = "6.2.2";
 const GAINS: [&str; 3] = ["K_e", "T_L", "K_e_dot"];
 /// Span after the change at 40.96 s, s.
 const TRANSITION_S: (f64, f64) = (40.96, 51.2);
-/// Starts of the plan, with poles, gains or both next to the true values (Table 6.1).
+/// Starts of the plan, with poles, gains or both close to the true values (Table 6.1).
 const STARTS: [&str; 9] = ["base", "IC1", "IC2", "IC3", "IC4", "IC5", "IC6", "IC7", "IC8"];
 
 pub(super) const CLAIMS: &[Claim] = &[
@@ -79,7 +79,7 @@ fn diminished(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(vec![part])
 }
 
-/// Share of runs whose error is beyond 100 %, or of which there is none.
+/// Share of runs with an error above 100 %, or without an estimate.
 fn beyond(errors: &[Vec<f64>]) -> f64 {
     let all = errors.concat();
     let far = all.iter().filter(|error| error.is_nan() || **error > 100.0);

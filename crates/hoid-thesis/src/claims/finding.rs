@@ -1,4 +1,4 @@
-//! Content of the data for a claim.
+//! Evidence of the data on a claim.
 
 use hoid_study::Statistics;
 
@@ -8,31 +8,31 @@ use super::{
     rules::{self, CellOutcome, CellTest, Part, Verdict},
 };
 
-/// Content of the data for a claim.
+/// Evidence of the data on a claim.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
-    /// Whether it holds.
+    /// Verdict on the claim.
     pub verdict: Verdict,
     /// Its parts with all cells.
     pub parts: Vec<Part>,
     /// The numbers, a few for each part.
     pub measured: Vec<Measured>,
-    /// Cells that pass.
+    /// Number of cells that pass.
     pub passed: usize,
-    /// Cells that go beyond the claimed number the same way.
+    /// Number of cells that exceed the claimed number.
     pub exceeded: usize,
-    /// Cells that fail.
+    /// Number of cells that fail.
     pub failed: usize,
-    /// Cells in all; the others are undecided.
+    /// Number of all cells; the others are undecided.
     pub of: usize,
     /// The findings, as text.
     pub text: String,
 }
 
-/// A number that was measured, over the cells of a part.
+/// A measured number over the cells of a part.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
-    /// Its definition.
+    /// Its name.
     pub label: String,
     /// Median over the cells that have a value.
     pub value: f64,
@@ -42,12 +42,12 @@ pub struct Measured {
     pub least: f64,
     /// Largest value of a cell.
     pub most: f64,
-    /// Cells with a value.
+    /// Number of cells with a value.
     pub cells: usize,
 }
 
 impl Claim {
-    /// Content of the data for it.
+    /// Evaluates the claim with the evidence of the data.
     pub fn evaluate(&self, evidence: &Evidence<'_>) -> Finding {
         let found = match self.source {
             Source::Data(measure) => measure(evidence),

@@ -78,7 +78,7 @@ fn fit(at: Setting, quantity: &str, nk: usize, start: &str) -> Query {
     at.query(&with_f(quantity)).name("BJ").nk(nk).start(start)
 }
 
-/// Differences of the bias to that of the base start, points of %.
+/// Differences of the bias to that of the base start, percentage points.
 fn differences(study: Study<'_>, at: Setting, name: &str, nk: usize, start: &str) -> Result<Vec<f64>, String> {
     let of = |start: &str| study.sample(&fit(at, &bias_of(name), nk, start));
     Ok(of(start)?.iter().zip(&of("base")?).map(|(a, b)| a - b).collect())
@@ -166,7 +166,7 @@ fn convergence(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(vec![near, far])
 }
 
-/// Share of searches of the true delay that do not converge or end in a worse minimum than that of
+/// Share of searches at the true delay that do not converge or end in a worse minimum than that of
 /// the base start.
 fn failures(study: Study<'_>, name: &str, start: &str) -> Result<Value, String> {
     let mut failed = Vec::new();
@@ -180,7 +180,7 @@ fn failures(study: Study<'_>, name: &str, start: &str) -> Result<Value, String> 
             from("BJ", "base", "loss")?,
         );
         for ((converged, loss), base) in converged.iter().zip(&loss).zip(&base) {
-            // A loss that is not a number belongs to a search that failed.
+            // A loss that is not a number belongs to a failed search.
             let reached = *converged == 1.0 && *loss <= 1.01 * base;
             failed.push(f64::from(u8::from(!reached)));
         }

@@ -1,9 +1,10 @@
 //! Statements of the thesis, tested by the data of studies.
 //!
-//! A claim names what the text states and where, which plans measure it and how. Its verdict comes
-//! from the data by the rules of the module [`rules`], the same for all claims. A claim whose plan
-//! was not run, or which needs something that the results do not have, cannot be tested and gives
-//! the reason; so does one on experiments with people, for which there are no data here.
+//! A claim contains the statement of the text and its place, the plans that measure it and the
+//! method. Its verdict comes from the data by the rules of the module [`rules`], the same for all
+//! claims. A claim whose plan was not run, or which needs data that the results do not have, cannot
+//! be tested and gives the reason; so does one on experiments with people, for which there are no
+//! data here.
 //!
 //! | module | theme |
 //! |---|---|
@@ -57,7 +58,7 @@ pub use rules::{Bound, CellOutcome, CellTest, Part, Verdict};
 pub use table::claims_table;
 pub use value::Value;
 
-/// All claims, theme by theme.
+/// All claims, by theme.
 pub fn claims() -> Vec<Claim> {
     [
         batch_arx::CLAIMS,

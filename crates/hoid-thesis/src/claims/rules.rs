@@ -1,24 +1,24 @@
 //! From numbers with Monte Carlo errors to a verdict.
 //!
-//! 1. **A cell.** A claim is tested in each cell (a scenario, an estimator, a parameter) of which
-//!    it speaks, with the measured value x, its Monte Carlo error s and a margin of 2 s.
-//!    - *Comparison* (larger, smaller, no larger than): the cell passes when x is beyond the limit
-//!      by more than the margin, fails when it is on the other side by more, and is undecided
-//!      within the margin.
-//!    - *Number* (around 50 %, 10 times): the cell passes when x lies within the range of the wording, widened by the
-//!      margin, and fails otherwise. It is undecided where it would pass with a margin of more than half the range:
-//!      such an x carries no information about the number. Where the number is the size of an effect (so many times
-//!      slower, so much less error), an x beyond the range on the side of the larger effect *exceeds* the claim: what
-//!      was reported is true, and more so.
-//!    - Where less than half of the replications give a value (models that do not convert) the cell
-//!      is undecided.
-//! 2. **A part** of a claim (same figure of merit, same test) holds when 90 % of its decided cells
-//!    pass. It holds, and more so, when 90 % pass or exceed the claim and not enough of them pass.
-//!    It holds in part when 50 % pass or exceed, and does not hold otherwise. When less than half of
-//!    its cells are decided, the replications do not decide it.
-//! 3. **A claim** holds when all its parts hold, and more so when one of them does. It does not hold
-//!    when none of its parts holds even in part, and holds in part otherwise. When no part is
-//!    decided, it cannot be tested.
+//! 1. **A cell.** A claim is tested in each cell (a scenario, an estimator, a parameter) to which
+//!    it applies, with the measured value x, its Monte Carlo error s and a margin of 2 s.
+//!    - *Comparison* (larger, smaller, no larger than): the cell passes if x is beyond the limit by
+//!      more than the margin, fails if it is on the other side by more, and is undecided within the
+//!      margin.
+//!    - *Number* (around 50 %, 10 times): the cell passes if x lies within the range of the wording, widened by the
+//!      margin, and fails otherwise. It is undecided if it would pass with a margin of more than half the range: such
+//!      an x carries no information about the number. If the number is the size of an effect (so many times slower, so
+//!      much less error), an x beyond the range on the side of the larger effect *exceeds* the claim: the statement is
+//!      true, and the effect is larger.
+//!    - If less than half of the replications give a value (models that cannot be converted) the
+//!      cell is undecided.
+//! 2. **A part** of a claim (same figure of merit, same test) holds if 90 % of its decided cells
+//!    pass. It holds, and more so, if 90 % pass or exceed the claim and fewer than 90 % pass. It
+//!    holds in part if 50 % pass or exceed, and does not hold otherwise. If less than half of its
+//!    cells are decided, the replications do not decide it.
+//! 3. **A claim** holds if all its parts hold, and more so if one of them does. It does not hold if
+//!    none of its parts holds even in part, and holds in part otherwise. If no part is decided, it
+//!    cannot be tested.
 //!
 //! Meaning of words, the same for all claims:
 //!
@@ -42,13 +42,13 @@ use super::value::Value;
 pub(super) const LARGE: f64 = 25.0;
 /// An acceptable bias, % of the true value.
 pub(super) const ACCEPTABLE: f64 = 10.0;
-/// A bias that is close to zero, or to another, points of % of the true value.
+/// A bias close to zero, or to another, percentage points of the true value.
 pub(super) const CLOSE: f64 = 5.0;
-/// The least difference that matters, points of % of the true value.
+/// The smallest relevant difference, percentage points of the true value.
 pub(super) const MATTERS: f64 = 0.1;
-/// Remainder of something that is heavily reduced.
+/// Remaining fraction of a quantity that is heavily reduced.
 pub(super) const QUARTER: f64 = 0.25;
-/// The least ratio of something that is much higher.
+/// Smallest ratio of a quantity that is much higher.
 pub(super) const MUCH: f64 = 1.5;
 /// R^2 of a linear trend.
 pub(super) const LINEAR: f64 = 0.9;
@@ -57,23 +57,23 @@ const MARGIN: f64 = 2.0;
 const HOLDS_FROM: f64 = 0.9;
 const IN_PART_FROM: f64 = 0.5;
 
-/// Content of the data for a claim.
+/// Verdict of the data on a claim.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Verdict {
     /// It holds.
     Holds,
-    /// What it reports is true, and the effect is larger than the number that it gives.
+    /// The statement is true, and the effect is larger than the claimed number.
     HoldsAndMoreSo,
     /// It holds in part.
     HoldsInPart,
     /// It does not hold.
     DoesNotHold,
-    /// It cannot be tested, and why.
+    /// It cannot be tested, with the reason.
     CannotBeTested(String),
 }
 
 impl Verdict {
-    /// In words, without the reason.
+    /// The verdict as text, without the reason.
     pub fn words(&self) -> &'static str {
         match self {
             Self::Holds => "holds",
@@ -94,7 +94,7 @@ impl std::fmt::Display for Verdict {
     }
 }
 
-/// How a cell ended.
+/// Outcome of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CellOutcome {
     /// As claimed.
@@ -107,7 +107,7 @@ pub enum CellOutcome {
     Undecided,
 }
 
-/// The bound that the value of a cell must keep.
+/// The bound on the value of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Bound {
     /// Larger than this.
@@ -123,16 +123,16 @@ pub enum Bound {
 /// A claim in one cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CellTest {
-    /// Which cell.
+    /// Name of the cell.
     pub label: String,
-    /// The measurements.
+    /// The measured value.
     pub measured: Value,
-    /// The claim.
+    /// The claimed bound.
     pub bound: Bound,
 }
 
 impl CellTest {
-    /// Whether the value is as claimed.
+    /// Compares the value with the claim.
     pub fn outcome(&self) -> CellOutcome {
         let Value { value, error } = self.measured;
         if !value.is_finite() || !error.is_finite() {
@@ -168,11 +168,11 @@ impl CellTest {
 /// The cells of a claim with one figure of merit and one test.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
-    /// The figure of merit and what is claimed of it.
+    /// The figure of merit and the claim.
     pub label: String,
     /// Its cells.
     pub tests: Vec<CellTest>,
-    /// Numbers next to those that are tested.
+    /// Additional numbers that are not tested.
     pub shown: Vec<(String, Value)>,
 }
 
@@ -194,42 +194,42 @@ impl Part {
         self.tests.push(CellTest { label, measured, bound });
     }
 
-    /// A cell in which the value is claimed to be larger than a limit.
+    /// Adds a cell in which the value is claimed to be larger than a limit.
     pub(super) fn above(&mut self, label: String, measured: Value, limit: f64) {
         self.add(label, measured, Bound::Above(limit));
     }
 
-    /// A cell in which the value is claimed to be smaller than a limit.
+    /// Adds a cell in which the value is claimed to be smaller than a limit.
     pub(super) fn below(&mut self, label: String, measured: Value, limit: f64) {
         self.add(label, measured, Bound::Below(limit));
     }
 
-    /// A cell in which the value is claimed to be around a number.
+    /// Adds a cell in which the value is claimed to be around a number.
     pub(super) fn around(&mut self, label: String, measured: Value, number: f64) {
         self.between(label, measured, 0.5 * number, 1.5 * number);
     }
 
-    /// A cell in which an effect, the larger the larger the value, is claimed to have this size.
+    /// Adds a cell in which an effect, which increases with the value, is claimed to have this size.
     pub(super) fn effect(&mut self, label: String, measured: Value, size: f64) {
         self.add(label, measured, Bound::Effect(0.5 * size, 1.5 * size));
     }
 
-    /// A cell in which an effect is claimed to be from one size to another.
+    /// Adds a cell in which an effect is claimed to be in a range of sizes.
     pub(super) fn effect_between(&mut self, label: String, measured: Value, low: f64, high: f64) {
         self.add(label, measured, Bound::Effect(low, high));
     }
 
-    /// A cell in which the value is claimed to be from one number to another.
+    /// Adds a cell in which the value is claimed to be in a range.
     pub(super) fn between(&mut self, label: String, measured: Value, low: f64, high: f64) {
         self.add(label, measured, Bound::Between(low, high));
     }
 
-    /// Cells with an outcome.
+    /// Number of cells with an outcome.
     pub fn count(&self, outcome: CellOutcome) -> usize {
         self.tests.iter().filter(|test| test.outcome() == outcome).count()
     }
 
-    /// Cells whose value is above and below the range of a claimed number by more than the margin.
+    /// Numbers of cells whose value is above and below the range of a claimed number by more than the margin.
     pub fn beyond(&self) -> (usize, usize) {
         let fails = self.tests.iter().filter(|test| test.outcome() == CellOutcome::Fails);
         fails.fold((0, 0), |(above, below), test| match test.bound {
@@ -244,7 +244,7 @@ impl Part {
         })
     }
 
-    /// Rule 2; none when the replications do not decide.
+    /// Rule 2; none if the replications do not decide.
     pub fn verdict(&self) -> Option<Verdict> {
         let [passes, exceeds, fails] =
             [CellOutcome::Passes, CellOutcome::Exceeds, CellOutcome::Fails].map(|outcome| self.count(outcome));
@@ -317,7 +317,7 @@ mod tests {
             assert_eq!(cell(value, 1.0, Bound::Above(10.0)), outcome);
             assert_eq!(cell(-value, 1.0, Bound::Below(-10.0)), outcome);
         }
-        // Without chance there is nothing between: what is not larger is not larger.
+        // Without Monte Carlo error no cell is undecided: a value that is not larger fails.
         assert_eq!(cell(10.0, 0.0, Bound::Above(10.0)), Fails);
         assert_eq!(cell(10.0 + 1e-9, 0.0, Bound::Above(10.0)), Passes);
         let around = Bound::Between(25.0, 75.0);

@@ -1,12 +1,12 @@
-//! The simulated settings of which claims speak, and the queries for their estimates.
+//! The simulated settings of the claims, and the queries for their estimates.
 
 use hoid_study::Query;
 
-/// Noise levels of the batch plans but 0.
+/// Noise levels of the batch plans, except 0.
 pub(super) const LEVELS: [f64; 3] = [0.1, 0.2, 0.3];
 /// Orders of the simulated remnant.
 pub(super) const ORDERS: [usize; 4] = [1, 2, 3, 4];
-/// Orders of which ARX has poles enough.
+/// Orders for which ARX has enough poles.
 pub(super) const HIGHER: [usize; 3] = [2, 3, 4];
 /// Delays of the batch plans, samples.
 pub(super) const DELAYS: [usize; 6] = [25, 26, 27, 28, 29, 30];
@@ -18,7 +18,7 @@ pub(super) const DISCRETE: [&str; 4] = ["a1", "a2", "b0", "b1"];
 pub(super) const NMS: [&str; 2] = ["omega_nm", "zeta_nm"];
 /// Noise levels of the plan of V.B.
 pub(super) const RECURSIVE_LEVELS: [f64; 3] = [0.01, 0.1, 0.2];
-/// Without remnant there is one record, whatever m0.
+/// Without remnant there is one record, for any m0.
 pub(super) const WITHOUT_REMNANT: Setting = Setting {
     condition: "C1",
     m0: 1,
@@ -47,7 +47,7 @@ pub(super) fn settings(conditions: &[&'static str], orders: &[usize], levels: &[
     all
 }
 
-/// The name of a quantity of models with F: what the text calls a1 and a2 is f1 and f2 there.
+/// The name of a quantity of models with F: a1 and a2 of the text are f1 and f2 there.
 pub(super) fn with_f(quantity: &str) -> String {
     match quantity
         .strip_suffix("a1")

@@ -2,10 +2,10 @@
 //! paired values.
 //!
 //! - The error of a median is that of the module [`hoid_study::statistics`].
-//! - Anything else that is made of the values of replications gets the error of the delete-a-group
-//!   jackknife (Kott, *Journal of Official Statistics* 17, 2001): with the g-th tenth of the
-//!   replications left out of all samples at once, `s^2 = (G - 1)/G sum (x_g - mean x_g)^2`.
-//!   Estimators that saw the same records stay paired.
+//! - Other functions of the values of replications get the error of the delete-a-group jackknife
+//!   (Kott, *Journal of Official Statistics* 17, 2001): with the g-th tenth of the replications
+//!   left out of all samples at once, `s^2 = (G - 1)/G sum (x_g - mean x_g)^2`. Estimators applied
+//!   to the same records stay paired.
 
 use hoid_numerics::statistics::{mean, squared_deviations};
 use hoid_study::{Statistics, statistics::median};
@@ -14,10 +14,10 @@ use super::value::Value;
 
 /// Groups of the jackknife.
 const GROUPS: usize = 10;
-/// Share of the replications that must give a value.
+/// Smallest share of the replications that must give a value.
 pub(super) const ENOUGH: f64 = 0.5;
 
-/// No value: too few replications give one.
+/// No value, since too few replications give one.
 pub(super) const NOTHING: Value = Value {
     value: f64::NAN,
     error: f64::NAN,
@@ -28,7 +28,7 @@ pub(super) fn magnitudes(values: &[f64]) -> Vec<f64> {
     values.iter().map(|v| v.abs()).collect()
 }
 
-/// Values enough to speak for all replications.
+/// True if there are enough values to represent all replications.
 fn enough(values: &[f64]) -> bool {
     let finite = values.iter().filter(|v| v.is_finite()).count();
     finite > 0 && finite as f64 >= ENOUGH * values.len() as f64
@@ -41,7 +41,7 @@ fn value_of(values: &[f64], figure: fn(&Statistics) -> (f64, f64)) -> Value {
     let (value, error) = figure(&Statistics::of(values));
     Value {
         value,
-        // A scenario without remnant has one replication, which reports all.
+        // A scenario without remnant has a single replication, which suffices.
         error: if values.len() == 1 { 0.0 } else { error },
     }
 }
@@ -63,7 +63,7 @@ pub(super) fn share_of(values: &[f64]) -> Value {
     }
 }
 
-/// The median of values that are enough.
+/// The median, if there are enough values.
 pub(super) fn med(values: &[f64]) -> f64 {
     if enough(values) { median(values) } else { f64::NAN }
 }
@@ -87,7 +87,7 @@ pub(super) fn interquartile_range(values: &[f64]) -> f64 {
     s.upper_quartile - s.lower_quartile
 }
 
-/// Largest less smallest.
+/// Largest minus smallest value.
 pub(super) fn spread(values: impl Iterator<Item = f64>) -> f64 {
     let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
     for value in values {
@@ -100,7 +100,7 @@ pub(super) fn spread(values: impl Iterator<Item = f64>) -> f64 {
     most - least
 }
 
-/// R^2 of the straight line through values at equal distances.
+/// R^2 of the straight line through equidistant values.
 pub(super) fn linearity(values: &[f64]) -> f64 {
     let n = values.len() as f64;
     let (x0, y0) = (0.5 * (n - 1.0), mean(values));
@@ -160,8 +160,8 @@ mod tests {
 
     #[test]
     fn the_jackknife_of_a_mean_is_its_error() {
-        // The expectation of s^2 is exact for a mean; with 9 degrees of freedom s scatters by 24 %
-        // and 400 samples bring that to 1.2 %, the root of a chi-square of 9 degrees is 2.7 %
+        // The expectation of s^2 is exact for a mean; with 9 degrees of freedom s has a spread of
+        // 24 %, which 400 samples reduce to 1.2 %; the root of a chi-square of 9 degrees is 2.7 %
         // below.
         let errors: f64 = (0..400)
             .map(|seed| jackknife(&[normals(100, seed)], &|s| s[0].iter().sum::<f64>() / s[0].len() as f64).error)

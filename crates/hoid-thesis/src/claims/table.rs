@@ -7,7 +7,7 @@ use super::{
     finding::{Finding, Measured},
 };
 
-/// A table of claims, a row each, with the measurements as text and the first of the numbers.
+/// A table of claims, one row each, with the measurements as text and the first of the numbers.
 pub fn claims_table(findings: &[(Claim, Finding)]) -> OutputTable {
     let text = |name: &str, of: &dyn Fn(&Claim, &Finding) -> String| OutputColumn {
         name: name.to_owned(),

@@ -8,8 +8,8 @@ use hoid_study::{
     run,
 };
 
-/// What a replication of an estimator gives for a column: the relative error of what has a truth,
-/// else the value.
+/// Value of a replication of an estimator for a column: the relative error if there is a true
+/// value, otherwise the value.
 type Data = dyn Fn(&Cell, &EstimatorCell, &str, u64) -> f64;
 
 const REPLICATIONS: u64 = 20;
@@ -23,7 +23,7 @@ fn synthetic(name: &str, data: &Data) -> Results {
     Results::synthetic(plan, data)
 }
 
-/// Small symmetric errors, a little different from one column to the next.
+/// Small symmetric errors that differ slightly between columns.
 fn scatter(column: &str, replication: u64) -> f64 {
     let phase = column.bytes().map(f64::from).sum::<f64>();
     1e-3 * (phase + 2.4 * replication as f64).sin()
@@ -61,7 +61,7 @@ fn claims_are_told_apart_and_short() {
     }
 }
 
-/// A query that describes nothing, or several estimators, would end as a reason without parts.
+/// A query that selects nothing, or several estimators, would give a reason without parts.
 #[test]
 fn each_claim_finds_all_its_cells_in_its_own_plans() {
     let data: &Data = &|_, _, column, replication| 0.01 + scatter(column, replication);
@@ -168,7 +168,7 @@ fn traces_give_bias_and_settling() {
     };
     let bias = study.trace_bias(&at.rls(""), "b0").unwrap();
     assert!((bias.value - 40.0).abs() < 1e-9 && bias.error > 0.0, "{bias:?}");
-    // Synthetic traces step at once.
+    // Synthetic traces step instantly.
     let settled = study.settling(&at.rpem(""), "K_e_dot").unwrap();
     assert!(settled.value <= 0.32 && settled.error >= 0.16 - 1e-9, "{settled:?}");
     assert!(

@@ -1,9 +1,9 @@
 //! Numbers with Monte Carlo errors, and those of their differences, means and ratios.
 
-/// A number and its Monte Carlo error, 0 for one that does not depend on chance.
+/// A number and its Monte Carlo error, 0 for one without random error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Value {
-    /// The number; not a number where too few replications give one.
+    /// The number; not a number if too few replications give one.
     pub value: f64,
     /// Its Monte Carlo error.
     pub error: f64,

@@ -1,11 +1,11 @@
-//! Claims on batch fits that look further than bias of the coefficients: the innovation variance by
-//! order of the remnant and in C2, b at a wrong delay, and the zero in C2.
+//! Claims on batch fits beyond the bias of the coefficients: the innovation variance by order of
+//! the remnant and in C2, b at a wrong delay, and the zero in C2.
 //!
 //! The text's *modified remnant noise variance* is the variance of the innovation that drives 1/D.
 //! Its reference value is that of the backward Euler form (eq. B.12),
 //! `sigma'^2 = (K_n (Ts/(Tn + Ts))^m)^2`. The remnant is held exactly over a sample, in the
 //! simulations of the text as here, so that the innovations of an exact model have another
-//! variance: it is shown alongside.
+//! variance, which is shown as well.
 
 use super::{
     claim::{Claim, Source, Theme},
@@ -78,7 +78,7 @@ fn backward_euler_variance(study: Study<'_>, at: Setting) -> Result<f64, String>
     Ok((k_n * (TS_S / (T_N_S + TS_S)).powi(m)).powi(2))
 }
 
-/// A figure of the biases of the innovation variance, %.
+/// A statistic of the biases of the innovation variance, %.
 fn variance(study: Study<'_>, at: Setting, figure: fn(&[f64]) -> f64) -> Result<Value, String> {
     let query = at.bj("innovation_variance", at.m0, TRUE_DELAY);
     study.sample(&query)?;
@@ -158,14 +158,14 @@ fn wrong_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(vec![large, smaller])
 }
 
-/// Relative errors of the zero 1/T_L, %, of those of T_L.
+/// Relative errors of the zero 1/T_L, %, from those of T_L.
 fn of_zero(t_l_percent: &[f64]) -> Vec<f64> {
     let of = |error: &f64| 100.0 * (1.0 / (1.0 + error / 100.0) - 1.0);
     t_l_percent.iter().map(of).collect()
 }
 
-/// Median magnitude of the relative error of the zero in C2 less that in C1; of the estimators of
-/// two queries, first less second, where there are two.
+/// Median magnitude of the relative error of the zero in C2 minus that in C1; for the estimators of
+/// two queries, first minus second.
 fn zero_change(study: Study<'_>, of: &dyn Fn(Setting) -> Vec<hoid_study::Query>, at: Setting) -> Result<Value, String> {
     let error = |condition| {
         study.of(&of(Setting { condition, ..at }), &|s| {

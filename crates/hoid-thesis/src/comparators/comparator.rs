@@ -1,4 +1,4 @@
-//! Definition of a comparator: it follows a record, and reports what the operator is at some times.
+//! Interface of a comparator: it tracks the operator over a record, and returns its estimate at given times.
 
 use hoid_ident::settings::Settings;
 use hoid_model::{OperatorParameters, Record, SampleTime, delayed_operator};
@@ -6,16 +6,16 @@ use num_complex::Complex64;
 
 use crate::ThesisError;
 
-/// Self-description of a comparator.
+/// Description of a comparator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct About {
     /// Its name in a plan.
     pub name: &'static str,
-    /// Its behaviour.
+    /// Description.
     pub help: &'static str,
     /// Author, year, place.
     pub source: &'static str,
-    /// What it is reported that a recursion is not, as text; empty for nothing.
+    /// Information that it has and a recursion does not, as text; empty for none.
     pub told: &'static str,
 }
 
@@ -24,33 +24,33 @@ pub struct About {
 pub struct Task<'a> {
     /// The record.
     pub record: &'a Record,
-    /// Samples after which an estimate is requested, in their order.
+    /// Samples after which an estimate is requested, in ascending order.
     pub at: &'a [usize],
     /// Frequencies of the lines of the forcing function, rad/s.
     pub lines_rad_s: &'a [f64],
     /// Frequencies at which the response is requested, rad/s; some of the lines.
     pub omega_rad_s: &'a [f64],
-    /// Span from which a start is fitted, s.
+    /// Span of the start fit, s.
     pub start_s: (f64, f64),
     /// Delay of b0 in samples.
     pub nk: usize,
-    /// A second run of the same person in the same task, where there is one.
+    /// A second run of the same person in the same task, if available.
     pub validation: Option<&'a Record>,
-    /// When the controlled element changes, s, and how fast, 1/s; none if it does not.
+    /// Time of the change of the controlled element, s, and its rate, 1/s; none if it is constant.
     pub change: Option<(f64, f64)>,
 }
 
-/// Result of a comparator, one entry for each sample that was requested.
+/// Result of a comparator, one entry for each requested sample.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Followed {
     /// The response at each frequency.
     pub response: Vec<Vec<Complex64>>,
-    /// The operator, where the method has one and it has a meaning.
+    /// The operator, if the method gives a valid one.
     pub operator: Vec<Option<OperatorParameters>>,
 }
 
 impl Followed {
-    /// For a method that gives a response alone.
+    /// Result of a method that gives only a response.
     pub fn without_operator(response: Vec<Vec<Complex64>>) -> Self {
         Self {
             operator: vec![None; response.len()],
@@ -58,8 +58,7 @@ impl Followed {
         }
     }
 
-    /// Result of a method with an operator at the next requested sample; its response is that of the operator, NaN if
-    /// there is none.
+    /// Adds the operator at the next requested sample; its response is that of the operator, NaN if there is none.
     pub(super) fn push(&mut self, task: &Task<'_>, operator: Option<OperatorParameters>) -> Result<(), ThesisError> {
         self.response.push(match &operator {
             Some(operator) => response_of(operator, task.record.sample_time(), task.omega_rad_s)?,
@@ -70,20 +69,20 @@ impl Followed {
     }
 }
 
-/// A method that is compared with others.
+/// A method for comparison with others.
 pub trait Comparator: Settings + Send + Sync {
-    /// Its self-description.
+    /// Returns its description.
     fn about(&self) -> About;
 
-    /// Follows a record.
+    /// Tracks the operator over a record.
     ///
     /// # Errors
-    /// [`ThesisError`] for a record that does not serve it.
+    /// [`ThesisError`] for an unsuitable record.
     fn follow(&self, task: &Task<'_>) -> Result<Followed, ThesisError>;
 }
 
 impl Task<'_> {
-    /// e and u, of which there are more than `least` samples.
+    /// Returns e and u, which must have more than `least` samples.
     pub(crate) fn signals(&self, method: &'static str, least: usize) -> Result<(&[f64], &[f64]), ThesisError> {
         let (e, u) = (self.record.input(), self.record.output());
         let unsuited = |quantity: &str, found: String, expected: &str| ThesisError::Unsuited {
@@ -117,7 +116,7 @@ impl Task<'_> {
     }
 }
 
-/// The response of an operator with any delay, after a zero-order hold, at some frequencies.
+/// The response of an operator with any delay, after a zero-order hold, at given frequencies.
 pub(crate) fn response_of(
     operator: &OperatorParameters,
     sample_time: SampleTime,

@@ -1,9 +1,9 @@
-//! Least squares by normal equations, for regressions of some hundred coefficients over thousands
+//! Least squares by normal equations, for regressions with some hundred coefficients over thousands
 //! of samples.
 //!
-//! `theta = (Phi' Phi + D)^-1 Phi' y`, by Cholesky's factor of the sum; D holds the prior knowledge
-//! of theta before the data (A. N. Tikhonov 1963; A. E. Hoerl and R. W. Kennard, *Technometrics* 12
-//! (1970) 55-67). Squaring the condition of Phi is not a loss where D bounds it.
+//! `theta = (Phi' Phi + D)^-1 Phi' y`, by the Cholesky factor of the sum; D is the prior precision
+//! of theta (A. N. Tikhonov 1963; A. E. Hoerl and R. W. Kennard, *Technometrics* 12 (1970) 55-67).
+//! Squaring the condition number of Phi does no harm if D bounds it.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -14,12 +14,12 @@ use crate::ThesisError;
 pub(super) struct NormalEquations {
     /// Lower triangle of Phi' Phi.
     pub gram: DMatrix<f64>,
-    /// Phi' y, a column for each output.
+    /// Phi' y, one column for each output.
     pub moments: DMatrix<f64>,
 }
 
 impl NormalEquations {
-    /// Without data.
+    /// Creates equations without data.
     pub fn new(coefficients: usize, outputs: usize) -> Self {
         Self {
             gram: DMatrix::zeros(coefficients, coefficients),
@@ -27,7 +27,7 @@ impl NormalEquations {
         }
     }
 
-    /// Takes in one sample, after everything before it has been multiplied by lambda.
+    /// Multiplies the sums by lambda and adds one sample.
     pub fn add(&mut self, lambda: f64, regressors: &[f64], outputs: &[f64]) {
         for (j, x) in regressors.iter().enumerate() {
             let mut column = self.gram.column_mut(j);
@@ -43,9 +43,9 @@ impl NormalEquations {
         }
     }
 
-    /// The coefficients, with D next to the data (its lower triangle counts).
+    /// Returns the coefficients, with D added to the data (its lower triangle is used).
     pub fn solve(&self, method: &'static str, prior: &DMatrix<f64>) -> Result<DMatrix<f64>, ThesisError> {
-        // Cholesky's factor reads the lower triangle alone.
+        // The Cholesky factorisation reads the lower triangle only.
         let factor: Option<Cholesky<f64, Dyn>> = (&self.gram + prior).cholesky();
         let singular = || ThesisError::Unsuited {
             method,
@@ -61,7 +61,7 @@ impl NormalEquations {
         }
     }
 
-    /// A prior that only keeps the matrix positive: `share` of the mean of its diagonal.
+    /// A prior that only keeps the matrix positive definite: `share` of the mean of its diagonal.
     pub fn ridge(&self, share: f64) -> DMatrix<f64> {
         let n = self.gram.nrows();
         let level = share * self.gram.trace() / n as f64;
@@ -76,7 +76,7 @@ mod tests {
 
     #[test]
     fn weighted_sums_give_weighted_least_squares() {
-        // y = 2 x_1 - x_2 exactly: whatever the weights.
+        // y = 2 x_1 - x_2 exactly, for any weights.
         let mut all = NormalEquations::new(2, 1);
         for k in 0..20 {
             let x = [f64::from(k).sin(), (1.7 * f64::from(k)).cos()];

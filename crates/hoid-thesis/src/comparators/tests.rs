@@ -1,4 +1,4 @@
-//! What the tests of comparators have in common, and tests of all of them.
+//! Common helpers of the tests of comparators, and tests of all of them.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeSet;
@@ -35,7 +35,7 @@ pub(super) fn task_of<'a>(record: &'a Record, at: &'a [usize], omega_rad_s: &'a 
     }
 }
 
-/// A run of a condition of the text, and what is true of it.
+/// A run of a condition of the text, and its true values.
 pub(super) struct Run {
     pub record: Record,
     validation: Record,
@@ -45,7 +45,7 @@ pub(super) struct Run {
 }
 
 impl Run {
-    /// One replication, P_n and m0 as requested.
+    /// One replication with the given P_n and m0.
     pub fn of(condition: Condition, order: usize, level: f64) -> Self {
         Self::replication(condition, order, level, 0)
     }
@@ -100,7 +100,7 @@ impl Run {
         }
     }
 
-    /// The true responses at the samples that are requested.
+    /// The true responses at the requested samples.
     pub fn responses(&self) -> Vec<Vec<Complex64>> {
         let task = self.task();
         let of = |k: &usize| response_of(&self.operator(*k), self.record.sample_time(), task.omega_rad_s).unwrap();
@@ -134,8 +134,8 @@ fn names_lead_to_comparators_and_all_say_where_they_are_from() {
     }
 }
 
-/// All of them on one run with a small remnant: before the change and long after it the response is
-/// that of the operator within half of it, and a value that is not a number is reported to be none.
+/// All of them on one run with a small remnant: before the change and long after it the error of
+/// the response is below one half, and a value that is not a number is reported as missing.
 #[test]
 fn all_follow_a_run_of_the_text() {
     let run = Run::of(Condition::C4, 1, 0.01);

@@ -1,6 +1,6 @@
-//! The operator's responses to error and error rate, of unit gain.
+//! The operator's responses to error and error rate, with unit gain.
 //!
-//! With the neuromuscular part known, `u = K_e y_0 + K_e_dot y_1 + n`: y_0 is the exact response of
+//! With a known neuromuscular part, `u = K_e y_0 + K_e_dot y_1 + n`: y_0 is the exact response of
 //! `omega^2/(s^2 + 2 zeta omega s + omega^2)` to the held error of nk - 1 samples before, y_1 its
 //! rate. It is the form of [`hoid_ident::SigmoidChange`] for a whole delay.
 
@@ -19,7 +19,7 @@ pub(super) fn unit_responses(
     let mut state = [0.0; 2];
     let (mut y_0, mut y_1) = (Vec::with_capacity(e.len()), Vec::with_capacity(e.len()));
     for k in 0..e.len() {
-        // The response to e(k - nk) is first seen at k.
+        // The response to e(k - nk) starts at k.
         let before = if k >= nk { e[k - nk] } else { 0.0 };
         state = held.step(state, before);
         y_0.push(square * state[0]);

@@ -6,27 +6,27 @@ use toml::{Table, Value};
 
 use crate::ThesisError;
 
-/// The plan that comes with the program.
+/// The built-in plan.
 pub const EXPERIMENT: &str = include_str!("../../plans/experiment.toml");
 
-/// Participants, and the processing of their runs.
+/// People of the experiment, and the processing of their runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExperimentPlan {
     /// Seed of all random streams.
     pub seed: u64,
     /// Number of subjects.
     pub subjects: u64,
-    /// Runs of each subject and condition.
+    /// Number of runs of each subject and condition.
     pub runs: u64,
-    /// How many of them, the last ones, are evaluated.
+    /// Number of runs that are evaluated, the last ones.
     pub evaluated: u64,
     /// Spread of the parameters between subjects, and between the runs of one.
     pub spreads: (f64, f64),
     /// Order of the remnant.
     pub remnant_order: usize,
-    /// Noise level before it is spread.
+    /// Noise level before the spread is applied.
     pub noise_level: f64,
-    /// First and last delay that is tried, samples.
+    /// First and last delay tried, samples.
     pub delays: (usize, usize),
 }
 
@@ -50,8 +50,8 @@ impl ExperimentPlan {
         Condition::C6,
     ];
 
-    /// Estimates that it makes: of each run and structure the fits of two spans with every delay and
-    /// with the best one, and a recursive one.
+    /// Number of its estimates: for each run and structure the fits of two spans with every delay
+    /// and with the best one, and a recursive one.
     pub fn estimates(&self) -> u64 {
         let delays = (self.delays.1 + 1).saturating_sub(self.delays.0) as u64;
         let of_run = 2 * (2 * delays + 2 + 1);

@@ -11,9 +11,9 @@ use crate::ThesisError;
 
 /// Spans of the batch fits, s.
 pub const SPANS_S: [(f64, f64); 2] = [(0.0, 30.72), (51.2, 81.92)];
-/// Samples from one kept estimate to the next.
+/// Samples between stored estimates.
 const EVERY: usize = 32;
-/// Sizes of P0 and of the memory, as in section V.B.
+/// P0 and memory, as in section V.B.
 const SETTINGS: [(&str, &str); 2] = [("memory", "256"), ("covariance", "0.1")];
 
 /// Coefficients and operator of one moment.
@@ -21,7 +21,7 @@ const SETTINGS: [(&str, &str); 2] = [("memory", "256"), ("covariance", "0.1")];
 pub struct State {
     /// a1, a2 (f1, f2 of a Box-Jenkins model), b0, b1.
     pub discrete: [f64; 4],
-    /// K_e, T_L, K_e_dot, omega_nm, zeta_nm; no numbers where the model does not convert.
+    /// K_e, T_L, K_e_dot, omega_nm, zeta_nm; not numbers if the model cannot be converted.
     pub operator: [f64; 5],
 }
 
@@ -30,30 +30,30 @@ pub struct State {
 pub struct Course {
     /// Times, s.
     pub times_s: Vec<f64>,
-    /// Coefficients and operator at each.
+    /// Coefficients and operator at each time.
     pub states: Vec<State>,
-    /// Variances of a1, a2, b0, b1, and d1 where there is one.
+    /// Variances of a1, a2, b0, b1, and d1 if there is one.
     pub variances: Vec<[f64; 5]>,
 }
 
-/// Findings in one run; entries by structure, ARX and Box-Jenkins, and by span.
+/// Results of one run, by structure (ARX and Box-Jenkins) and by span.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunOutcome {
     /// n_k*, samples.
     pub nk: [usize; 2],
-    /// T_n* of the Box-Jenkins model, s; no number where neither span has one.
+    /// T_n* of the Box-Jenkins model, s; not a number if neither span has one.
     pub t_n_s: f64,
-    /// The true delay, in samples with that of the hold.
+    /// The true delay including that of the hold, samples.
     pub true_nk: usize,
     /// Batch fits.
     pub batch: [[State; 2]; 2],
     /// RLS and RPEM.
     pub courses: [Course; 2],
-    /// The simulated scenario, at the start and at the end.
+    /// True values at the start and at the end.
     pub truth: [State; 2],
 }
 
-/// The procedure of section VI on one run; delays from the first to the last are tried.
+/// Applies the procedure of section VI to one run, with the delays from first to last.
 ///
 /// # Errors
 /// [`ThesisError::Estimator`] for a model that cannot be fitted or tracked.
@@ -137,7 +137,7 @@ fn best_delay(span: &Record, structure: Structure, (first, last): (usize, usize)
     }
 }
 
-/// Mean of the time constants that there are, by backward Euler.
+/// Mean of the available time constants, by backward Euler.
 fn time_constant(fits: &[Fit; 2]) -> f64 {
     let of = |fit: &Fit| {
         fit.remnant(RemnantDiscretisation::BackwardEuler)
@@ -184,7 +184,7 @@ fn course(record: &Record, start: &Fit) -> Result<Course, ThesisError> {
     Ok(course)
 }
 
-/// Places of a1, a2 (or f1, f2), b0, b1 and d1 in theta.
+/// Positions of a1, a2 (or f1, f2), b0, b1 and d1 in theta.
 fn places(orders: &Orders) -> [Option<usize>; 5] {
     let names = orders.parameter_names();
     let of = |wanted: &[&str]| names.iter().position(|name| wanted.contains(&name.as_str()));
@@ -213,7 +213,7 @@ fn values(operator: Option<OperatorParameters>) -> [f64; 5] {
     })
 }
 
-/// The simulated operator of a sample.
+/// The simulated operator at a sample.
 fn true_state(record: &Record, k: usize) -> State {
     let of = |name: &str| record.channel(name).map_or(f64::NAN, |values| values[k]);
     let operator = OperatorParameters {

@@ -1,8 +1,8 @@
-//! Figs. H.1 to H.12 as the text draws them, *obtained values averaged from M realizations*: the
-//! averages over the runs with the medians alongside.
+//! Figs. H.1 to H.12 as in the text, *obtained values averaged from M realizations*: the averages
+//! over the runs, and the medians.
 //!
-//! `T_L = K_e_dot/K_e` of one run in which K_e nearly vanishes decides the average of all, which is
-//! why the figures of the same number show the medians (`traces`).
+//! `T_L = K_e_dot/K_e` of a single run in which K_e nearly vanishes dominates the average of all;
+//! therefore the figures of the same number show the medians (`traces`).
 
 use hoid_study::{Query, Results};
 
@@ -14,7 +14,7 @@ use super::{
 };
 use hoid_report::figures::{CurveKind, Ordinate, TraceCurve, TraceGrid, TracePanel, trace_panels};
 
-/// The noise level that is drawn: averages and medians of three levels would be twelve lines.
+/// The displayed noise level: averages and medians of three levels would be twelve lines.
 const LEVEL: f64 = 0.1;
 
 pub(super) fn items() -> Vec<Item> {

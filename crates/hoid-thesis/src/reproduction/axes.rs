@@ -1,4 +1,4 @@
-//! Orders, delays and noise levels over which the figures of the text go, and their labels.
+//! Orders, delays and noise levels of the figures of the text, and their labels.
 
 /// Delays of the figures.
 pub(super) const DELAYS: [usize; 5] = [26, 27, 28, 29, 30];

@@ -29,7 +29,7 @@ impl Model {
         }
     }
 
-    /// Hue of the method.
+    /// Index of the method for its hue.
     pub(super) fn method(self) -> usize {
         usize::from(self != Self::Arx)
     }
@@ -44,7 +44,7 @@ impl Model {
     }
 }
 
-/// The parameters of a figure: column of the study for ARX and Box-Jenkins, label.
+/// The parameters of a figure: columns of the study for ARX and Box-Jenkins, label.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Parameters {
     Discrete,
@@ -52,7 +52,7 @@ enum Parameters {
     Remnant,
 }
 
-/// A quantity of the study for ARX, for Box-Jenkins, its symbol, and the same in letters.
+/// Quantity of the study for ARX, for Box-Jenkins, its symbol, and the symbol in letters.
 type Row = (&'static str, &'static str, &'static str, &'static str);
 
 const DISCRETE: [Row; 4] = [
@@ -98,11 +98,11 @@ impl Parameters {
     }
 }
 
-/// Where the ordinate of what [`bends`] ends to be linear, %.
+/// Limit of the linear part of an ordinate for which [`bends`] is true, %.
 const LINEAR_WITHIN: f64 = 10.0;
 
-/// True for biases of up to thousands of times the value: the noise of a model of first order that
-/// represents a remnant of higher order is not that of the remnant.
+/// True for biases of up to thousands of times the value: the innovation variance of a first-order
+/// model of a higher-order remnant is not that of the remnant.
 fn bends(model: Model, remnant_order: usize, letters: &str) -> bool {
     model == Model::First && remnant_order > 1 && matches!(letters, "innovation variance" | "T_n" | "K_n")
 }
@@ -157,7 +157,7 @@ fn item(name: &str, condition: &'static str, model: Model, parameters: Parameter
 }
 
 fn make(item: &Item, results: &Results, condition: &str, model: Model, parameters: Parameters) -> ItemOutput {
-    // Without remnant its parameters have no truth to be compared with.
+    // Without remnant its parameters have no true values.
     let levels = if parameters == Parameters::Remnant {
         &LEVELS[1..]
     } else {

@@ -17,7 +17,7 @@ pub fn items() -> Vec<Item> {
     all
 }
 
-/// Tables, the figures of the article, those of the appendices by number, the rest.
+/// Sort key: tables, the figures of the article, those of the appendices by number, the rest.
 fn place(name: &str) -> (u8, String, u32, String) {
     let number = |text: &str| text.parse::<f64>().map_or(0, |n| (10.0 * n) as u32);
     if let Some(n) = name.strip_prefix("table-") {

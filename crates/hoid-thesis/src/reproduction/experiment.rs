@@ -24,7 +24,7 @@ const CAPTION: &str = "Three virtual subjects, mean (dark) and median (light) ov
 /// Runs of the experiment, made once.
 type Runs = Arc<OnceLock<Result<Vec<EvaluatedRun>, String>>>;
 
-/// Results of a panel.
+/// Quantities of a panel.
 #[derive(Debug, Clone, Copy)]
 enum Shown {
     Discrete(usize),
@@ -32,7 +32,7 @@ enum Shown {
     Variance(usize),
 }
 
-/// A row of panels: what, name, unit.
+/// A row of panels: quantity, name, unit.
 type Row = (Shown, &'static str, &'static str);
 
 const DISCRETE: [Row; 4] = [
@@ -120,7 +120,7 @@ fn made() -> Result<Vec<EvaluatedRun>, String> {
     experiment(&plan).map_err(|error| error.to_string())
 }
 
-/// Makes an item of the runs; the reason where there are none.
+/// Makes an item from the runs; the reason if there are none.
 fn with(
     runs: &Runs,
     make: impl Fn(&Item, &[EvaluatedRun]) -> ItemOutput + Send + Sync + 'static,
@@ -165,7 +165,7 @@ fn table(item: &Item, runs: &[EvaluatedRun]) -> ItemOutput {
     data.table(&item.title).into()
 }
 
-/// Mean and median of the numbers among some.
+/// Mean and median of the finite values.
 fn middle(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let finite: Vec<f64> = values.filter(|value| value.is_finite()).collect();
     if finite.is_empty() {
@@ -205,7 +205,7 @@ fn draw(item: &Item, runs: &[EvaluatedRun], condition: Condition, rows: &[Row]) 
                 for (t, [mean, median]) in times_s.iter().zip(&both) {
                     data.row(&[name, estimator], &[subject as f64, *t, *mean, *median]);
                 }
-                // Levels get darker: the median first, the mean over it.
+                // Higher levels are darker: the median first, the mean over it.
                 for (level, which) in [1, 0].into_iter().enumerate() {
                     let values = both.iter().map(|of| of[which]).collect();
                     curves.push(curve(CurveKind::Estimate, method, level, times_s.clone(), values));
@@ -257,7 +257,7 @@ fn draw(item: &Item, runs: &[EvaluatedRun], condition: Condition, rows: &[Row]) 
     item.drawn(trace_panels, &grid, data)
 }
 
-/// The mean of the simulated operators: the value of the start, then that of the end.
+/// The mean of the simulated operators: the value at the start, then that at the end.
 fn truth(shown: Shown, own: &[&EvaluatedRun], condition: Condition) -> TraceCurve {
     let [first, last] = [0, 1].map(|end| middle(own.iter().map(|run| shown.of_state(&run.outcome.truth[end])))[0]);
     let schedule = hoid_model::scenario::Scenario::condition(condition).schedule;

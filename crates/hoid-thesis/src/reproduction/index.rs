@@ -1,5 +1,4 @@
-//! The page that shows the reproduction: tables, figures with their data, claims, studies with
-//! their plans.
+//! The page of the reproduction: tables, figures with their data, claims, studies with their plans.
 
 use crate::claims::{Claim, Finding, Measured, Verdict};
 use hoid_io::{ColumnValues, OutputTable};
@@ -13,13 +12,13 @@ use crate::ThesisError;
 /// The page.
 #[derive(Debug, Default)]
 pub struct IndexPage {
-    /// The processing and its inputs, as name and value.
+    /// Inputs and processing, as name and value.
     pub settings: Vec<(String, String)>,
     /// Remarks for the reader.
     pub notes: Vec<String>,
     entries: Vec<Value>,
     claims: Vec<Value>,
-    /// Claims that hold, hold in part, do not hold, cannot be tested.
+    /// Numbers of claims that hold, hold and more so, hold in part, do not hold, cannot be tested.
     tally: [usize; 5],
     studies: Vec<Value>,
 }
@@ -31,16 +30,16 @@ pub struct StudyEntry {
     pub name: String,
     /// Its title.
     pub title: String,
-    /// Where its directory is, from the page; empty if nothing of it is kept.
+    /// Path of its directory, relative to the page; empty if it is not kept.
     pub directory: String,
-    /// Estimates that were made.
+    /// Number of estimates.
     pub estimates: u64,
-    /// Time that it took, s; none when it already existed.
+    /// Duration, s; none if the study already existed.
     pub seconds: Option<f64>,
 }
 
 impl IndexPage {
-    /// Adds a table or figure: where its picture and its data are, from the page.
+    /// Adds a table or figure, with the paths of its figure and its data relative to the page.
     pub fn add(&mut self, item: &Item, svg: Option<&str>, data: &str, table: &OutputTable) {
         let rows = if svg.is_none() { table_rows(table) } else { Vec::new() };
         let header: Vec<String> = table.columns.iter().map(|c| c.name.clone()).collect();
@@ -50,11 +49,11 @@ impl IndexPage {
         });
     }
 
-    /// Adds the claims of the text with the evidence of the data on them.
+    /// Adds the claims of the text with their evidence.
     pub fn add_claims(&mut self, findings: &[(Claim, Finding)]) {
         let mut theme = "";
         for (claim, finding) in findings {
-            // The heading is before the first claim of its theme.
+            // The heading precedes the first claim of its theme.
             let heading = (claim.theme.title() != theme).then(|| claim.theme.title());
             theme = claim.theme.title();
             let class = match finding.verdict {
@@ -79,7 +78,7 @@ impl IndexPage {
         ];
     }
 
-    /// Claims that hold, hold and more so, hold in part, do not hold, cannot be tested.
+    /// Numbers of claims that hold, hold and more so, hold in part, do not hold, cannot be tested.
     pub fn tally(&self) -> [usize; 5] {
         self.tally
     }
@@ -119,7 +118,7 @@ impl IndexPage {
     }
 }
 
-/// A measured value as text: with its error, and its range over the cells where there are several.
+/// A measured value as text: with its error, and its range over the cells if there are several.
 fn measured(of: &Measured) -> String {
     let (value, error) = numbers::with_uncertainty(of.value, Some(of.error).filter(|error| *error > 0.0));
     let error = if of.error > 0.0 {
@@ -149,7 +148,7 @@ fn table_rows(table: &OutputTable) -> Vec<Vec<String>> {
         .collect()
 }
 
-/// Up to six significant digits.
+/// Formats up to six significant digits.
 fn number(value: f64) -> String {
     if !value.is_finite() {
         return "\u{2013}".to_owned();

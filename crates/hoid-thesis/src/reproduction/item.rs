@@ -16,25 +16,25 @@ pub type Studies = BTreeMap<String, Results>;
 /// Makes an item from the results of its plan.
 type Maker = Box<dyn Fn(&Item, Option<&Results>) -> ItemOutput + Send + Sync>;
 
-/// Runs that several items show and no plan describes. They are made before the items are drawn: a
-/// thread that draws one of them and makes the runs could be handed, while it waits for a part of
-/// them, another item that waits for all of them.
+/// Runs that several items share and no plan describes. They are made before the items are drawn:
+/// otherwise a thread that makes the runs for one item could, while it waits for a part of them, be
+/// given another item that waits for all of them.
 #[derive(Clone)]
 pub(super) struct SharedRuns {
     /// Their name and title.
     pub name: &'static str,
     pub title: &'static str,
-    /// Estimates that are made.
+    /// Number of estimates.
     pub estimates: u64,
-    /// Makes them.
+    /// Makes the runs.
     pub make: Arc<dyn Fn() + Send + Sync>,
 }
 
 /// One table or figure.
 pub struct Item {
-    /// Its name, as `fig-5`, `C.1` or `table-2`.
+    /// Its name, such as `fig-5`, `C.1` or `table-2`.
     pub name: String,
-    /// Its definition, one line.
+    /// Its title, one line.
     pub title: String,
     /// Notes for the reader.
     pub caption: String,
@@ -87,7 +87,7 @@ impl Item {
         }
     }
 
-    /// With runs that it shares with other items.
+    /// Adds runs that it shares with other items.
     #[must_use]
     pub(super) fn sharing(mut self, runs: &SharedRuns) -> Self {
         self.shared = Some(runs.clone());
@@ -108,7 +108,7 @@ impl Item {
         })
     }
 
-    /// Its figure of a grid, and the numbers of that.
+    /// The figure of a grid, and its numbers.
     pub(super) fn drawn<G>(&self, draw: Drawing<G>, grid: &G, data: TableBuilder) -> ItemOutput {
         ItemOutput {
             svg: Some(draw(&self.name, &self.title, grid)),
@@ -116,7 +116,7 @@ impl Item {
         }
     }
 
-    /// Makes it from the results of the studies; without those of its plan it is empty.
+    /// Makes the item from the results of the studies; without those of its plan it is empty.
     pub fn make(&self, studies: &Studies) -> ItemOutput {
         (self.make)(self, self.plan.and_then(|plan| studies.get(plan)))
     }

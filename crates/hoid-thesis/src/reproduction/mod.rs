@@ -16,9 +16,9 @@
 //! | `index` | the page that shows it all, with the claims | all |
 //! | `run` | all of this in a directory | |
 //!
-//! Axes, cells and grouping are those of the captions. The hue is the method (ARX blue, Box-Jenkins
-//! vermillion), its shade the noise level or the delay, black dashes the truth. Each figure comes
-//! with its data as a table.
+//! Axes, cells and grouping are those of the captions. The hue represents the method (ARX blue,
+//! Box-Jenkins vermillion), its shade the noise level or the delay, dashed black lines the truth.
+//! Each figure has its data as a table.
 
 mod averages;
 mod axes;

@@ -14,7 +14,7 @@ use hoid_report::figures::{MapColours, MapGrid, MapPanel, maps};
 const DELAYS: [usize; 6] = [25, 26, 27, 28, 29, 30];
 const TRUE_DELAY: usize = 29;
 
-/// Results of a map.
+/// Quantity of a map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Shown {
     Vaf,
@@ -133,8 +133,8 @@ fn make(item: &Item, results: &Results, condition: &str, m0: usize, shown: Shown
         });
     }
     let grid = |panels: Vec<MapPanel>, titles: Vec<String>| MapGrid {
-        // Two next to each other have cells that hold their numbers. Biases of b, a and the noise
-        // differ by an order of magnitude: a colour bar for each pair.
+        // With two columns the cells have space for their numbers. Biases of b, a and the noise
+        // differ by an order of magnitude: one colour bar for each pair.
         columns: 2,
         panels,
         titles,

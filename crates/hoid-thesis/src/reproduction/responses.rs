@@ -81,7 +81,7 @@ fn omegas() -> Vec<f64> {
         .collect()
 }
 
-/// The response of the averaged model; none if no run gives one.
+/// The response of the averaged model; none if no run gives a value.
 fn averaged(
     results: &Results,
     condition: &str,

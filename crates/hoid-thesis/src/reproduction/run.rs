@@ -1,8 +1,8 @@
-//! The whole reproduction in a directory: runs the plans that are needed, draws tables and figures,
-//! tests the claims, writes the index page.
+//! The whole reproduction in a directory: runs the required plans, draws tables and figures, tests
+//! the claims, writes the index page.
 //!
-//! Studies are in `studies/NAME`, pictures and numbers in `figures` and `tables`. A study that is
-//! already present is taken as it is, so that a reproduction that was stopped continues.
+//! Studies are in `studies/NAME`, figures and numbers in `figures` and `tables`. An existing study
+//! is used unchanged, so that a stopped reproduction continues.
 
 use std::{
     collections::BTreeSet,
@@ -27,14 +27,14 @@ use crate::{
     plans::TEXT_PLANS,
 };
 
-/// Items to be reproduced.
+/// Options of a reproduction.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reproduction {
-    /// Tables, figures, appendices, studies, or [`CLAIMS`]; all of them where nothing is named.
+    /// Tables, figures, appendices, studies, or [`CLAIMS`]; all if empty.
     pub only: Vec<String>,
     /// Replications of each cell.
     pub replications: u64,
-    /// Threads; none for one a core.
+    /// Number of threads; none for one per core.
     pub jobs: Option<usize>,
 }
 
@@ -48,12 +48,12 @@ impl Default for Reproduction {
     }
 }
 
-/// An event of a reproduction that runs.
+/// Event of a running reproduction.
 #[derive(Debug, Clone, Copy)]
 pub enum ReproductionEvent<'a> {
-    /// An estimate of a study is done.
+    /// Progress of a study.
     Progress(Progress),
-    /// A study has its results.
+    /// A study is complete.
     Study(&'a StudyEntry),
     /// Warnings about a study: damaged blocks that were computed again.
     Note(&'a str),
@@ -62,21 +62,21 @@ pub enum ReproductionEvent<'a> {
 /// Summary of a reproduction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReproductionSummary {
-    /// The page that shows it all.
+    /// Path of the page.
     pub index: PathBuf,
-    /// Tables and figures.
+    /// Number of tables and figures.
     pub items: usize,
-    /// Claims that hold, hold and more so, hold in part, do not hold, cannot be tested; none if
-    /// they were not chosen.
+    /// Numbers of claims that hold, hold and more so, hold in part, do not hold, cannot be tested;
+    /// none if they were not selected.
     pub tally: Option<[usize; 5]>,
-    /// Time that the studies took, s.
+    /// Duration of the studies, s.
     pub simulated_s: f64,
-    /// Time that the drawing took, s.
+    /// Duration of the drawing, s.
     pub drawn_s: f64,
 }
 
-/// Reproduces into a directory; none when `goes_on` has stopped it, and then it can be called again
-/// to continue.
+/// Runs the reproduction in a directory; none if `goes_on` has stopped it, in which case a further
+/// call continues.
 ///
 /// # Errors
 /// [`ThesisError::UnknownItem`]; [`ThesisError::Study`] and [`ThesisError::Io`] for failures of
@@ -129,7 +129,7 @@ pub fn reproduce(
     for name in ["figures", "tables"] {
         make_directory(&directory.join(name))?;
     }
-    // Collected by place, so that the page does not depend on which is drawn first.
+    // Collected by position, so that the page does not depend on the order of drawing.
     let made: Vec<_> = chosen
         .par_iter()
         .map(|item| write(item, &studies, directory))
@@ -164,8 +164,8 @@ pub fn reproduce(
     }))
 }
 
-/// The chosen items, by their name, their plan or the letter of an appendix, and whether the claims
-/// were.
+/// The selected items, by their name, their plan or the letter of an appendix, and whether the
+/// claims are selected.
 fn chosen(all: Vec<Item>, only: &[String]) -> Result<(Vec<Item>, bool), ThesisError> {
     if only.is_empty() {
         return Ok((all, true));
@@ -193,7 +193,7 @@ fn chosen(all: Vec<Item>, only: &[String]) -> Result<(Vec<Item>, bool), ThesisEr
     Ok((items.collect(), names.contains(&CLAIMS)))
 }
 
-/// Tests the claims of the text: their table, their part of the page, and how many hold.
+/// Tests the claims of the text: writes their table and their part of the page, and counts their verdicts.
 fn test_claims(studies: &Studies, index: &mut IndexPage, directory: &Path) -> Result<[usize; 5], ThesisError> {
     let mut evidence = Evidence::new();
     for results in studies.values() {
@@ -205,7 +205,7 @@ fn test_claims(studies: &Studies, index: &mut IndexPage, directory: &Path) -> Re
     Ok(index.tally())
 }
 
-/// Runs a named plan, or takes what is there; none when it was stopped.
+/// Runs a named plan, or reads its existing results; none if it was stopped.
 fn study(
     named: &NamedPlan,
     wanted: &Reproduction,
@@ -244,7 +244,7 @@ fn study(
     Ok(Some((entry, Results::read(&directory)?)))
 }
 
-/// Where the parts of an item were written, from the page.
+/// Paths of the parts of an item, relative to the page.
 struct Written {
     svg: Option<String>,
     data: String,

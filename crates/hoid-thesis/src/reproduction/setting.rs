@@ -168,7 +168,7 @@ fn starts_table(title: &str) -> hoid_io::OutputTable {
     let mut data = TableBuilder::new(&["start"], &["b0", "b1", "a1", "a2"]);
     let plan = plans::find("initial-conditions").and_then(|named| named.plan().ok());
     let mut known: Vec<String> = Vec::new();
-    // The starts of Table 6.1; those far away belong to a claim.
+    // The starts of Table 6.1; distant ones belong to a claim.
     let of_the_table = |estimator: &&hoid_study::plan::EstimatorCell| estimator.name == "BJ";
     for estimator in plan.iter().flat_map(|plan| &plan.estimators).filter(of_the_table) {
         if known.contains(&estimator.start) {

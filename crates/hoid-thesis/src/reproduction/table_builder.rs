@@ -2,7 +2,7 @@
 
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
 
-/// A table that grows row by row: texts and numbers under fixed names.
+/// A table built row by row: texts and numbers in named columns.
 pub(super) struct TableBuilder {
     texts: Vec<(&'static str, Vec<String>)>,
     numbers: Vec<(&'static str, Vec<f64>)>,

@@ -1,4 +1,4 @@
-//! Recursive estimates over time, the middle of all runs: Figs. 11, 12, G.1 to G.8 and H.1 to H.12.
+//! Recursive estimates over time, medians over all runs: Figs. 11, 12, G.1 to G.8 and H.1 to H.12.
 
 use hoid_study::{Query, Results, plan::Cell, statistics::quantile};
 
@@ -9,7 +9,7 @@ use super::{
 };
 use hoid_report::figures::{CurveKind, Ordinate, TraceCurve, TraceGrid, TracePanel, trace_panels};
 
-/// Which parameters a figure shows: the column of RLS, that of RPEM, name and unit of the panel.
+/// Parameter of a row of panels: the column of RLS, that of RPEM, name and unit of the panel.
 pub(super) type Row = (&'static str, &'static str, &'static str, &'static str);
 
 pub(super) const DISCRETE: [Row; 4] = [
@@ -26,8 +26,7 @@ pub(super) const OPERATOR: [Row; 5] = [
     ("zeta_nm", "zeta_nm", "zeta_nm", ""),
 ];
 
-/// An estimator of a figure: method of the colour language, name in the plan, batch fits next to
-/// it.
+/// An estimator of a figure: index of its method for the colour, name in the plan, its batch fits.
 type Curves = (usize, &'static str, &'static [(&'static str, f64, f64)]);
 
 const RLS: Curves = (0, "RLS", &[("OLS first", 0.0, 30.72), ("OLS last", 51.2, 81.92)]);
@@ -201,7 +200,7 @@ fn make(
         }
     }
     let alone = orders.len() == 1;
-    // Two next to each other where that leaves no panel alone in the last row.
+    // Two columns, unless the last row would have a single panel.
     let of_one = if panels.len().is_multiple_of(2) { 2 } else { 1 };
     let grid = TraceGrid {
         panels,
@@ -217,11 +216,11 @@ fn make(
     item.drawn(trace_panels, &grid, data)
 }
 
-/// From where on the estimates set the range of their panels, s: before, they leave their start.
+/// Time from which the estimates determine the range of their panels, s: before, they move away from their start.
 const SETTLED_S: f64 = 15.0;
 
-/// Every curve from [`SETTLED_S`] on except for its highest and lowest three per cent: no estimator
-/// is missing because another is better.
+/// Range of all curves from [`SETTLED_S`] on, except their highest and lowest three per cent: each
+/// estimator contributes, even if another one is better.
 fn ordinate(curves: &[TraceCurve]) -> Ordinate {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for curve in curves {

@@ -1,9 +1,9 @@
 //! Errors of a method in one run.
 //!
-//! At each kept time `E(t) = sqrt(mean_i |H(j omega_i, t)/H_0(j omega_i, t) - 1|^2)` over the lines
-//! of the forcing function from 0.6 to 11 rad/s (the third to the ninth: the two below turn a few
-//! times in the whole run, the last has hardly any power); H_0 is the operator of that time, held.
-//! What is reported is the root mean square of E over a span, in %:
+//! At each stored time `E(t) = sqrt(mean_i |H(j omega_i, t)/H_0(j omega_i, t) - 1|^2)` over the
+//! lines of the forcing function from 0.6 to 11 rad/s (the third to the ninth: the two below have a
+//! few periods in the whole run, the last has hardly any power); H_0 is the operator at that time,
+//! with the hold. The reported value is the root mean square of E over a span, in %:
 //!
 //! | span | from, to |
 //! |---|---|
@@ -23,15 +23,15 @@ use crate::{ThesisError, comparators::Followed, comparators::response_of};
 
 /// Spans, s.
 const SPANS_S: [(f64, f64); 3] = [(30.72, 40.96), (40.96, 46.08), (61.44, 81.93)];
-/// Parameters are examined from here on, s.
+/// Time from which parameters are evaluated, s.
 const PARAMETERS_FROM_S: f64 = 10.0;
-/// Which lines of the forcing function.
+/// Indices of the evaluated lines of the forcing function.
 pub(super) const LINES: Range<usize> = 2..9;
 
-/// Errors of one run, %; no number where there is no estimate.
+/// Errors of one run, %; not numbers if there is no estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Errors {
-    /// For the response: before, through, after.
+    /// Of the response: before, during and after the change.
     pub response: [f64; 3],
     /// Of K_e, T_L, K_e_dot, omega_nm, zeta_nm.
     pub operator: [f64; 5],
@@ -42,7 +42,7 @@ fn values(operator: &OperatorParameters) -> [f64; 5] {
     [o.k_e, o.t_l_s, o.k_e_dot(), o.omega_nm_rad_s, o.zeta_nm]
 }
 
-/// The operator of a sample of a simulated record.
+/// The true operator at a sample of a simulated record.
 fn truth(record: &Record, k: usize) -> OperatorParameters {
     let of = |name: &str| record.channel(name).map_or(f64::NAN, |values| values[k]);
     OperatorParameters {
@@ -58,10 +58,10 @@ fn root_mean_square(squares: &[f64]) -> f64 {
     100.0 * (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
-/// The errors of the findings after the samples `at`.
+/// Computes the errors of the estimates after the samples `at`.
 ///
 /// # Errors
-/// [`ThesisError::Model`] for a record that does not report what its operator was.
+/// [`ThesisError::Model`] for a record without the true operator.
 pub fn errors(record: &Record, at: &[usize], omega_rad_s: &[f64], found: &Followed) -> Result<Errors, ThesisError> {
     let mut spans = [const { Vec::new() }; 3];
     let mut parameters = [const { Vec::new() }; 5];
@@ -124,7 +124,7 @@ mod tests {
         let errors = errors(&record, &at, &omega, &found).unwrap();
         let [before, through, after] = errors.response;
         assert!(before < 1e-10, "{before}");
-        // K_e_dot = K_e T_L goes along.
+        // K_e_dot = K_e T_L changes accordingly.
         assert!(
             (through - 10.0).abs() < 1e-9 && (after - 10.0).abs() < 1e-9,
             "{errors:?}"
@@ -132,7 +132,7 @@ mod tests {
         let share = (81.92 - 40.96) / (81.92 - 10.0);
         assert!((errors.operator[0] - 10.0 * f64::sqrt(share)).abs() < 0.1, "{errors:?}");
         assert!(errors.operator[1] < 1e-10);
-        // Nothing found is not a number.
+        // A missing estimate is not a number.
         let none = Followed {
             response: vec![vec![Complex64::new(f64::NAN, 0.0); 2]; at.len()],
             operator: vec![None; at.len()],

@@ -1,8 +1,8 @@
 //! All methods of the survey on the same runs.
 //!
-//! Part II of the thesis describes the methods by which others have identified operators who change (section 2.4). A
-//! survey follows the same simulated runs with all of them: the recursive methods, as estimators of a study that
-//! anything can run, and the [`comparators`](crate::comparators), tables in a file of their own:
+//! Part II of the thesis describes the methods by which others have identified time-varying operators (section 2.4). A
+//! survey applies all of them to the same simulated runs: the recursive methods, as estimators of a study, and the
+//! [`comparators`](crate::comparators), tables in a separate file:
 //!
 //! ```toml
 //! [[comparators]]
@@ -11,8 +11,8 @@
 //! radians = 6
 //! ```
 //!
-//! All methods give the response `H(j omega, t)`, so that they are compared by it ([`measure`]); parameters are
-//! compared only for methods that have them.
+//! All methods give the response `H(j omega, t)`, by which they are compared ([`measure`]); parameters are compared
+//! only for methods that have them.
 //!
 //! | module | contents |
 //! |---|---|

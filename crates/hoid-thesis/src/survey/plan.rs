@@ -8,7 +8,7 @@ use crate::{
     comparators::{Comparator, comparators},
 };
 
-/// A plan of a survey, checked.
+/// A checked plan of a survey.
 pub struct SurveyPlan {
     /// Scenarios and estimators.
     pub study: Plan,
@@ -20,8 +20,8 @@ impl SurveyPlan {
     /// Reads and checks the texts of a study and of its comparators.
     ///
     /// # Errors
-    /// [`ThesisError::Study`] for the problems of the study, [`ThesisError::Unsuited`] and
-    /// [`ThesisError::Estimator`] for a comparator or an option of one.
+    /// [`ThesisError::Study`] for problems of the study, [`ThesisError::Unsuited`] and
+    /// [`ThesisError::Estimator`] for a comparator or one of its options.
     pub fn parse(study: &str, comparators: &str, path: &str) -> Result<Self, ThesisError> {
         let study = Plan::parse(study, path)?;
         let wrong = |quantity: &str, found: String, expected: String| ThesisError::Unsuited {

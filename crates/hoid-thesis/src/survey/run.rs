@@ -1,4 +1,4 @@
-//! Runs of a survey and what each method finds in them.
+//! Runs of a survey and the results of each method.
 
 use std::time::Instant;
 
@@ -18,7 +18,7 @@ use crate::{
     comparators::{Followed, Task},
 };
 
-/// Samples from one kept estimate to the next.
+/// Samples between stored estimates.
 const EVERY: usize = 32;
 /// First replication of the validation sets: no run of a survey has this number.
 const VALIDATION: u64 = 1 << 40;
@@ -30,20 +30,20 @@ pub struct MethodErrors {
     pub cell: u64,
     /// Name of the method in the plan.
     pub name: String,
-    /// Information given in addition to e and u; empty for none.
+    /// Information used in addition to e and u; empty for none.
     pub told: &'static str,
-    /// Errors by run; why there are none if it failed.
+    /// Errors by run; the reason if the method failed.
     pub runs: Vec<Result<Errors, String>>,
     /// Processor time of one run, s, the median.
     pub seconds: f64,
 }
 
-/// Follows all runs of a plan with all of its methods; cells in their order, and in each the
-/// estimators before the comparators. `each` is called after every run.
+/// Applies all methods of a plan to all its runs; cells in their order, and in each the estimators
+/// before the comparators. `each` is called after every run.
 ///
 /// # Errors
-/// [`ThesisError`] for a scenario that cannot be simulated. A method that fails on a run reports it
-/// in its errors.
+/// [`ThesisError`] for a scenario that cannot be simulated. The failure of a method on a run is
+/// reported in its errors.
 pub fn survey(plan: &SurveyPlan, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<MethodErrors>, ThesisError> {
     let mut all = Vec::new();
     for cell in &plan.study.cells {
@@ -126,7 +126,7 @@ fn methods_of(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Reco
     estimators.chain(comparators).collect()
 }
 
-/// Result of an estimator of a study: a recursion at each time, a batch fit the same at all.
+/// Result of an estimator of a study: a recursion at each time, a batch fit the same at all times.
 fn of_estimator(estimator: &EstimatorCell, cell: &Cell, task: &Task<'_>) -> Result<Followed, ThesisError> {
     match estimator.task_for(&cell.resolved) {
         StudyTask::Track(options) => of_trace(&track(task.record, &options, EVERY)?, task),
@@ -213,7 +213,7 @@ method = "fourier"
             own.runs[run].clone().unwrap()
         };
         for run in 0..2 {
-            // The batch fit of the end is right there and wrong before the change.
+            // The batch fit of the end is correct there and wrong before the change.
             let [before, _, after] = of("BJ", run).response;
             assert!(after < 10.0 && before > 30.0, "{before} {after}");
             // Fourier coefficients give no parameters.

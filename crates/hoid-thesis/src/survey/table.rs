@@ -1,4 +1,4 @@
-//! The tables of a survey, as they stand in `research/notes/survey-methods.md`.
+//! The tables of a survey, in the format of `research/notes/survey-methods.md`.
 
 use std::collections::BTreeMap;
 
@@ -6,13 +6,13 @@ use hoid_study::{plan::Cell, statistics::median};
 
 use super::{measure::Errors, plan::SurveyPlan, run::MethodErrors};
 
-/// Content shown for one run: three spans of the response, and K_e, K_e_dot and omega_nm.
+/// Values displayed for one run: three spans of the response, and K_e, K_e_dot and omega_nm.
 fn shown(errors: &Errors) -> [f64; 6] {
     let ([before, through, after], o) = (errors.response, errors.operator);
     [before, through, after, o[0], o[2], o[3]]
 }
 
-/// Two digits, a bar for nothing, and no more of what has left all bounds.
+/// Formats two digits, a bar for a missing value, and a limit for diverged ones.
 fn digits(value: f64) -> String {
     match value {
         v if v.is_nan() => "–".to_owned(),
@@ -22,7 +22,7 @@ fn digits(value: f64) -> String {
     }
 }
 
-/// Medians over runs, where more than half of them give a number.
+/// Medians over runs, if more than half of them give a number.
 fn medians(of: &MethodErrors) -> ([f64; 6], usize) {
     let runs: Vec<[f64; 6]> = of.runs.iter().flatten().map(shown).collect();
     let column = |i: usize| {
@@ -48,7 +48,7 @@ fn heading(cell: &Cell) -> String {
     words.join(", ")
 }
 
-/// A table of each cell, in Markdown, and one of all methods over the cells.
+/// A table for each cell, in Markdown, and one of all methods over the cells.
 pub fn survey_tables(plan: &SurveyPlan, found: &[MethodErrors]) -> String {
     let mut text = String::new();
     let mut everywhere: BTreeMap<&str, Vec<[f64; 6]>> = BTreeMap::new();

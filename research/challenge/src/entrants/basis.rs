@@ -1,12 +1,13 @@
-//! Three gains in the basis of a nominal person.
+//! Three gains in the basis of a nominal operator.
 //!
 //! `u = sum over i = 0..2 of theta_i x_i + c + v`, `x_i` the response of
-//! `s^i/((T_I s + 1)(s^2/omega^2 + 2 zeta s/omega + 1)) e^(-tau s)` to e, with T_I = 3 s, omega = 11
-//! rad/s, zeta = .25, tau = .2 s for everybody; v is autoregressive. Data of seconds determine the
-//! numerator, not poles, lag and delay (the principle of basis functions: P. S. C. Heuberger, P. M.
-//! J. Van den Hof and B. Wahlberg, *Modelling and Identification with Rational Orthogonal Basis
-//! Functions*, 2005). The noise model is fitted on the start span, by least squares and
-//! autocovariance in turn, and stays. Everything is thinned to 50 to 60 samples a second.
+//! `s^i/((T_I s + 1)(s^2/omega^2 + 2 zeta s/omega + 1)) e^(-tau s)` to e, with T_I = 3 s, omega =
+//! 11 rad/s, zeta = .25, tau = .2 s for all operators; v is autoregressive. Data of a few seconds
+//! determine the numerator, not poles, lag and delay (the principle of basis functions: P. S. C.
+//! Heuberger, P. M. J. Van den Hof and B. Wahlberg, *Modelling and Identification with Rational
+//! Orthogonal Basis Functions*, 2005). The noise model is fitted on the start span, alternating
+//! least squares and autocovariance, and then fixed. All signals are decimated to 50 to 60 samples
+//! per second.
 
 use hoid_model::Complex64;
 
@@ -18,17 +19,17 @@ use super::super::{
 
 /// Gains and constant.
 pub(super) const GAINS: usize = 4;
-/// A vector and a square matrix of them.
+/// Vector and square matrix of this size.
 pub(super) type Gains = [f64; GAINS];
 pub(super) type Square = [[f64; GAINS]; GAINS];
 
 /// Order of the noise model.
 const ORDER: usize = 16;
-/// Rate to which signals are thinned at most, Hz.
+/// Rate of the decimated signals, Hz.
 const RATE_HZ: f64 = 50.0;
-/// Seconds at the start that are left out: the filters start at rest.
+/// Omitted seconds at the start: the filters start at rest.
 const SETTLING_S: f64 = 5.0;
-/// Standard deviations beyond which a residual of the start is limited.
+/// Limit of the residuals of the start span, standard deviations.
 const LIMIT: f64 = 3.5;
 
 const NOMINAL: Operator = Operator {
@@ -49,15 +50,15 @@ pub(super) struct White {
     pub t_s: f64,
     pub x: Gains,
     pub y: f64,
-    /// True if it moves nothing: something is missing, or it is history.
+    /// True if it gives no update: a value is missing, or it is history.
     pub is_void: bool,
 }
 
-/// The whole run after the whitening filter, with the start.
+/// The whole run after the whitening filter, with the start estimate.
 #[derive(Debug)]
 pub(super) struct Whitened {
     pub samples: Vec<White>,
-    /// Time between two, s.
+    /// Sample interval, s.
     pub every_s: f64,
     /// The gains of the start span, their covariance, and the variance of the innovations.
     pub theta: Gains,
@@ -67,7 +68,7 @@ pub(super) struct Whitened {
     pub size_u: f64,
 }
 
-/// One thinned sample: time, regressors, u.
+/// One decimated sample: time, regressors, u.
 struct Plain {
     t_s: f64,
     x: Gains,
@@ -76,7 +77,7 @@ struct Plain {
 }
 
 /// # Errors
-/// Where the start span does not determine the gains.
+/// If the start span does not determine the gains.
 pub(super) fn whitened(task: &Task) -> Result<Whitened, String> {
     let plain = regressors(task);
     let thin = thinning(task);
@@ -184,7 +185,7 @@ fn autocovariance(values: &[f64]) -> Vec<f64> {
     all
 }
 
-/// Least squares, outliers limited in a second round.
+/// Least squares, with outliers limited in a second pass.
 fn least_squares(white: &[White]) -> Result<Whitened, String> {
     let mut sums = Sums::default();
     white.iter().for_each(|w| sums.add(&w.x, w.y));
@@ -219,7 +220,7 @@ pub(super) struct Sums {
     pub n: f64,
 }
 
-/// A regression.
+/// Solution of a regression.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Solved {
     pub theta: Gains,
@@ -249,7 +250,7 @@ impl Sums {
     }
 
     /// # Errors
-    /// Where the gains are not determined.
+    /// If the gains are not determined.
     pub fn solve(&self) -> Result<Solved, String> {
         let inverse = inverse(&self.xx).ok_or("the gains are not determined")?;
         let theta: Gains = std::array::from_fn(|i| product(&inverse[i], &self.xy));
@@ -270,7 +271,7 @@ pub(super) fn product(a: &Gains, b: &Gains) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// The inverse of a positive matrix by Cholesky's factors, scaled to a unit diagonal.
+/// The inverse of a positive definite matrix by Cholesky factors, scaled to a unit diagonal.
 fn inverse(matrix: &Square) -> Option<Square> {
     let scale: Gains = std::array::from_fn(|i| matrix[i][i].sqrt());
     if scale.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
@@ -300,14 +301,14 @@ fn inverse(matrix: &Square) -> Option<Square> {
     }))
 }
 
-/// Value of each gain at a frequency, after the hold; the constant nothing.
+/// Response of each regressor at a frequency, after the hold; zero for the constant.
 pub(super) fn worth(task: &Task, omega_rad_s: f64) -> [Complex64; GAINS] {
     let common = NOMINAL.response(omega_rad_s) * hold(omega_rad_s, task.sample_time);
     let s = Complex64::new(0.0, omega_rad_s);
     [common, common * s, common * s * s, Complex64::from(0.0)]
 }
 
-/// Results of gains.
+/// Estimate of the response from the gains.
 pub(super) fn reported(task: &Task, theta: &Gains, covariance: &Square) -> ReportedResponse {
     let covariance: Vec<f64> = covariance.iter().flatten().copied().collect();
     let each: Vec<_> = task.lines_rad_s.iter().map(|omega| worth(task, *omega)).collect();

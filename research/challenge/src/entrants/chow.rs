@@ -1,13 +1,13 @@
-//! The difference of the complex response at 2.5 rad/s, the last 5 s against up to 40 s before
-//! them, each with a variance of its own (G. C. Chow, Econometrica 28 (1960) 591-605; without the
+//! Test of the difference of the complex response at 2.5 rad/s between the last 5 s and up to 40 s
+//! before them, each with its own variance (G. C. Chow, Econometrica 28 (1960) 591-605; without the
 //! common variance it is Wald's test).
 //!
 //! `d = H_now - H_before`, `T = d' (C_now + C_before)^-1 d`; whitened residuals are limited at 3.5 standard deviations
-//! of the fit before. Where nothing changes T would be chi-square with two degrees of freedom, were the remnant white
-//! after the filter of the start and the basis that of this person. As neither is, T is divided by the level at which
-//! it has been so far, from the mean of its logarithm (that of a chi-square is `ln 2 - gamma`), and held against
-//! [`THRESHOLD`]. After an alarm what came before it is forgotten. The response that is reported is that of all seconds
-//! since, 40 at most.
+//! of the fit before. Without a change T would be chi-square with two degrees of freedom if the remnant were white
+//! after the filter of the start and the basis were that of the operator. Since neither holds, T is divided by its
+//! level so far, from the mean of its logarithm (that of a chi-square is `ln 2 - gamma`), and compared with
+//! [`THRESHOLD`]. After an alarm the data before it are discarded. The reported response is that of all seconds since,
+//! at most 40.
 
 use std::collections::VecDeque;
 
@@ -18,23 +18,23 @@ use super::{
     basis::{Solved, Square, Sums, product, reported, whitened, worth},
 };
 
-/// Seconds of a block, and blocks of present and past; the least of before.
+/// Length of a block, s, and blocks of present and past; the smallest number before.
 const BLOCK_S: f64 = 0.25;
 const NOW: usize = 20;
 const BEFORE: usize = 160;
 const LEAST_BEFORE: usize = 24;
-/// Seconds before an alarm that are kept.
+/// Number of seconds before an alarm that are kept.
 const KEPT: usize = 12;
 const AT_RAD_S: f64 = 2.5;
 const LIMIT: f64 = 3.5;
-/// T over its level from which a change is declared, in a given number of blocks one after the other. In runs 2 to 5 of
-/// the cases without a change (open seeds; 1.8 h), which are in no table, 6, 8, 12 and 25 are passed 32, 15, 9 and 5
-/// times; except for a missing and a silent span 21, 5, 0 and 0 times.
+/// Ratio of T to its level above which a change is declared, in a given number of consecutive blocks. In runs 2 to 5 of
+/// the cases without a change (open seeds; 1.8 h), which are in no table, 6, 8, 12 and 25 are exceeded 32, 15, 9 and 5
+/// times; excluding a missing and a silent span 21, 5, 0 and 0 times.
 const THRESHOLD: f64 = 10.0;
 const PERSISTENCE: usize = 4;
-/// Expectation of the logarithm of a chi-square with two degrees of freedom; what the level is
-/// supposed to be above it, for how many blocks that counts, and of how many it is a mean at most; by
-/// how much a logarithm raises it at most.
+/// Expectation of the logarithm of a chi-square with two degrees of freedom; prior of the level
+/// above it, its weight in blocks, and the memory of the mean in blocks; largest increase by one
+/// logarithm.
 const MEAN_LOG: f64 = 0.115_931_515_658_412_45;
 const DEFAULT_LEVEL: f64 = 0.5;
 const SUPPOSED: f64 = 10.0;

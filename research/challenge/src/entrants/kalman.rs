@@ -1,9 +1,9 @@
-//! Three gains of a nominal person as a random walk, after a whitening filter: recursive least
+//! Three gains of a nominal operator as a random walk, after a whitening filter: recursive least
 //! squares with a population basis (R. E. Kalman, J. Basic Engineering 82 (1960) 35-45; L. Ljung,
 //! *System Identification*, 1999, section 11.6).
 //!
-//! The gains drift by a tenth of the response at 2 rad/s in a root second; innovations are limited
-//! at 3.5 standard deviations. Nothing is declared.
+//! The gains drift by a tenth of the response at 2 rad/s per root second; innovations are limited
+//! at 3.5 standard deviations. No changes are declared.
 
 use super::{
     super::entrant::{Entrant, EntrantResult, Task},

@@ -1,8 +1,7 @@
 //! The methods of `hoid_track` with their default options.
 //!
-//! Where the delay is reported, it is given; where it is not, it is searched on the start span over
-//! the range that the program searches, the other orders as they are. H is the response that a row
-//! or a tracker reports.
+//! If the delay is given, it is used; otherwise it is selected on the start span over the range of
+//! the program, with the other orders unchanged. H is the response of a row or of a tracker.
 
 use hoid_ident::{
     OrderRanges,
@@ -25,7 +24,7 @@ impl Entrant for OfMethod {
         let options = self.options(task)?;
         match task.record() {
             Some(record) if task.seam.is_none() => {
-                // Rows at every half second, on which all times that are requested lie.
+                // Rows every half second, which include all requested times.
                 let every = (0.5 / task.sample_time.s()).round() as usize;
                 let trace = track(&record, &options, every).map_err(|e| e.to_string())?;
                 let row = |t_s: &f64| ((t_s / task.sample_time.s() / every as f64 + 1e-6) as usize).max(1) - 1;
@@ -77,8 +76,8 @@ fn alarms(changes: &[(f64, Change)]) -> Vec<Alarm> {
     changes.iter().map(of).collect()
 }
 
-/// Sample by sample: data that a record does not hold, missing samples and the history of a second
-/// recording.
+/// Sample by sample: for data that a record cannot hold, missing samples and the history of a
+/// second recording.
 fn over_samples(task: &Task, options: &TrackOptions) -> Result<EntrantResult, String> {
     let span = task.start_record().ok_or("the start span is not all there")?;
     let mut tracker = Tracker::new(options, Some(&span), task.sample_time).map_err(|e| e.to_string())?;
@@ -97,7 +96,7 @@ fn over_samples(task: &Task, options: &TrackOptions) -> Result<EntrantResult, St
         let t_s = task.time_s(k);
         tracker.update(sample, t_s >= moves_from - task.sample_time.s() / 2.0);
         changes.extend(tracker.change().map(|change| (t_s, change)));
-        // The last sample before the time, as the rows of a trace have it.
+        // The last sample before the time, as in the rows of a trace.
         while task.asked_s.get(next).is_some_and(|t| task.sample(*t) <= k + 1) {
             let each = task.lines_rad_s.iter().map(|omega| tracker.response(*omega));
             answer
@@ -110,7 +109,7 @@ fn over_samples(task: &Task, options: &TrackOptions) -> Result<EntrantResult, St
     Ok(answer)
 }
 
-/// The report at a time; nothing while one of the responses is missing.
+/// The estimate at a time; nothing while one of the responses is missing.
 fn reported(responses: Option<Vec<Response>>, operator: Option<&OperatorEstimate>) -> ReportedResponse {
     let Some(responses) = responses else {
         return ReportedResponse::default();
@@ -159,7 +158,7 @@ mod tests {
         )
     }
 
-    /// Sample by sample is the same as over a record.
+    /// Processing sample by sample gives the same as a record.
     #[test]
     fn both_ways_say_the_same() {
         let task = task("change-K_e_dot-100");
@@ -180,8 +179,8 @@ mod tests {
         }
     }
 
-    /// In a loop of small margin the error is nearly a sine, whose phase gains that walk follow as well as any delay:
-    /// who may walk from the start on ends far from the person.
+    /// In a loop with a small margin the error is nearly a sine, whose phase drifting gains fit as well as any delay: a
+    /// method whose gains drift from the start ends far from the operator.
     #[test]
     fn a_loop_of_small_margin_leads_nobody_astray() {
         let case = cases().into_iter().find(|case| case.name == "change-omega-30").unwrap();

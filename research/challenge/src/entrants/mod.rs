@@ -1,4 +1,4 @@
-//! Those who take part.
+//! The participants.
 //!
 //! | file | contents |
 //! |---|---|
@@ -16,7 +16,7 @@ mod threshold;
 
 use super::entrant::Entrant;
 
-/// All of them: the methods in the order of their registry, then the plain ones.
+/// All participants: the methods in the order of their registry, then the simple ones.
 pub fn entrants() -> Vec<Box<dyn Entrant>> {
     let mut all: Vec<Box<dyn Entrant>> = Vec::new();
     for method in hoid_survey::methods() {

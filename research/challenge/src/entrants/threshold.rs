@@ -1,6 +1,6 @@
-//! The published baseline: a change is declared where the error or its rate is larger than three of
-//! its standard deviations in the start span (R. A. Hess, J. Guidance, Control, and Dynamics 32
-//! (2009); [`ErrorThreshold`]). Within 8 s of an alarm there is no other. It knows no response.
+//! The published baseline: a change is declared if the error or its rate exceeds three of its
+//! standard deviations in the start span (R. A. Hess, J. Guidance, Control, and Dynamics 32 (2009);
+//! [`ErrorThreshold`]). There are no further alarms within 8 s. It estimates no response.
 
 use hoid_track::ErrorThreshold;
 

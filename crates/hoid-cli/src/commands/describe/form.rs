@@ -1,4 +1,4 @@
-//! A description as a page for people.
+//! A description as a page of text.
 
 use hoid::analysis::Described;
 use hoid::ident::frequency::Realisation;
@@ -7,14 +7,14 @@ use hoid::report::numbers;
 
 use crate::text;
 
-/// A description as it is shown.
+/// A description to display.
 pub struct Shown<'a> {
     pub described: &'a Described,
     pub element: Option<&'a ContinuousTransferFunction>,
 }
 
 impl Shown<'_> {
-    /// The described response, in a line.
+    /// Description of the response, in one line.
     pub fn title(&self) -> String {
         let (found, names) = (
             &self.described.found,
@@ -41,7 +41,7 @@ impl Shown<'_> {
         )
     }
 
-    /// The page: its reliability first; with `verbose` every setting.
+    /// The page: its verdict first; all settings with `verbose`.
     pub fn page(&self, verbose: bool) -> String {
         let Described { found, data, settings } = self.described;
         let function = &found.function;

@@ -1,5 +1,5 @@
-//! `hoid describe`: how a person responds at the lines of a periodic excitation. `run` takes
-//! records to a description; `form` shows it, to people and to programs.
+//! `hoid describe`: the response of an operator at the lines of a periodic excitation. `run`
+//! computes the description from records; `form` formats it as text and JSON.
 
 mod form;
 mod run;

@@ -1,4 +1,4 @@
-//! A finished group as a page for people and as an object for programs.
+//! A finished group as a page of text and as a JSON object.
 
 use hoid::ident::family::Parameter;
 use hoid::model::VerdictLevel;
@@ -17,7 +17,7 @@ pub struct Finished<'a> {
 }
 
 impl Finished<'_> {
-    /// The page: what failed and what is doubtful first, then the people.
+    /// The page: failures and doubtful results first, then the people.
     pub fn page(&self, verbose: bool) -> String {
         let GroupSummary {
             runs,
@@ -122,7 +122,7 @@ fn person(p: &Person) -> Value {
     Value::Object(map)
 }
 
-/// Ends of an interval that are open are null.
+/// Open ends of an interval are null.
 fn parameter(p: &Parameter) -> Value {
     json!({
         "value": json::number(p.value),

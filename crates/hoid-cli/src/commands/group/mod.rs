@@ -1,5 +1,5 @@
-//! `hoid group`: recorded runs by subject and condition. `form` shows what came out, to people and
-//! to programs, `pooled` what is found of each person from all of them.
+//! `hoid group`: recorded runs by subject and condition. `form` formats the results as text and
+//! JSON, `pooled` computes the estimates of each person with partial pooling.
 
 mod form;
 mod pooled;
@@ -27,7 +27,7 @@ use crate::{
     json, output,
 };
 
-/// Reasons in the message of a group that has no result; the page has all of them.
+/// Maximum number of reasons in the message of a group without result; the page contains all of them.
 const REASONS_OF_EXIT: usize = 3;
 
 pub fn run(args: &GroupArgs) -> Result<(), CliError> {
@@ -117,7 +117,7 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
     };
     let evidence = inspect(&mut manifest, &args.directory, &known)?;
     if args.out.is_some() {
-        // The files are named from where the manifest is.
+        // File names are relative to the manifest.
         let directory = args.directory.canonicalize().unwrap_or_else(|_| args.directory.clone());
         for run in &mut manifest.runs {
             run.file = directory.join(&run.file);
@@ -171,7 +171,7 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
     paper_table::check(&args.show)?;
     output_paths::check(&[&path], &[args.show.table.as_deref()], &[])?;
     let manifest = Manifest::read(&path)?;
-    // What continues writes no manifest.
+    // A resumed group writes no manifest.
     if !args.resume {
         hoid::io::check_output_directory(out, &[&path])?;
     }
@@ -222,7 +222,7 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
     Ok(())
 }
 
-/// A file for each condition: the name as it is typed for one, with the condition after it for
+/// One file for each condition: the given name for one condition, with the condition appended for
 /// several.
 fn draw(figures: &[(String, String)], place: &Path, width_mm: Option<f64>) -> Result<(), CliError> {
     if figures.is_empty() {

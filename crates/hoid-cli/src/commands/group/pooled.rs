@@ -1,4 +1,5 @@
-//! `hoid group --pool`: people from all of them, and the populations of the conditions, as files and on the page.
+//! `hoid group --pool`: estimates of people with partial pooling, and the populations of the conditions, as files and
+//! on the page.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +14,7 @@ use crate::{error::CliError, text};
 
 const TABLE: &str = "pooled.csv";
 
-/// The populations, and the files that were written.
+/// Returns the populations, and the written files.
 pub fn pooled(
     manifest: &Manifest,
     summary: &GroupSummary,
@@ -36,7 +37,7 @@ pub fn pooled(
     Ok((populations, files))
 }
 
-/// A condition as a part of the name of a file.
+/// A condition as part of a file name.
 pub fn in_a_file_name(condition: &str) -> String {
     condition.replace(|c: char| !c.is_ascii_alphanumeric() && c != '-' && c != '_', "-")
 }
@@ -46,7 +47,7 @@ pub fn objects(populations: &[Population]) -> Value {
     populations.iter().map(Population::json).collect()
 }
 
-/// Statement of the page about them.
+/// The part of the page about the populations.
 pub fn page(populations: &[Population], files: &[PathBuf]) -> String {
     let mut rows = text::table(&[
         "condition",

@@ -1,4 +1,4 @@
-//! The operator of a person, shown to people.
+//! The operator of a person as text.
 
 use hoid::analysis::{Account, Identified, Setting};
 use hoid::ident::{
@@ -11,11 +11,11 @@ use hoid::report::{numbers, sentence_of_operator, undetermined};
 
 use crate::{error::CliError, text};
 
-/// Standard errors of tau_e, and a time in s, that half a sample is more than where both delays are printed.
+/// Standard errors of tau_e, and a time in s, that half a sample must exceed for both delays to be printed.
 const STRAIGHT_ERRORS: f64 = 2.0;
 const LEAST_HALF_S: f64 = 0.007;
 
-/// Frequencies at which a response to a target is shown with the controlled element, rad/s.
+/// Frequencies at which a response to a target is shown in series with the controlled element, rad/s.
 const AT_RAD_S: [f64; 3] = [1.0, 2.5, 4.0];
 
 /// All results.
@@ -23,7 +23,7 @@ pub struct FamilyReport<'a> {
     pub identified: &'a Identified,
     pub fit: &'a FamilyFit,
     pub files: &'a [String],
-    /// As they were fitted: without their mean.
+    /// The records of the fit, without their mean.
     pub records: &'a [Record],
     pub accounts: &'a [Account],
     pub element: Option<&'a ContinuousTransferFunction>,
@@ -32,7 +32,7 @@ pub struct FamilyReport<'a> {
 }
 
 impl FamilyReport<'_> {
-    /// The answer, and with `verbose` the rest.
+    /// The result; details with `verbose`.
     pub fn page(&self, verbose: bool) -> Result<String, CliError> {
         let mut page = self.answer(verbose)?;
         if !verbose {
@@ -49,7 +49,7 @@ impl FamilyReport<'_> {
         Ok(page)
     }
 
-    /// Verdict, parameters with their intervals, loop, fit, and what they are of.
+    /// Verdict, parameters with their intervals, loop, fit, and the analysed records.
     fn answer(&self, verbose: bool) -> Result<String, CliError> {
         let fit = self.fit;
         let gain = self.records.first().map(GainUnit::of).unwrap_or_default();
@@ -82,7 +82,7 @@ impl FamilyReport<'_> {
             coherence.map_or_else(String::new, |share| format!(
                 "; coherence of u with the excitation {share:.2}"
             )),
-            // Where they do not, a finding reports it.
+            // If they do not, a finding reports it.
             match fit.agreement.is_some() && fit.verdict.findings().iter().all(|found| found.kind != "agreement") {
                 true => "; the methods agree",
                 false => "",
@@ -98,7 +98,7 @@ impl FamilyReport<'_> {
         Ok(page)
     }
 
-    /// The responses to inputs in addition to the error.
+    /// The responses to inputs other than the error.
     fn channels(&self, gain: &GainUnit, verbose: bool) -> String {
         let mut page = String::new();
         for channel in &self.fit.channels {
@@ -131,8 +131,8 @@ impl FamilyReport<'_> {
         page
     }
 
-    /// What a response to a target does with the controlled element: one in all where the target alone moves the machine
-    /// along with it.
+    /// The response to a target in series with the controlled element: equal to one if the target by itself makes the
+    /// output follow it.
     fn with_element(&self, channel: &ChannelFit) -> String {
         let Some(element) = self.element.filter(|_| channel.role == ChannelRole::Feedforward) else {
             return String::new();
@@ -187,7 +187,7 @@ impl FamilyReport<'_> {
         )
     }
 
-    /// The errors of the person, where they are larger than those of their runs.
+    /// The errors of the person, if they are larger than those of the runs.
     fn of_person(&self) -> String {
         let fit = self.fit;
         if fit.run_to_run == 0.0 || fit.operators.len() > 1 {
@@ -223,7 +223,7 @@ impl FamilyReport<'_> {
         }
     }
 
-    /// The methods side by side.
+    /// The results of the methods for comparison.
     fn methods(&self) -> String {
         let fit = self.fit;
         let gain = self.records.first().map(GainUnit::of).unwrap_or_default();
@@ -355,7 +355,7 @@ fn named(p: &Parameter, gain: &GainUnit) -> String {
     }
 }
 
-/// Value and error with the digits that the error allows; no false digits where the error exceeds
+/// Value and error with the digits that the error permits; no spurious digits if the error exceeds
 /// the value.
 fn with_error(value: f64, error: Option<f64>) -> String {
     match error {
@@ -369,7 +369,7 @@ fn with_error(value: f64, error: Option<f64>) -> String {
     }
 }
 
-/// Parameters with interval, prior share and whether they are determined.
+/// Parameters with interval and share of the prior, and whether they are determined.
 fn parameters(of: &[Parameter], gain: &GainUnit) -> String {
     let mut rows = text::table(&["parameter", "value", "95 % from", "to", "of it prior"]);
     for p in of {

@@ -1,4 +1,4 @@
-//! `hoid identify`: records to a model and the operator's parameters.
+//! `hoid identify`: from records to a model and the parameters of the operator.
 
 mod family;
 mod family_form;

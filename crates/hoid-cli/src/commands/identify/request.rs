@@ -10,7 +10,7 @@ use crate::{args::IdentifyArgs, error::CliError, output};
 const ROLE: &str = "role";
 const FEEDBACK: &str = "feedback";
 
-/// The request, the options checked against each other.
+/// Returns the request, with the options checked for consistency.
 ///
 /// # Errors
 /// [`CliError::Usage`].
@@ -32,7 +32,7 @@ pub fn asked(args: &IdentifyArgs) -> Result<ResolvedRequest, CliError> {
     }
 }
 
-/// The options by their names; every input in addition to the first has a role.
+/// The options by their names; every input other than the first has a role.
 fn options(args: &IdentifyArgs) -> Result<BTreeMap<String, String>, CliError> {
     let given = args.options.given();
     let mut all: BTreeMap<String, String> = given.map(|(name, text)| (name.to_owned(), text.to_owned())).collect();
@@ -64,7 +64,7 @@ fn options(args: &IdentifyArgs) -> Result<BTreeMap<String, String>, CliError> {
     Ok(all)
 }
 
-/// The first option of reading and writing that has no meaning for what is asked, and what it belongs to.
+/// The first option of reading and writing that does not apply to the request, and the analysis to which it belongs.
 fn misplaced(args: &IdentifyArgs, asked: &ResolvedRequest) -> Option<(&'static str, &'static str)> {
     let changing = matches!(asked, ResolvedRequest::Change(_));
     let steady = "a model that does not change";

@@ -1,4 +1,4 @@
-//! From records to a model: read, fit, judge, write.
+//! From records to a model: reading, fit, verdict, writing.
 
 use std::path::{Path, PathBuf};
 
@@ -39,7 +39,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let read = reading.files(&args.records, reading::told)?;
     let (rate, counts) = (args.read.prepare.rate.decimate, asked.counts_samples());
     reading::say_kept(read.kept_rate(rate, counts));
-    // Read before anything is written: a bad validation file leaves nothing behind.
+    // Read before anything is written: an invalid validation file leaves no output.
     let other = args.validate.as_deref();
     let other = other.map(|path| reading.file(path, reading::told)).transpose()?;
     match asked {
@@ -63,7 +63,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     }
 }
 
-/// Writes and prints a fit of polynomials.
+/// Writes and prints the fit of a polynomial model.
 fn show<F: BatchAnswer>(
     args: &IdentifyArgs,
     found: &Identified<F>,
@@ -120,7 +120,7 @@ fn show<F: BatchAnswer>(
     CliError::of_verdict(verdict)
 }
 
-/// The describing function of the records, where they have a recorded excitation.
+/// The describing function of the records, if they have a recorded excitation.
 fn description(args: &IdentifyArgs, data: &Recordings) -> Option<Description> {
     data.described(&Excitation::default(), None, args.faults.faults)
         .ok()
@@ -154,7 +154,7 @@ fn prediction_ahead(fit: &Fit, records: &[Record], k: usize) -> Result<(usize, f
     Ok((k, vaf(&measured, &predicted), nrmse_fit(&measured, &predicted)))
 }
 
-/// The answer as text.
+/// The result as a sentence.
 fn sentence(found: &PolynomialAnswer<'_>) -> Option<String> {
     let of = found.operator.as_ref().ok().filter(|_| found.has_operator());
     let named = of.iter().flat_map(|o| o.rows()).map(|(name, _, e)| (name, e.value));
@@ -166,7 +166,7 @@ fn sentence(found: &PolynomialAnswer<'_>) -> Option<String> {
     )
 }
 
-/// The answer, and with `verbose` the rest.
+/// The result; details with `verbose`.
 fn page(found: &PolynomialAnswer<'_>, verbose: bool) -> String {
     let mut page = answer(found);
     if verbose {
@@ -177,7 +177,7 @@ fn page(found: &PolynomialAnswer<'_>, verbose: bool) -> String {
     page
 }
 
-/// Verdict, parameters with their intervals, fit, and what they are of.
+/// Verdict, parameters with their intervals, fit, and the analysed records.
 fn answer(found: &PolynomialAnswer<'_>) -> String {
     let fit = found.fit;
     let gain = found.records.first().map(GainUnit::of).unwrap_or_default();
@@ -191,7 +191,7 @@ fn answer(found: &PolynomialAnswer<'_>) -> String {
         Some(family) => Some(family_operator::to_text(family, &gain)),
         None => Some(text::operator(&found.operator, &gain)),
     };
-    // Where there is no operator the coefficients are the answer.
+    // Without an operator the coefficients are the result.
     if !found.has_operator() {
         page.push_str(&text::coefficients(fit));
     }
@@ -232,7 +232,7 @@ fn answer(found: &PolynomialAnswer<'_>) -> String {
     page
 }
 
-/// The candidates tried, coefficients, roots, tests of the residuals, settings.
+/// The candidates tried, coefficients, roots, residual tests, settings.
 fn details(found: &PolynomialAnswer<'_>) -> String {
     let fit = found.fit;
     let mut page = "\n".to_owned();
@@ -250,7 +250,7 @@ fn details(found: &PolynomialAnswer<'_>) -> String {
     page.push_str(&text::quality(fit, &found.quality));
     page.push('\n');
     page.push_str(&text::roots(fit));
-    // Residuals that are rounding carry no information.
+    // Residuals of the size of rounding errors carry no information.
     if fit.covariance().is_some() {
         page.push_str(&text::residual_tests(found.files, &found.validations));
     }

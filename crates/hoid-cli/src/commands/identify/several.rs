@@ -11,10 +11,10 @@ use crate::{
     json, output, text,
 };
 
-/// Options that have a meaning for them.
+/// Options that apply to several inputs.
 const OPTIONS: [&str; 3] = ["orders", "nk", "role"];
 
-/// The structure, where polynomials with several inputs are requested.
+/// The structure, if a polynomial model with several inputs is requested.
 pub fn structure(args: &IdentifyArgs) -> Option<Structure> {
     let name = args.structure.as_deref()?.trim().to_ascii_lowercase();
     (args.read.inputs.len() > 1).then(|| name.parse().ok()).flatten()

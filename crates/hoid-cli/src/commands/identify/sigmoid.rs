@@ -64,11 +64,11 @@ fn trace(fit: &SigmoidFit, record: &Record) -> Result<Record, CliError> {
             });
         }
     }
-    // A gain is always there.
+    // There is always a gain.
     Ok(trace.unwrap_or_else(|| record.clone()))
 }
 
-/// Name of each parameter of an operator, before and after the change.
+/// Names of the parameters of an operator, before and after the change.
 fn before_and_after(fit: &SigmoidFit) -> String {
     let mut rows = text::table(&["parameter", "before the change", "", "after it", "", "unit"]);
     let (before, after) = (fit.initial_operator(), fit.last_operator());
@@ -96,7 +96,7 @@ struct SigmoidReport<'a> {
 }
 
 impl SigmoidReport<'_> {
-    /// The answer, and with `verbose` the rest.
+    /// The result; details with `verbose`.
     fn page(&self, verbose: bool) -> String {
         let Self {
             fit,
@@ -171,7 +171,7 @@ impl SigmoidReport<'_> {
             fit.residual_count(),
             numbers::plain(fit.innovation_variance())
         ));
-        // Residuals that are rounding carry no information.
+        // Residuals of the size of rounding errors carry no information.
         if fit.covariance().is_some() {
             let mut coloured = false;
             for (file, test) in files.iter().zip(tests) {

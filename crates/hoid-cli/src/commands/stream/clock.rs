@@ -1,30 +1,28 @@
-//! The times of the lines against an even grid: which samples are missing, which lines come too
-//! late.
+//! Comparison of the times of the lines with an even grid: missing samples and late lines.
 //!
-//! Live times jitter, and the clock that made them is not quite that of `--fs`. The grid therefore
-//! follows the times with a small gain; a line is late by whole samples when it lies beyond half a
-//! sample of the place where the next one is expected.
+//! Live times jitter, and their clock differs slightly from that of `--fs`. The grid therefore
+//! follows the times with a small gain; a line is late by whole samples if it deviates by more than
+//! half a sample from the expected time.
 
-/// Share of the difference by which the grid follows the times.
+/// Gain with which the grid follows the times.
 const GAIN: f64 = 0.1;
-/// Longest gap that is bridged, s.
+/// Longest gap that is filled, s.
 pub const LONGEST_GAP_S: f64 = 10.0;
-/// Lines in a row, each later than the one before, after which a clock is trusted to have been set
-/// back.
+/// Number of consecutive lines with increasing times after which a clock counts as set back.
 const SET_BACK: usize = 10;
-/// Samples by which the grid may run ahead of the times before that is reported.
+/// Number of samples by which the grid may lead the times before this is reported.
 const AHEAD: f64 = 2.0;
 
-/// Lines over which the rate of the times is judged.
+/// Number of lines over which the rate of the times is checked.
 const JUDGED: usize = 128;
-/// Share by which the rate may differ from `--fs`.
+/// Largest relative deviation of the rate from `--fs`.
 const OFF: f64 = 0.05;
 
-/// Content of the time of a line.
+/// Result for the time of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Arrival {
-    /// The next sample, after a number of missing ones that are to be bridged; `left_out` when the
-    /// gap was longer than that.
+    /// The next sample, after a number of missing ones to be filled; `left_out` if the gap was
+    /// longer than that.
     Sample { missing: usize, left_out: bool },
     /// Not later than the last line.
     Behind { last_s: f64 },
@@ -34,12 +32,12 @@ pub enum Arrival {
 #[derive(Debug)]
 pub struct Clock {
     sample_time_s: f64,
-    /// Place of the last sample on the grid, and its time.
+    /// Position of the last sample on the grid, and its time.
     last: Option<(f64, f64)>,
-    /// Last line behind, and how many in a row.
+    /// Last line with a decreasing time, and the number of consecutive ones.
     behind: Option<(f64, usize)>,
     hurried: bool,
-    /// Differences of the times that are judged next, s.
+    /// Differences of the times for the next check, s.
     steps: Vec<f64>,
 }
 
@@ -54,7 +52,7 @@ impl Clock {
         }
     }
 
-    /// Takes the time of a line.
+    /// Processes the time of a line.
     pub fn take(&mut self, t: f64) -> Arrival {
         let ts = self.sample_time_s;
         let next = Arrival::Sample {
@@ -101,9 +99,9 @@ impl Clock {
         }
     }
 
-    /// The rate of the times in Hz, where it is another than `--fs`: asked after each line, it answers once in
-    /// [`JUDGED`] lines. The median of the differences is compared with single gaps, their mean against times that are
-    /// rounded; both have to be off.
+    /// The rate of the times in Hz, if it differs from `--fs`: called after each line, it returns a value at most once
+    /// in [`JUDGED`] lines. The median of the differences is insensitive to single gaps, their mean to rounded times;
+    /// both have to deviate.
     pub fn other_rate(&mut self) -> Option<f64> {
         if self.steps.len() < JUDGED {
             return None;
@@ -116,7 +114,7 @@ impl Clock {
         (is_off(median) && is_off(mean)).then_some(1.0 / median)
     }
 
-    /// True once when the lines have come faster than the sampling frequency reports.
+    /// True once if the lines have arrived faster than the sampling frequency.
     pub fn hurried(&mut self) -> bool {
         std::mem::take(&mut self.hurried)
     }
@@ -165,7 +163,7 @@ mod tests {
             assert_eq!(clock.take(t), Arrival::Behind { last_s: 1.0 });
         }
         assert_eq!(missing(&mut clock, 1.01), 0);
-        // One wild time does not end the stream.
+        // A single wrong time does not end the stream.
         missing(&mut clock, 1e300);
         for k in 0..9 {
             assert!(matches!(clock.take(1.02 + 0.01 * f64::from(k)), Arrival::Behind { .. }));

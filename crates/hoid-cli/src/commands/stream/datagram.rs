@@ -1,5 +1,5 @@
-//! Samples and estimates as datagrams: lines of text as on standard input (cells, or objects of JSON), or
-//! structs of C, least byte first and without gaps.
+//! Samples and estimates as datagrams: lines of text as on standard input (cells, or JSON objects), or C structs,
+//! little-endian and packed.
 //!
 //! ```c
 //! struct sample {             /* 40 bytes */
@@ -20,7 +20,7 @@
 //! };
 //! ```
 //!
-//! What is not known is NaN.
+//! Unknown values are NaN.
 
 use hoid::model::{SampleTime, VerdictLevel, uncertainty::Estimate};
 use hoid::track::{Change, Live};
@@ -28,11 +28,11 @@ use hoid::track::{Change, Live};
 use super::lines::StreamSample;
 
 const MAGIC: &[u8; 4] = b"hoid";
-/// Bytes of a sample and of an estimate.
+/// Size of a sample and of an estimate, bytes.
 const SAMPLE: usize = 40;
 const ESTIMATE: usize = 168;
 
-/// Definition of a datagram.
+/// Content of a datagram.
 #[derive(Debug, PartialEq)]
 pub enum Datagram<'b> {
     Sample(SampleDatagram),
@@ -86,7 +86,7 @@ impl SampleDatagram {
         }
     }
 
-    /// As a line would be read: a value with a fault is NaN.
+    /// Converts it like a line: an invalid value is NaN.
     pub fn read(&self, sample_time: SampleTime, largest: f64) -> StreamSample {
         let sound = |v: f64| v.abs() <= largest;
         let told = |name: &str, v: f64| (!sound(v)).then(|| format!("{name} is {v}"));

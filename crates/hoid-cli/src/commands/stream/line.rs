@@ -10,21 +10,21 @@ use crate::json;
 /// Counts since the start.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Counts {
-    /// Samples, those with a fault and missing ones included.
+    /// Number of samples, including invalid and missing ones.
     #[serde(skip)]
     pub samples: u64,
-    /// Samples with a fault in e or u, missing ones included.
+    /// Number of samples with an invalid e or u, including missing ones.
     pub skipped: u64,
-    /// Samples that the guard held back, or during which it let the estimate stay constant.
+    /// Number of samples held back by the guard, or during which it froze the estimate.
     pub held: u64,
-    /// How often the guard started the estimate again.
+    /// Number of restarts by the guard.
     pub restarts: u64,
-    /// For these, samples that were missing by the column t.
+    /// Number of these samples that were missing according to the column t.
     #[serde(skip)]
     pub bridged: u64,
-    /// Steps that stability or a bound made shorter.
+    /// Number of steps shortened by stability or a bound.
     pub shortened: u64,
-    /// Lines that could not be taken for a sample.
+    /// Number of lines that are not samples.
     pub dropped: u64,
 }
 
@@ -56,8 +56,7 @@ struct Line<'a> {
     warm_up: Option<WarmUp<'a>>,
 }
 
-/// Known properties of a change: the odds at every line, the rest at the first line after one was
-/// declared.
+/// State of a change: the odds in every line, the rest in the first line after its declaration.
 #[derive(Serialize)]
 struct ChangeLine {
     log_odds: Option<f64>,
@@ -65,7 +64,7 @@ struct ChangeLine {
     declared: Option<Value>,
 }
 
-/// The rate at which a fast stream is tracked, and by how much the estimate is after its line.
+/// The rate at which a fast stream is tracked, and the lag of the estimate with respect to its line.
 #[derive(Serialize)]
 struct Rate {
     factor: usize,
@@ -120,7 +119,7 @@ impl From<&Estimate> for Number {
     }
 }
 
-/// Where the recursion is after a line of the input.
+/// State of the recursion after a line of the input.
 pub struct StreamStatus<'a> {
     /// Time of the last sample, s.
     pub t: Option<f64>,
@@ -135,17 +134,17 @@ pub struct StreamStatus<'a> {
     pub event: Option<TrackFault>,
     /// Faults since the last line.
     pub fault: Option<String>,
-    /// How the rate was lowered.
+    /// The decimation, if any.
     pub decimated: Option<Decimated>,
     /// Findings that make the whole stream doubtful.
     pub finding: Option<&'a Finding>,
 }
 
 impl StreamStatus<'_> {
-    /// Writes the line into a buffer, its end included.
+    /// Writes the line to a buffer, including its end.
     ///
     /// # Errors
-    /// The errors of the serialiser, which a buffer in memory does not have.
+    /// Errors of the serialiser, which do not occur for a buffer in memory.
     pub fn write(&self, buffer: &mut Vec<u8>) -> serde_json::Result<()> {
         let tracker: Option<&Tracker> = match self.live {
             Live::Tracking(tracker) => Some(tracker),
@@ -166,7 +165,7 @@ impl StreamStatus<'_> {
                 names: self.names,
                 estimates: t.parameters(),
             }),
-            // Other orders have no meaning as an operator at all.
+            // Other orders cannot be converted to an operator.
             operator: (operator.zip(tracker))
                 .map(|(o, t)| json::tracked_operator(&o, |o| t.determined(o)))
                 .filter(|o| !o.is_null()),
@@ -177,7 +176,7 @@ impl StreamStatus<'_> {
             open_loop: tracker.and_then(Tracker::open_loop).as_ref().map(json::open_loop),
             innovation: self.innovation,
             change: tracker.and_then(Tracker::change_odds).map(|odds| ChangeLine {
-                // Before the first birth there are no odds.
+                // There are no odds before the first hypothesis of a change.
                 log_odds: odds.is_finite().then_some(odds),
                 declared: self.change.as_ref().map(|(t, change)| json::change(*t, change)),
             }),

@@ -1,5 +1,5 @@
-//! Lines of a stream, as hostile as they come: what they mean, or why they mean nothing. Nothing
-//! here ends a stream but a header that lacks a column.
+//! Lines of a stream from untrusted sources: their meaning, or the reason why they have none. Only
+//! a header that lacks a column ends a stream.
 
 use std::io::{self, BufRead, ErrorKind};
 
@@ -9,10 +9,10 @@ use serde_json::{Map, Value};
 
 use crate::error::CliError;
 
-/// Longest line that is examined, bytes; of a longer one the rest is left out, so that memory stays
+/// Maximum length of a line, bytes; the rest of a longer one is skipped, so that memory stays
 /// bounded.
 const LONGEST: usize = 1 << 16;
-/// Characters of a faulty cell that are shown.
+/// Maximum number of characters of an invalid cell in messages.
 const SHOWN: usize = 24;
 
 /// Lines of bounded length.
@@ -29,7 +29,7 @@ impl<R: BufRead> Lines<R> {
         }
     }
 
-    /// The next line without its end; `Err` inside for a line that is too long, `None` at the end.
+    /// The next line without its end; an inner `Err` for a line that is too long, `None` at the end.
     pub fn next(&mut self) -> io::Result<Option<Result<String, String>>> {
         self.bytes.clear();
         let mut length = 0;
@@ -62,31 +62,31 @@ impl<R: BufRead> Lines<R> {
     }
 }
 
-/// Meaning of a line.
+/// Result of parsing a line.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ParsedLine {
-    /// Nothing: blank, a comment, a header.
+    /// A blank line, a comment or a header.
     Nothing,
     /// A sample.
     Sample(StreamSample),
-    /// A line that cannot be taken for a sample of its own, with the reason.
+    /// A line that is not a sample, with the reason.
     Unreadable(String),
 }
 
-/// A sample as read; a value with a fault is NaN.
+/// A sample as read; an invalid value is NaN.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StreamSample {
     /// Time in s; `None` without a column t.
     pub t: Option<f64>,
     pub e: f64,
     pub u: f64,
-    /// External signal, where there is a column f_t and it holds a number.
+    /// External signal, if there is a column f_t with a number.
     pub reference: Option<f64>,
     /// Problems with e or u.
     pub fault: Option<String>,
 }
 
-/// Where the columns are.
+/// Positions of the columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct ColumnPositions {
     count: usize,
@@ -96,7 +96,7 @@ struct ColumnPositions {
     reference: Option<usize>,
 }
 
-/// The columns of a stream: found by the header, or by the number of cells in the first line of
+/// The columns of a stream: known from the header, or from the number of cells in the first line of
 /// numbers.
 pub struct Columns {
     input: String,
@@ -117,7 +117,7 @@ impl Columns {
         }
     }
 
-    /// True when the samples have a column t.
+    /// True if the samples have a column t.
     pub fn have_time(&self) -> bool {
         self.places.is_some_and(|p| p.t.is_some())
     }
@@ -127,10 +127,10 @@ impl Columns {
         self.places.is_some()
     }
 
-    /// Meaning of a line.
+    /// Parses a line.
     ///
     /// # Errors
-    /// [`CliError::Stream`] for a header without the columns.
+    /// [`CliError::Stream`] for a header that lacks a column.
     pub fn read(&mut self, line: &str) -> Result<ParsedLine, CliError> {
         let line = line.trim_matches(['\r', ' ', '\u{feff}']);
         if line.trim().is_empty() && !line.contains('\t') || line.starts_with('#') {
@@ -171,7 +171,7 @@ impl Columns {
         ))
     }
 
-    /// An object of JSON, by the names of the channels: `{"t": 0.01, "e": 0.5, "u": -1.0}`.
+    /// Parses a JSON object with the names of the channels: `{"t": 0.01, "e": 0.5, "u": -1.0}`.
     fn object(&self, line: &str) -> ParsedLine {
         let object: Map<String, Value> = match serde_json::from_str(line) {
             Ok(object) => object,
@@ -185,7 +185,7 @@ impl Columns {
         }
     }
 
-    /// A sample of its numbers; those that do not exist are `None`.
+    /// A sample from its numbers; missing ones are `None`.
     fn sample(
         &self,
         t: Option<Result<f64, Fault>>,
@@ -226,7 +226,7 @@ impl Columns {
         })
     }
 
-    /// Names of the channels that a sample has to have.
+    /// Names of the required channels.
     fn names(&self) -> String {
         let input = if self.with_input {
             format!("{} and ", self.input)
@@ -256,7 +256,7 @@ impl Columns {
         }
     }
 
-    /// ", as --input err --output stick" for missing values and there by another name.
+    /// ", as --input err --output stick" for columns that are missing and exist under another name.
     fn hint(&self, cells: &[&str], (no_input, no_output): (bool, bool)) -> String {
         let input = error_among(cells).filter(|_| no_input && self.with_input);
         let output = control_among(cells).filter(|_| no_output);
@@ -297,7 +297,7 @@ impl Columns {
     }
 }
 
-/// Why a cell is not a number.
+/// Reason why a cell is not a number.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Fault {
     Missing,
@@ -327,7 +327,7 @@ fn number(cell: &str) -> Result<f64, Fault> {
     }
 }
 
-/// The same of a value of JSON.
+/// The number of a JSON value.
 fn number_of_json(value: &Value) -> Result<f64, Fault> {
     match value {
         Value::Null => Err(Fault::Missing),
@@ -336,19 +336,19 @@ fn number_of_json(value: &Value) -> Result<f64, Fault> {
     }
 }
 
-/// True for one object of JSON, which may be of several lines.
+/// True for a single JSON object, possibly of several lines.
 pub fn is_object(text: &str) -> bool {
     text.trim_start().starts_with('{') && serde_json::from_str::<IgnoredAny>(text).is_ok()
 }
 
-/// A text between quotation marks, cut to a readable length.
+/// A text in quotation marks, shortened to a readable length.
 fn shown(text: &str) -> String {
     let cut: String = text.chars().take(SHOWN).collect();
     let rest = if text.chars().count() > SHOWN { "..." } else { "" };
     format!("\"{}{rest}\"", cut.escape_debug())
 }
 
-/// Two or more names.
+/// True for two or more names.
 fn is_header(cells: &[&str]) -> bool {
     let is_name = |c: &&str| {
         let first = c.chars().next();
@@ -383,7 +383,7 @@ mod tests {
             (Some(2.0), 0.5, -1.0, Some(7.0))
         );
         assert!(read.fault.is_none());
-        // Cells next to objects, in any order.
+        // Cells and objects, in any order.
         let mut columns = Columns::new("error", "stick", true, 10.0);
         let read = sample(&mut columns, r#"{"stick": "3", "error": null}"#);
         assert!(read.t.is_none() && read.e.is_nan() && read.u == 3.0 && !columns.are_known());

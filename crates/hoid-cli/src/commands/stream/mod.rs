@@ -1,6 +1,6 @@
-//! `hoid stream`: a recursive estimate, live. Each line of standard input that is not a comment
-//! gives one line of JSON on standard output, flushed, whatever the line holds; or each datagram
-//! one datagram.
+//! `hoid stream`: a recursive estimate, online. Each line of standard input that is not a comment
+//! gives one line of JSON on standard output, flushed, whatever its content; or each datagram one
+//! datagram.
 //!
 //! | file | contents |
 //! |---|---|
@@ -32,7 +32,7 @@ use lines::Lines;
 use session::Session;
 use udp::Udp;
 
-/// An interrupt waits so long for a line that is being written.
+/// Maximum time for which an interrupt waits for a line that is being written.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 pub fn run(args: &StreamArgs) -> Result<(), CliError> {
@@ -48,7 +48,7 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
     let decimation = args.rate.of(asked.counts_samples());
     let decimator = match decimation.factor(sample_time) {
         1 => None,
-        // For the output alone nothing is held.
+        // With an output only, no hold is assumed.
         factor => Some(Decimator::new(factor, sample_time, [true, false, false])?),
     };
     let tracked = decimator.as_ref().map_or(sample_time, Decimator::sample_time);
@@ -129,8 +129,8 @@ fn lock(session: &Mutex<Session>) -> MutexGuard<'_, Session> {
     session.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Ends with a summary at an interrupt, with exit code 0 where there is an estimate; a line that is being written is finished
-/// before.
+/// Ends with a summary at an interrupt, with exit code 0 if there is an estimate; a line that is being written is
+/// completed first.
 fn end_on_interrupt(session: &Arc<Mutex<Session>>) {
     let session = Arc::clone(session);
     interrupt::on_interrupt(move |_| {
@@ -140,8 +140,8 @@ fn end_on_interrupt(session: &Arc<Mutex<Session>>) {
                 output::message(&session.summary());
                 process::exit(session.end().map_or_else(|error| i32::from(error.exit_code()), |()| 0));
             }
-            // A start fit, or a reader that takes nothing: lines are written whole, so that none is
-            // cut.
+            // A start fit in progress, or a blocked reader: lines are written completely, so that
+            // none is truncated.
             if asked.elapsed() > PATIENCE {
                 process::exit(0);
             }

@@ -1,4 +1,4 @@
-//! A stream: its samples in their order, and the state of the recursion.
+//! A stream: its samples in order, and the state of the recursion.
 
 use std::collections::VecDeque;
 
@@ -15,12 +15,12 @@ use super::{
 };
 use crate::{args::StreamArgs, commands::reading, error::CliError, output, recursion, text};
 
-/// Length of the warm-up when none is typed, s.
+/// Default length of the warm-up, s.
 const DEFAULT_WARM_UP_S: f64 = 20.0;
-/// Faults that are kept for the next line.
+/// Maximum number of faults kept for the next line.
 const FAULTS_TOLD: usize = 4;
 
-/// Everything that a line changes.
+/// The state of the stream, changed by each line.
 pub struct Session {
     asked: TrackRequest,
     plan: TrackPlan,
@@ -31,10 +31,10 @@ pub struct Session {
     sample_time: SampleTime,
     /// Decimator of error, control and target.
     decimator: Option<Decimator<3>>,
-    /// Factor of e and u.
+    /// Factors of e and u.
     scale: (f64, f64),
     every: u64,
-    /// Lines that count for `every`.
+    /// Number of lines counted for `every`.
     lines: u64,
     counts: Counts,
     /// True once a sample had a time.
@@ -42,13 +42,13 @@ pub struct Session {
     /// Time of the last sample, s.
     t: Option<f64>,
     innovation: Option<f64>,
-    /// A change that no line has reported yet, and when it was declared, s.
+    /// A change that has not been reported, and the time of its declaration, s.
     change: Option<(Option<f64>, Change)>,
-    /// Events of the guard that no line has reported yet.
+    /// Guard events that have not been reported.
     event: Option<TrackFault>,
     names: Vec<String>,
     faults: VecDeque<String>,
-    /// That the times go at another rate has been reported.
+    /// True if a deviating rate of the times has been reported.
     rate_told: bool,
     /// Rate of the time stamps.
     rate: Option<Finding>,
@@ -100,7 +100,7 @@ impl Session {
         Ok(session)
     }
 
-    /// The tracker is there: its names, and all settings to standard error.
+    /// Reports the start of the tracker: its names, and all settings on standard error.
     fn began(&mut self, when: &str, options: &TrackOptions, choice: Option<&Choice>) {
         if let Live::Tracking(tracker) = &self.live {
             self.names = tracker.parameter_names();
@@ -121,7 +121,7 @@ impl Session {
         output::message(&format!("{when}; {}.", each.join("; ")));
     }
 
-    /// Takes a line; true when the output has a line for it.
+    /// Processes a line; true if the output has a line for it.
     pub fn take(&mut self, text: Result<String, String>) -> Result<bool, CliError> {
         let line = match text {
             Ok(text) => self.columns.read(&text)?,
@@ -136,7 +136,7 @@ impl Session {
         match line {
             ParsedLine::Nothing => return false,
             ParsedLine::Sample(read) => self.timed(read),
-            // By its time the next line will show whether a sample is missing.
+            // The time of the next line shows whether a sample is missing.
             ParsedLine::Unreadable(reason) if self.columns.have_time() || !self.columns.are_known() => {
                 self.dropped(format!("{reason}: dropped"));
             }
@@ -149,11 +149,11 @@ impl Session {
         self.lines.is_multiple_of(self.every)
     }
 
-    /// Handles a datagram, of which the samples that count for an answer are reported one by one.
-    /// What is not a sample is dropped: it may come from anyone.
+    /// Processes a datagram; each sample that requires an answer is reported individually. Anything
+    /// that is not a sample is dropped: it may come from any sender.
     ///
     /// # Errors
-    /// The errors of the answers.
+    /// Errors of the answers.
     pub fn take_datagram(
         &mut self,
         bytes: &[u8],
@@ -200,7 +200,7 @@ impl Session {
         answer
     }
 
-    /// Takes a sample at its place in time.
+    /// Processes a sample at its position in time.
     fn timed(&mut self, read: StreamSample) {
         if let Some(t) = read.t {
             self.has_time = true;
@@ -231,8 +231,8 @@ impl Session {
         self.sample(self.scale.0 * read.e, self.scale.1 * read.u, read.reference);
     }
 
-    /// Reports once that the times go at another rate than `--fs`; from there on every line carries
-    /// the finding.
+    /// Reports once that the rate of the times differs from `--fs`; from then on every line
+    /// contains the finding.
     fn judge_rate(&mut self, t: f64) {
         let fs = 1.0 / self.sample_time.s();
         let (hurried, other) = (self.clock.hurried(), self.clock.other_rate());
@@ -256,7 +256,8 @@ impl Session {
         }
     }
 
-    /// An innovation belongs to one sample, which of a decimated stream is the last one for some lines.
+    /// Discards the innovation, which belongs to one sample: in a decimated stream the last one remains for several
+    /// lines.
     fn forget_innovation(&mut self) {
         if self.decimator.is_none() {
             self.innovation = None;
@@ -279,7 +280,7 @@ impl Session {
             behind_s = decimator.lag_samples() as f64 * self.sample_time.s();
             self.innovation = None;
         }
-        // The time that the recursion has come to.
+        // The time up to which the recursion has advanced.
         let t = self.t.map(|t| t - behind_s);
         let plan = &self.plan;
         let LiveOutcome { outcome, started } = self.live.update(sample, &|record| recursion::choose(plan, record));
@@ -309,7 +310,7 @@ impl Session {
         self.fault(reason);
     }
 
-    /// Keeps a fault for the next line of the output, the last ones where there are many.
+    /// Keeps a fault for the next line of the output; only the last ones if there are many.
     fn fault(&mut self, text: String) {
         if self.faults.len() == FAULTS_TOLD {
             self.faults.pop_front();
@@ -317,7 +318,7 @@ impl Session {
         self.faults.push_back(text);
     }
 
-    /// Writes the line of the output into a buffer.
+    /// Writes the line of the output to a buffer.
     pub fn write(&mut self, buffer: &mut Vec<u8>) -> Result<(), CliError> {
         let fault = (!self.faults.is_empty()).then(|| self.faults.drain(..).collect::<Vec<_>>().join("; "));
         let standing = StreamStatus {
@@ -336,7 +337,7 @@ impl Session {
         standing.write(buffer).map_err(unwritable)
     }
 
-    /// A stream that ended without an estimate has not given what was asked.
+    /// Error for a stream that ended without an estimate.
     pub fn end(&self) -> Result<(), CliError> {
         let c = self.counts;
         if c.samples == 0 && c.dropped > 0 {
@@ -384,7 +385,7 @@ impl Session {
     }
 }
 
-/// Factor of e and u.
+/// Factors of e and u.
 fn scale(args: &StreamArgs) -> Result<(f64, f64), CliError> {
     let mut all = reading::by_channel("--scale", &args.scale)?;
     let mut take = |name: &str| all.remove(name).map_or(1.0, |scaling| scaling.factor());

@@ -7,15 +7,15 @@ use std::{
 
 use crate::{args::UdpPlaces, error::CliError};
 
-/// Largest datagram that there is, bytes.
+/// Maximum size of a datagram, bytes.
 const LARGEST: usize = 1 << 16;
 
-/// Room for a datagram.
+/// Buffer for a datagram.
 pub fn room() -> Vec<u8> {
     vec![0; LARGEST]
 }
 
-/// A socket that takes samples, and where its answers go.
+/// A socket that receives samples, and the address of its answers.
 pub struct Udp {
     socket: UdpSocket,
     output: SocketAddr,
@@ -32,7 +32,7 @@ impl fmt::Display for Udp {
 
 impl Udp {
     /// # Errors
-    /// [`CliError::Stream`] for an address that the system does not give.
+    /// [`CliError::Stream`] for an address that the system does not provide.
     pub fn bind(places: &UdpPlaces) -> Result<Self, CliError> {
         let socket = UdpSocket::bind(places.input).map_err(|error| {
             CliError::Stream(format!(
@@ -57,12 +57,12 @@ impl Udp {
     /// The next datagram.
     ///
     /// # Errors
-    /// [`CliError::Stream`] when the socket is no more.
+    /// [`CliError::Stream`] if the socket fails.
     pub fn receive<'b>(&self, bytes: &'b mut [u8]) -> Result<&'b [u8], CliError> {
         loop {
             match self.socket.recv(bytes) {
                 Ok(length) => return Ok(&bytes[..length]),
-                // An answer that no one took is reported here.
+                // An answer that could not be delivered is reported here.
                 Err(error) if is_passing(&error) => {}
                 Err(error) => return Err(CliError::Stream(format!("the socket cannot be read: {error}"))),
             }
@@ -77,7 +77,7 @@ impl Udp {
 
 fn is_passing(error: &io::Error) -> bool {
     use io::ErrorKind::{ConnectionRefused, ConnectionReset, Interrupted, WouldBlock};
-    // On Windows a datagram that is too large for the room is an error, too.
+    // On Windows a datagram larger than the buffer is also an error.
     matches!(
         error.kind(),
         ConnectionRefused | ConnectionReset | Interrupted | WouldBlock

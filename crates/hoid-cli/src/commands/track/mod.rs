@@ -1,4 +1,4 @@
-//! `hoid track`: a recursive estimate over a record, its trace into a file.
+//! `hoid track`: a recursive estimate over a record, with its trace in a file.
 
 mod page;
 mod report;

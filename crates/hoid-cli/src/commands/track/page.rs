@@ -1,4 +1,4 @@
-//! A summary of a trace for people.
+//! A summary of a trace as text.
 
 use hoid::analysis::Tracked;
 use hoid::model::{GainUnit, uncertainty::Estimate};
@@ -7,13 +7,13 @@ use hoid::track::value_of;
 
 use crate::{error::CliError, text};
 
-/// Rows of the trace that are printed.
+/// Number of rows of the trace that are printed.
 const ROWS_SHOWN: usize = 8;
 
-/// Coefficients that are printed where there is no operator.
+/// Number of coefficients printed if there is no operator.
 const COEFFICIENTS_SHOWN: usize = 6;
 
-/// A summary for people, and with `verbose` the rest.
+/// A summary; details with `verbose`.
 ///
 /// # Errors
 /// The errors of the quality of the start fit.
@@ -79,7 +79,7 @@ fn details(tracked: &Tracked) -> Result<String, CliError> {
     Ok(page)
 }
 
-/// The start covariances that were tried on a second run, where one was given.
+/// The start covariances tried on a second run, if one was given.
 fn covariance(tracked: &Tracked) -> String {
     let Some((file, choice)) = tracked.chosen_covariance() else {
         return String::new();
@@ -95,7 +95,7 @@ fn covariance(tracked: &Tracked) -> String {
     )
 }
 
-/// The estimate at a handful of times.
+/// The estimate at a few times.
 fn rows_shown(tracked: &Tracked) -> String {
     let trace = &tracked.trace;
     if trace.is_empty() {
@@ -183,7 +183,7 @@ fn open_loop(tracked: &Tracked) -> String {
     words
 }
 
-/// The changes that were declared.
+/// The declared changes.
 fn changes(tracked: &Tracked) -> String {
     let trace = &tracked.trace;
     if trace.change_odds().is_empty() {

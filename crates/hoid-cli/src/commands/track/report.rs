@@ -7,7 +7,7 @@ use hoid::report::{BatchFit, TrackReport, batch_fit, default_batch_fits, figures
 
 use crate::{args::TrackArgs, commands::figure, error::CliError, output};
 
-/// Writes the page into the directory of `--report` and the parameters over time into the file of
+/// Writes the page to the directory of `--report` and the parameters over time to the file of
 /// `--figure`; nothing without them.
 pub fn write(args: &TrackArgs, tracked: &Tracked, batch: &[BatchFit]) -> Result<Option<PathBuf>, CliError> {
     if args.report.is_none() && args.picture.figure.is_none() {
@@ -28,9 +28,8 @@ pub fn write(args: &TrackArgs, tracked: &Tracked, batch: &[BatchFit]) -> Result<
     Ok(Some(write_report(directory, &report.to_html()?)?))
 }
 
-/// The batch fits that the page compares with: of the spans as typed, else the start fit and that
-/// of the last third. A span of the program's own choice that cannot be fitted is left out with a
-/// note.
+/// The batch fits for comparison on the page: those of the given spans, otherwise the start fit and
+/// that of the last third. A default span that cannot be fitted is omitted with a note.
 pub fn batch_fits(args: &TrackArgs, tracked: &Tracked) -> Result<Vec<BatchFit>, CliError> {
     if args.report.is_none() {
         return Ok(Vec::new());

@@ -1,4 +1,4 @@
-//! The run of the command: read, track, write.
+//! Execution of the command: read, track, write.
 
 use std::path::Path;
 

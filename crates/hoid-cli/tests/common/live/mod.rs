@@ -1,4 +1,4 @@
-//! `hoid stream` at work: for its tests, and for `cargo xtask slow latency`.
+//! A running `hoid stream`: for its tests, and for `cargo xtask slow latency`.
 //!
 //! | file | holds |
 //! |---|---|
@@ -19,13 +19,13 @@ use std::{
 
 pub use draw::Draw;
 
-/// e and u at t: sinusoids, and what they have in addition.
+/// e and u at t: sinusoids with noise.
 pub fn sample(t_s: f64, draw: &mut Draw) -> (f64, f64) {
     let waves = |at: f64| (0.9 * at).sin() + 0.5 * (2.3 * at).sin() + 0.2 * (7.1 * at).sin();
     (waves(t_s), 0.1 * waves(t_s - 0.3) + 0.05 * (2.0 * draw.share() - 1.0))
 }
 
-/// Self-description of a stream at its end.
+/// Summary of a stream at its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Summary {
     pub samples: usize,
@@ -35,7 +35,8 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Of `8192 samples: 5 skipped for a fault in e or u (5 of them missing), 0 steps made shorter; 2 lines dropped.`
+    /// Parses
+    /// `8192 samples: 5 skipped for a fault in e or u (5 of them missing), 0 steps made shorter; 2 lines dropped.`
     pub fn of(said: &str) -> Self {
         let line = said
             .lines()
@@ -59,13 +60,13 @@ impl Summary {
     }
 }
 
-/// Sends a signal to a program of ours.
+/// Sends a signal to a child process.
 pub fn signal(child: &Child, name: &str) {
     let id = child.id().to_string();
     assert!(Command::new("kill").args([name, &id]).status().unwrap().success());
 }
 
-/// Report of a program that ends still; it ends well.
+/// Remaining messages of a program that ends; it must succeed.
 pub fn last_words(child: &mut Child, said: &mut BufReader<ChildStderr>) -> String {
     let mut words = String::new();
     said.read_to_string(&mut words).unwrap();

@@ -1,8 +1,8 @@
-//! Samples at a rate, and how long their answers take.
+//! Samples at a fixed rate, and the latency of their answers.
 //!
-//! Each sample is sent at its time, whether or not the last one was answered. What is reported is the time from the
-//! call that sends it to the return of the call that has its answer: both ways through the system, the estimate
-//! between, and what else the machine did.
+//! Each sample is sent at its time, regardless of earlier answers. The latency is the time from the call that sends it
+//! to the return of the call that receives its answer: both ways through the system, the estimate, and delays due to
+//! other processes.
 
 use std::{
     io::{BufRead, BufReader, Write},
@@ -18,14 +18,14 @@ use super::{
     udp::{Stream, as_struct},
 };
 
-/// No answer for so long is none.
+/// Timeout of an answer.
 const SILENCE: Duration = Duration::from_secs(5);
 
-/// Samples that were sent, and the times of those that were answered.
+/// Number of samples sent, and latencies of the answered ones.
 pub struct Tally {
     pub sent: usize,
     pub trips: Vec<Duration>,
-    /// Report of the stream on them.
+    /// Summary reported by the stream.
     pub summary: Summary,
 }
 
@@ -34,7 +34,7 @@ impl Tally {
         self.sent - self.trips.len()
     }
 
-    /// The time within which this share of the answers came.
+    /// The time within which this share of the answers arrived.
     pub fn within(&self, share: f64) -> Duration {
         let mut sorted = self.trips.clone();
         sorted.sort_unstable();
@@ -53,7 +53,7 @@ pub fn paced(rate_hz: usize, n: usize, mut call: impl FnMut(usize)) {
     }
 }
 
-/// As structs over UDP.
+/// Sends structs over UDP.
 pub fn over_udp(program: &Path, rate_hz: usize, n: usize, draw: &mut Draw) -> Tally {
     let stream = Stream::new(program, rate_hz, &[]);
     let socket = stream.socket.try_clone().unwrap();
@@ -74,7 +74,7 @@ pub fn over_udp(program: &Path, rate_hz: usize, n: usize, draw: &mut Draw) -> Ta
     }
 }
 
-/// Answers until there are n, or nothing comes any more: their sequence and when they came.
+/// Receives answers until there are n, or until a timeout: their sequence numbers and arrival times.
 pub fn received(socket: &UdpSocket, n: usize) -> Vec<(u32, Instant)> {
     socket.set_read_timeout(Some(SILENCE)).unwrap();
     let mut all = Vec::with_capacity(n);
@@ -88,7 +88,7 @@ pub fn received(socket: &UdpSocket, n: usize) -> Vec<(u32, Instant)> {
     all
 }
 
-/// As lines through pipes. The reader rests once, for `pause`, after the first hundred answers.
+/// Sends lines through pipes. The reader pauses once, for `pause`, after the first hundred answers.
 pub fn over_pipes(program: &Path, rate_hz: usize, n: usize, draw: &mut Draw, pause: Duration) -> Tally {
     let mut child: Child = Command::new(program)
         .args(["stream", "--fs", &rate_hz.to_string()])

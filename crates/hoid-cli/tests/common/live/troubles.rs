@@ -1,5 +1,5 @@
-//! Readers that stop, either side started again, clocks that jump, hostile datagrams: nothing crashes, and what was
-//! lost is counted. Each returns samples sent, answers, and what the stream reports.
+//! Readers that stop, restarts of either side, clock jumps, hostile datagrams: no crash, and lost samples are counted.
+//! Each returns the samples sent, the answers, and the summary of the stream.
 
 use std::{net::UdpSocket, path::Path, time::Duration};
 
@@ -10,11 +10,11 @@ use super::{
     udp::{PATIENCE, Stream, as_struct},
 };
 
-/// Hz.
+/// Rate, Hz.
 const RATE: usize = 1000;
 const SLOW: usize = 100;
 
-/// What happened.
+/// Result of a case.
 pub struct Outcome {
     pub what: &'static str,
     pub sent: usize,
@@ -31,7 +31,7 @@ fn outcome(what: &'static str, sent: usize, answered: usize, stream: Stream) -> 
     }
 }
 
-/// All of them.
+/// Runs all cases.
 pub fn all(program: &Path, pause: Duration, hostile: usize, draw: &mut Draw) -> Vec<Outcome> {
     vec![
         reader_of_pipe_stops(program, pause, draw),
@@ -44,7 +44,7 @@ pub fn all(program: &Path, pause: Duration, hostile: usize, draw: &mut Draw) -> 
     ]
 }
 
-/// Pipes hold the sender back: every sample is answered.
+/// Pipes block the sender: every sample is answered.
 pub fn reader_of_pipe_stops(program: &Path, pause: Duration, draw: &mut Draw) -> Outcome {
     let n = (2.0 * pause.as_secs_f64() * RATE as f64) as usize + 500;
     let tally = over_pipes(program, RATE, n, draw, pause);
@@ -58,8 +58,8 @@ pub fn reader_of_pipe_stops(program: &Path, pause: Duration, draw: &mut Draw) ->
     }
 }
 
-/// Sends further samples until one of them is answered; the number of samples in all, and of answers
-/// on the way.
+/// Sends further samples until one of them is answered; returns the total number of samples, and of
+/// answers received meanwhile.
 fn until_answered(stream: &Stream, sent: usize, mut send: impl FnMut(usize)) -> (usize, usize) {
     let (mut sent, mut answered) = (sent, 0);
     stream
@@ -84,7 +84,7 @@ fn until_answered(stream: &Stream, sent: usize, mut send: impl FnMut(usize)) -> 
     }
 }
 
-/// Answers that no one takes are lost, samples are not.
+/// Answers that are not received are lost, samples are not.
 pub fn reader_of_udp_stops(program: &Path, pause: Duration, draw: &mut Draw) -> Outcome {
     let stream = Stream::new(program, RATE, &[]);
     let mut send = |k: usize| {
@@ -101,7 +101,7 @@ pub fn reader_of_udp_stops(program: &Path, pause: Duration, draw: &mut Draw) -> 
     outcome
 }
 
-/// Samples that the system lost while the stream stayed constant are found by their sequence.
+/// Samples lost by the system while the stream was stopped are detected by their sequence numbers.
 pub fn stream_stops(program: &Path, pause: Duration, draw: &mut Draw) -> Outcome {
     let stream = Stream::new(program, RATE, &[]);
     let mut send = |k: usize| {
@@ -122,7 +122,7 @@ pub fn stream_stops(program: &Path, pause: Duration, draw: &mut Draw) -> Outcome
     outcome
 }
 
-/// A sender that comes back with its sequence at zero is trusted after ten samples.
+/// A sender that restarts its sequence at zero is accepted after ten samples.
 pub fn sender_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
     let mut stream = Stream::new(program, SLOW, &[]);
     let ask = |stream: &Stream, draw: &mut Draw| {
@@ -134,7 +134,7 @@ pub fn sender_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
     };
     ask(&stream, draw);
     let place = stream.socket.local_addr().unwrap();
-    // Its port is free before it is taken again.
+    // Its port is free before it is used again.
     stream.socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     stream.socket = UdpSocket::bind(place).unwrap();
     stream.socket.connect(("127.0.0.1", stream.port)).unwrap();
@@ -145,7 +145,7 @@ pub fn sender_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
     outcome
 }
 
-/// A stream that was killed and started again answers from its first sample on; what was sent meanwhile is lost.
+/// A stream that was killed and restarted answers from its first sample on; samples sent in the meantime are lost.
 pub fn stream_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
     let stream = Stream::new(program, SLOW, &[]);
     let datagram = |k: u32, draw: &mut Draw| {
@@ -159,11 +159,11 @@ pub fn stream_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
     let (port, socket) = stream.killed();
     let mut refused = 0;
     for k in 100..150 {
-        // The system reports at the next call that no one listens.
+        // The system reports at the next call that there is no listener.
         refused += usize::from(socket.send(&datagram(k, draw)).is_err());
     }
     assert!(refused > 0);
-    // What the system still has to report it.
+    // Errors that the system still has to report.
     let _ = socket.take_error();
     let stream = Stream::at(program, SLOW, port, socket, &[]);
     for k in 150..250 {
@@ -175,11 +175,11 @@ pub fn stream_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
     outcome
 }
 
-/// Times that jump forth are a gap, those that jump back are trusted after ten samples.
+/// Forward jumps of the time are a gap, backward jumps are accepted after ten samples.
 pub fn clock_jumps(program: &Path, draw: &mut Draw) -> Outcome {
     let stream = Stream::new(program, SLOW, &[]);
     let mut sequence = 0;
-    // By 5 s, back by 4 s, by an hour, of which 10 s are bridged.
+    // By 5 s, back by 4 s, by an hour, of which 10 s are filled.
     for begin_s in [0.0, 6.0, 3.0, 3600.0] {
         for k in 0..100 {
             let (e, u) = sample(f64::from(k) / SLOW as f64, draw);
@@ -193,7 +193,7 @@ pub fn clock_jumps(program: &Path, draw: &mut Draw) -> Outcome {
     outcome
 }
 
-/// Datagrams that are not samples, between those that are.
+/// Datagrams that are not samples, mixed with samples.
 pub fn hostile_datagrams(program: &Path, hostile: usize, draw: &mut Draw) -> Outcome {
     let stream = Stream::new(program, SLOW, &[]);
     let mut sent = 0;
@@ -217,7 +217,7 @@ fn no_sample(draw: &mut Draw) -> Vec<u8> {
     let any: Vec<u8> = (0..length).map(|_| draw.bits() as u8).collect();
     let text: String = any.iter().map(|byte| char::from(b'a' + byte % 26)).collect();
     match draw.below(6) {
-        // No text starts so.
+        // No text starts with these bytes.
         0 => [&[0xff], any.as_slice()].concat(),
         1 => {
             let mut whole = as_struct(7, f64::NAN, 0.1, 0.1);

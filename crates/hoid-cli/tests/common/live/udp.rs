@@ -1,4 +1,4 @@
-//! A stream over UDP and the socket of who asks it.
+//! A stream over UDP and the socket of its client.
 
 use std::{
     io::{BufRead, BufReader},
@@ -10,11 +10,11 @@ use std::{
 
 use super::{last_words, signal};
 
-/// Far beyond what an answer takes.
+/// Far beyond the latency of an answer.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 const NUMBERS: usize = 19;
 
-/// A stream that is running.
+/// A running stream.
 pub struct Stream {
     pub child: Child,
     said: BufReader<ChildStderr>,
@@ -24,13 +24,13 @@ pub struct Stream {
 }
 
 impl Stream {
-    /// At a port that the system chooses.
+    /// Starts at a port that the system chooses.
     pub fn new(program: &Path, rate_hz: usize, arguments: &[&str]) -> Self {
         let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
         Self::at(program, rate_hz, 0, socket, arguments)
     }
 
-    /// At this port, 0 for one that the system chooses, with answers to this socket.
+    /// Starts at this port, 0 for one that the system chooses, with answers to this socket.
     pub fn at(program: &Path, rate_hz: usize, port: u16, socket: UdpSocket, arguments: &[&str]) -> Self {
         socket.set_read_timeout(Some(PATIENCE)).unwrap();
         let answers = socket.local_addr().unwrap().port();
@@ -44,7 +44,7 @@ impl Stream {
             .spawn()
             .unwrap();
         let mut said = BufReader::new(child.stderr.take().unwrap());
-        // Where the system has chosen the port, it is reported.
+        // If the system has chosen the port, it is reported.
         let port = loop {
             let mut line = String::new();
             assert!(said.read_line(&mut line).unwrap() > 0, "the stream has ended");
@@ -72,7 +72,7 @@ impl Stream {
         bytes
     }
 
-    /// Answers come from the port that listens.
+    /// Answers come from the listening port.
     pub fn receive(&self, bytes: &mut [u8]) -> Option<usize> {
         self.socket.recv(bytes).ok()
     }
@@ -85,13 +85,13 @@ impl Stream {
         (word(4), std::array::from_fn(number), word(160).cast_signed(), word(164))
     }
 
-    /// Interrupts the stream; what it has reported.
+    /// Interrupts the stream and returns its messages.
     pub fn end(mut self) -> String {
         signal(&self.child, "-INT");
         last_words(&mut self.child, &mut self.said)
     }
 
-    /// Ends the stream silently; its port and the socket.
+    /// Kills the stream; returns its port and the socket.
     pub fn killed(mut self) -> (u16, UdpSocket) {
         self.child.kill().unwrap();
         self.child.wait().unwrap();
@@ -99,7 +99,7 @@ impl Stream {
     }
 }
 
-/// A sample as a struct; t is NaN if the sequence determines it.
+/// A sample as a struct; t is NaN if the sequence number gives the time.
 pub fn as_struct(sequence: u32, t: f64, e: f64, u: f64) -> Vec<u8> {
     let mut bytes = b"hoid".to_vec();
     bytes.extend_from_slice(&sequence.to_le_bytes());

@@ -6,14 +6,14 @@ use super::numbers::Numbers;
 #[derive(Debug, Clone)]
 pub(crate) struct Array {
     pub(crate) numbers: Numbers,
-    /// Its lengths, as many as there are dimensions. Their product is the count of the numbers.
+    /// Length of each dimension. Their product is the number of elements.
     pub(crate) dims: Vec<usize>,
-    /// The last index runs fastest, as in C; otherwise the first, as in Fortran and MATLAB.
+    /// True if the last index runs fastest, as in C; otherwise the first does, as in Fortran and MATLAB.
     pub(crate) last_fastest: bool,
 }
 
 impl Array {
-    /// The numbers from the first to the last, in the order in which they stand.
+    /// All numbers in file order.
     pub(crate) fn vector(numbers: Numbers) -> Self {
         Self {
             dims: vec![numbers.len()],
@@ -26,7 +26,7 @@ impl Array {
     pub(super) fn line(&self, k: usize, along_first: bool) -> Numbers {
         let (rows, columns) = (self.dims[0], self.dims[1]);
         let len = if along_first { rows } else { columns };
-        // Where an index runs fastest, its neighbours are neighbours in the file.
+        // Along the fastest index, neighbours are adjacent in the file.
         let (first, stride) = match (along_first, self.last_fastest) {
             (true, true) => (k, columns),
             (true, false) => (k * rows, 1),

@@ -1,4 +1,4 @@
-//! Columns of one stream at the times of another: linear interpolation between the neighbours.
+//! Columns of one stream at the times of another, by linear interpolation.
 
 use std::ops::Range;
 
@@ -10,7 +10,7 @@ use crate::wording::shown;
 /// A column at the times of another stream.
 pub(super) struct Aligned {
     pub(super) numbers: Numbers,
-    /// The rows that lie inside of the stream that the column came from.
+    /// Rows that lie inside the stream of the column.
     pub(super) rows: Range<usize>,
     pub(super) note: String,
 }
@@ -57,7 +57,7 @@ pub(super) fn aligned(
     })
 }
 
-/// The line through the first two of the points.
+/// Evaluates the line through the first two points.
 fn between(t: &[f64], values: &[f64], at: f64) -> f64 {
     match (t, values) {
         ([t0, t1, ..], [v0, v1, ..]) => {
@@ -70,7 +70,7 @@ fn between(t: &[f64], values: &[f64], at: f64) -> f64 {
     }
 }
 
-/// The times of a structure, which have to increase.
+/// Times of a structure, which must increase.
 fn times(column_paths: &[ColumnPath], place: &str, file: &str) -> Result<Vec<f64>, IoError> {
     let time = column_paths
         .iter()

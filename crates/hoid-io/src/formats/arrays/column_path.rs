@@ -1,8 +1,8 @@
 //! Arrays as columns.
 //!
-//! An array with one long side is a column. For a matrix, time runs along the longer side, and each
-//! line along it is a column with a path of its own: `x(:,2)` or `x(2,:)` in MATLAB's words,
-//! counted from 1, `x[:,1]` or `x[1,:]` in Python's, counted from 0. For a square one the first
+//! An array with one long side is a column. In a matrix, time runs along the longer side, and each
+//! line along it is a column with its own path: `x(:,2)` or `x(2,:)` in MATLAB notation, counted
+//! from 1, `x[:,1]` or `x[1,:]` in Python notation, counted from 0. In a square matrix the first
 //! index is time.
 
 use super::contents::{Contents, Entry, Indexing, OBJECT, Value};
@@ -10,14 +10,14 @@ use super::numbers::Numbers;
 use crate::IoError;
 use crate::wording::shown;
 
-/// A matrix with more lines than this is a picture, not a set of channels.
+/// A matrix with more lines is an image, not a set of channels.
 const MOST_LINES: usize = 256;
 
 /// One column.
 #[derive(Debug, Clone)]
 pub(crate) struct ColumnPath {
     pub(crate) path: String,
-    /// The structure that it is in; empty at top level.
+    /// The enclosing structure; empty at top level.
     pub(crate) parent: String,
     pub(crate) unit: String,
     pub(crate) holds: Holds,
@@ -41,7 +41,7 @@ impl ColumnPath {
         }
     }
 
-    /// The numbers, where it holds such.
+    /// The numbers, if the column holds numbers.
     pub(crate) fn numbers(&self) -> Option<&Numbers> {
         match &self.holds {
             Holds::Numbers(numbers) => Some(numbers),
@@ -59,7 +59,7 @@ impl ColumnPath {
         }
     }
 
-    /// Why it is not a column of numbers.
+    /// Returns the error that states why this is not a numeric column.
     pub(super) fn refused(&self, file: &str) -> IoError {
         IoError::Unsupported {
             file: file.to_owned(),
@@ -68,12 +68,12 @@ impl ColumnPath {
         }
     }
 
-    /// Whether it is an object of MATLAB.
+    /// True if the value is a MATLAB object.
     pub(super) fn holds_object(&self) -> bool {
         matches!(&self.holds, Holds::Unread(what) if what.starts_with(OBJECT))
     }
 
-    /// Contents of it, as text.
+    /// Describes the contents as text.
     pub(crate) fn what(&self) -> String {
         match &self.holds {
             Holds::Numbers(numbers) => numbers.kind().name().to_owned(),
@@ -83,7 +83,7 @@ impl ColumnPath {
     }
 }
 
-/// A path without its last part. A point inside of brackets is none between parts.
+/// A path without its last part. A point inside brackets does not separate parts.
 pub(crate) fn parent(path: &str) -> &str {
     let mut depth = 0_usize;
     for (at, byte) in path.bytes().enumerate().rev() {
@@ -108,7 +108,7 @@ impl Contents {
 }
 
 impl Entry {
-    /// The columns in it.
+    /// The columns of this entry.
     pub(super) fn column_paths(&self, indexing: Indexing) -> Vec<ColumnPath> {
         let column_path = |path: String, holds| ColumnPath {
             path,

@@ -1,21 +1,21 @@
-//! Contents of a file of named arrays: paths, each with a value.
+//! Contents of a file of named arrays: paths with values.
 
 use super::array::Array;
 
-/// How the lines of a matrix are named.
+/// Notation of the lines of a matrix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Indexing {
     Matlab,
     Python,
 }
 
-/// The name under which comments are kept as text.
+/// Name under which comments are stored as text.
 pub(crate) const COMMENTS: &str = "hoid_comments";
 
-/// How the words on an object of MATLAB start.
+/// First words of the description of a MATLAB object.
 pub(crate) const OBJECT: &str = "an object of the class";
 
-/// Contents of a path.
+/// Value of a path.
 #[derive(Debug, Clone)]
 pub(crate) enum Value {
     Array(Array),
@@ -24,12 +24,12 @@ pub(crate) enum Value {
     Unread(String),
 }
 
-/// One thing in a file.
+/// An entry of a file.
 #[derive(Debug, Clone)]
 pub(crate) struct Entry {
-    /// Such as `e`, `data.run(3).e` or `c{2}`.
+    /// Path, such as `e`, `data.run(3).e` or `c{2}`.
     pub(crate) path: String,
-    /// The structure that it is in, such as `data.run(3)`; empty at top level.
+    /// The enclosing structure, such as `data.run(3)`; empty at top level.
     pub(crate) parent: String,
     pub(crate) value: Value,
     /// Unit; empty when unknown.
@@ -37,7 +37,7 @@ pub(crate) struct Entry {
 }
 
 impl Entry {
-    /// At top level.
+    /// Creates an entry at top level.
     pub(crate) fn new(path: impl Into<String>, value: Value) -> Self {
         Self {
             path: path.into(),
@@ -47,7 +47,7 @@ impl Entry {
         }
     }
 
-    /// In a structure, or at top level where that has no name.
+    /// Creates an entry in a structure, or at top level if the structure has no name.
     pub(crate) fn field(parent: &str, name: &str, value: Value) -> Self {
         let path = if parent.is_empty() {
             name.to_owned()
@@ -65,20 +65,20 @@ impl Entry {
 #[derive(Debug)]
 pub(crate) struct Contents {
     pub(crate) entries: Vec<Entry>,
-    /// The lines that hoid wrote next to the columns.
+    /// Comment lines that hoid wrote with the columns.
     pub(crate) comments: Vec<String>,
     /// Notes on reading.
     pub(crate) notes: Vec<String>,
-    /// How the lines of a matrix are named.
+    /// Notation of the lines of a matrix.
     pub(crate) indexing: Indexing,
-    /// Whether each structure holds times of its own on one common clock, so that its columns can
-    /// be put next to those of another.
+    /// True if each structure holds its own times on a common clock, so that its columns can be
+    /// aligned with those of another.
     pub(crate) own_clocks: bool,
 }
 
 impl Contents {
     pub(crate) fn new(mut entries: Vec<Entry>, indexing: Indexing) -> Self {
-        // A name is printed: nothing in it that a terminal obeys.
+        // Names are printed: they must not contain terminal control characters.
         for text in entries
             .iter_mut()
             .flat_map(|entry| [&mut entry.path, &mut entry.parent])

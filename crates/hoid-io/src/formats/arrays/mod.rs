@@ -1,6 +1,6 @@
-//! Files of named arrays: NPZ, MATLAB, XDF. What they hold is a list of paths, each with an array,
-//! a text or something that is not read; records and tables are made of it here, the same way for
-//! all of them.
+//! Files of named arrays: NPZ, MATLAB, XDF. Their contents are a list of paths, each with an array,
+//! a text or unsupported content; this module makes records and tables from the list, in the same
+//! way for all formats.
 //!
 //! | module | contents |
 //! |---|---|

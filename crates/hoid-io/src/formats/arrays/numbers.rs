@@ -1,5 +1,4 @@
-//! Numbers as they are in a file: bytes, a type, and where each starts. They become `f64` when they
-//! are requested.
+//! Numbers as stored in a file: bytes, a type and a stride. They are converted to `f64` on request.
 
 use std::rc::Rc;
 
@@ -22,7 +21,7 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    /// Bytes of one number.
+    /// Size of one number in bytes.
     pub(crate) fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
@@ -32,17 +31,17 @@ impl Kind {
         }
     }
 
-    /// Whether it holds whole numbers alone.
+    /// True for integer types.
     pub(crate) fn is_whole(self) -> bool {
         !matches!(self, Self::F16 | Self::F32 | Self::F64)
     }
 
-    /// Whether the numbers are of single precision or less.
+    /// True for single precision or less.
     pub(crate) fn is_single(self) -> bool {
         matches!(self, Self::F16 | Self::F32)
     }
 
-    /// As numpy and MATLAB call it.
+    /// Name of the type in numpy and MATLAB.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::F16 => "half",
@@ -72,7 +71,7 @@ pub(crate) struct Numbers {
 }
 
 impl Numbers {
-    /// The numbers that fill the bytes; a rest shorter than one is not examined.
+    /// Interprets the bytes as numbers; an incomplete number at the end is ignored.
     pub(crate) fn new(bytes: Vec<u8>, kind: Kind, big_endian: bool) -> Self {
         let len = bytes.len() / kind.size();
         Self {
@@ -85,7 +84,7 @@ impl Numbers {
         }
     }
 
-    /// One number out of each item of `item` bytes, `offset` bytes from its start.
+    /// Takes one number from each item of `item` bytes, at `offset` bytes from its start.
     pub(crate) fn field(bytes: &Rc<Vec<u8>>, kind: Kind, big_endian: bool, offset: usize, item: usize) -> Self {
         let fits = item > 0 && offset + kind.size() <= item;
         Self {
@@ -98,7 +97,7 @@ impl Numbers {
         }
     }
 
-    /// Numbers already known.
+    /// Wraps numbers that are already `f64`.
     pub(crate) fn from_f64(values: &[f64]) -> Self {
         Self::new(values.iter().flat_map(|v| v.to_le_bytes()).collect(), Kind::F64, false)
     }
@@ -111,8 +110,8 @@ impl Numbers {
         self.kind
     }
 
-    /// Each `stride`-th number from `first` on, `len` of them; those that do not exist are left
-    /// away.
+    /// Takes each `stride`-th number from `first` on, `len` of them; numbers that do not exist are
+    /// omitted.
     pub(crate) fn line(&self, first: usize, stride: usize, len: usize) -> Self {
         let there = if first >= self.len {
             0
@@ -127,7 +126,7 @@ impl Numbers {
         }
     }
 
-    /// The number at a place; NaN if there is none.
+    /// The number at an index; NaN if there is none.
     pub(crate) fn value(&self, at: usize) -> f64 {
         let Some(bytes) = self.bytes_of(at) else {
             return f64::NAN;
@@ -146,17 +145,17 @@ impl Numbers {
         }
     }
 
-    /// The whole number of eight bytes at a place.
+    /// The 8-byte integer at an index.
     pub(crate) fn whole(&self, at: usize) -> Option<i64> {
         self.bytes_of(at).map(i64::from_le_bytes)
     }
 
-    /// All as `f64`.
+    /// All numbers as `f64`.
     pub(crate) fn values(&self) -> Vec<f64> {
         (0..self.len).map(|at| self.value(at)).collect()
     }
 
-    /// All as counts, where each is one.
+    /// All numbers as counts, if each is one.
     pub(crate) fn counts(&self) -> Option<Vec<u64>> {
         let count = |at: usize| {
             let n = self.bytes_of(at).map(u64::from_le_bytes)?;
@@ -169,7 +168,7 @@ impl Numbers {
         (0..self.len).map(count).collect()
     }
 
-    /// The bytes of a number, the little end first, followed by zeros.
+    /// The bytes of a number, little-endian, followed by zeros.
     fn bytes_of(&self, at: usize) -> Option<[u8; 8]> {
         let size = self.kind.size();
         let from = self.start + at * self.step;

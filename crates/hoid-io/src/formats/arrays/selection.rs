@@ -1,9 +1,9 @@
-//! The columns of a record among all arrays of a file.
+//! Selection of the columns of a record among all arrays of a file.
 //!
-//! A name is a path (`data.run(3).e`), or its end where only one path ends so (`run(3).e`, or `e`);
-//! a path that is the name wins. `run(1).e` also finds the only element `run.e`. The time is `t`,
-//! or `time`, next to the output or in the next structure around it. The other arrays next to the
-//! output become channels where they are as long.
+//! A name is a path (`data.run(3).e`), or its end if only one path has that end (`run(3).e`, or
+//! `e`); a path equal to the name takes precedence. `run(1).e` also matches the only element
+//! `run.e`. The time is `t`, or `time`, in the structure of the output or the nearest enclosing
+//! one. The other arrays next to the output become channels if they have the same length.
 
 use std::ops::Range;
 
@@ -17,16 +17,16 @@ use crate::table::{Column, ColumnExpression, Precision, Signal, Source, Table, a
 use crate::time::is_time;
 use crate::wording::{list, shown};
 
-/// The names of the time, the first that is there.
+/// Names of the time column, in order of precedence.
 pub(crate) const TIMES: [&str; 2] = ["t", "time"];
 
-/// The unit of moments of a clock, in s from the first.
+/// Unit of clock times, in s from the first.
 pub(crate) const MOMENTS: &str = "s from the first";
 
-/// More columns than this are not the channels of a record; the others are left out.
+/// Maximum number of columns of a record; further ones are left out.
 const MOST_COLUMNS: usize = 1024;
 
-/// Where the rows of a table came from.
+/// Origin of the rows of a table.
 struct ArraySource<'a> {
     file: &'a str,
     columns: Vec<Numbers>,
@@ -48,7 +48,7 @@ impl Source for ArraySource<'_> {
     }
 }
 
-/// The table that the options ask for.
+/// Returns the table that the options select.
 pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a str) -> Result<Table<'a>, IoError> {
     let column_paths = contents.column_paths();
     let expressions: Vec<&ColumnExpression> = options.input.iter().chain([&options.output]).collect();
@@ -57,7 +57,7 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
     let mut used: Vec<usize> = Vec::new();
     for expression in &expressions {
         let resolved = expression.resolve(&named.names(), file).map_err(|error| {
-            // Where there is an object, the signals are in it.
+            // If there is an object, it holds the signals.
             let object = column_paths.iter().find(|column_path| column_path.holds_object());
             object.map_or(error, |object| object.refused(file))
         });
@@ -128,7 +128,7 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
             list(&left_out)
         ));
     }
-    // Where other streams have samples as well.
+    // Rows for which the other streams have samples as well.
     let rows = shared.unwrap_or(0..rows);
     if rows.is_empty() {
         return Err(IoError::NoOverlap { file: file.to_owned() });
@@ -180,7 +180,7 @@ fn column(name: &str, column_path: &ColumnPath, numbers: &Numbers) -> Column {
 
 /// Columns by the names that expressions may use.
 struct Named<'a> {
-    /// The paths, then the names that represent one of them.
+    /// The paths, followed by the names that match one path only.
     columns: Vec<(String, &'a ColumnPath)>,
 }
 
@@ -225,7 +225,7 @@ impl<'a> Named<'a> {
     }
 }
 
-/// The paths that end in a name, part by part.
+/// Paths that end in a name, compared part by part.
 fn ends(paths: &[&str], name: &str) -> Vec<usize> {
     let ending = |name: &str| -> Vec<usize> {
         let ends = |path: &str| {
@@ -243,7 +243,7 @@ fn ends(paths: &[&str], name: &str) -> Vec<usize> {
     }
 }
 
-/// The time in the structure of the output, or in the next around it, that is as long.
+/// The time in the structure of the output, or the nearest enclosing one, with the same length.
 fn time_beside<'a>(column_paths: &'a [ColumnPath], beside: &str, rows: usize) -> Option<&'a ColumnPath> {
     let mut place = beside;
     loop {

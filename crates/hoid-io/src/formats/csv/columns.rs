@@ -1,4 +1,4 @@
-//! Columns of results in CSV, out and in.
+//! Columns of results in CSV, written and read.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -10,17 +10,17 @@ use crate::results::{ColumnKind, ColumnValues, OutputColumn, OutputTable, TableS
 use crate::table::{Cell, check_names};
 use crate::wording::shown;
 
-/// A file between its rows.
+/// State of a file between its rows.
 struct CsvColumns {
     separator: u8,
 }
 
-/// Writes comments and header, divided by commas.
+/// Writes comments and header, separated by commas.
 pub(super) fn start_with_commas(file: &mut dyn Write, schema: &TableSchema) -> io::Result<Box<dyn RowWriter>> {
     Ok(Box::new(CsvColumns::start(file, schema, b',')?))
 }
 
-/// Writes comments and header, divided by tabs.
+/// Writes comments and header, separated by tabs.
 pub(super) fn start_with_tabs(file: &mut dyn Write, schema: &TableSchema) -> io::Result<Box<dyn RowWriter>> {
     Ok(Box::new(CsvColumns::start(file, schema, b'\t')?))
 }
@@ -35,7 +35,7 @@ impl RowWriter for CsvColumns {
                 let written = match column {
                     Values::Real(values) if values[row].is_nan() => Ok(()),
                     // The fewest digits, with a point or an exponent, which distinguishes them from
-                    // whole numbers.
+                    // integers.
                     Values::Real(values) => write!(cell, "{:?}", values[row]),
                     Values::Whole(values) => write!(cell, "{}", values[row]),
                     Values::Text(values) => {
@@ -76,13 +76,13 @@ impl CsvColumns {
     fn writer<'a>(&self, file: &'a mut dyn Write) -> csv::Writer<&'a mut dyn Write> {
         csv::WriterBuilder::new()
             .delimiter(self.separator)
-            // What starts with # is quoted.
+            // Texts that start with # are quoted.
             .comment(Some(b'#'))
             .from_writer(file)
     }
 }
 
-/// The columns in the bytes of a CSV file.
+/// Reads the columns from the bytes of a CSV file.
 pub(super) fn read(bytes: &[u8], file: &str) -> Result<OutputTable, IoError> {
     let text = text(bytes, file)?;
     let Some(header_line) = text.lines().find(|line| !is_aside(line)) else {
@@ -133,7 +133,7 @@ fn survey(text: &str, file: &str, separator: u8) -> Result<(Vec<String>, Vec<Col
     let mut names: Vec<String> = Vec::new();
     let mut kinds = Vec::new();
     let mut rows = 0;
-    // The reader fails on nothing but input and output, of which there is none here.
+    // The reader fails only on I/O errors, which cannot occur here.
     while matches!(reader.read_byte_record(&mut record), Ok(true)) {
         let line = || {
             let at = record.position().map_or(0, |p| p.byte() as usize);
@@ -179,13 +179,13 @@ fn survey(text: &str, file: &str, separator: u8) -> Result<(Vec<String>, Vec<Col
     Ok((names, kinds, rows))
 }
 
-/// A whole number as it is written: digits without zeros in front.
+/// An integer as written: digits without leading zeros.
 fn whole(cell: &str) -> Option<u64> {
     let digits = cell.bytes().all(|b| b.is_ascii_digit()) && (cell == "0" || !cell.starts_with('0'));
     digits.then(|| cell.parse().ok()).flatten()
 }
 
-/// The text is UTF-8 as a whole and the separators are ASCII, so that each cell is as well.
+/// The text is valid UTF-8 and the separators are ASCII, so that each cell is valid as well.
 fn utf8(cell: &[u8]) -> &str {
     std::str::from_utf8(cell).unwrap_or("\u{fffd}")
 }

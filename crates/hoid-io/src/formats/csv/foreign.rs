@@ -1,18 +1,18 @@
-//! Text of other programs, made what the reader of tables takes: UTF-16 and Latin 1, lines above the
-//! header, columns between blanks.
+//! Text of other programs, converted to what the table reader accepts: UTF-16 and Latin 1, lines
+//! above the header, columns separated by blanks.
 //!
-//! All of it is done in the bytes, line by line, so that messages still name the lines of the file.
+//! The conversion works line by line on the bytes, so that messages still refer to the lines of the file.
 
 use super::text::{is_aside, separator};
 use crate::table::{Cell, with_decimal_point};
 
-/// Lines among which the header is searched for.
+/// Number of lines in which the header is searched for.
 const LINES: usize = 60;
 
-/// Letters and signs of Latin 1 that units and names of columns have; other bytes are damage.
+/// Letters and signs of Latin 1 that occur in units and column names; other bytes are damage.
 const LATIN: &[u8] = b"\xb0\xb2\xb3\xb5\xc4\xc9\xd6\xdc\xdf\xe0\xe4\xe7\xe8\xe9\xea\xf1\xf6\xfc";
 
-/// Rewrites the bytes of a table, and reports the actions taken.
+/// Rewrites the bytes of a table, and returns the changes made.
 pub(super) fn made_plain(bytes: &mut Vec<u8>) -> Vec<String> {
     let mut notes = Vec::new();
     if let Some(text) = utf16(bytes) {
@@ -39,7 +39,7 @@ pub(super) fn made_plain(bytes: &mut Vec<u8>) -> Vec<String> {
     notes
 }
 
-/// Text in UTF-16, which a mark at its start reports.
+/// Decodes UTF-16 text, recognised by its byte order mark.
 fn utf16(bytes: &[u8]) -> Option<String> {
     let unit: fn([u8; 2]) -> u16 = match bytes {
         [0xff, 0xfe, ..] => u16::from_le_bytes,
@@ -51,7 +51,7 @@ fn utf16(bytes: &[u8]) -> Option<String> {
     String::from_utf16(&units).ok().filter(|_| rest.len().is_multiple_of(2))
 }
 
-/// Whether each byte that is not an ASCII is one of a name or a unit.
+/// True if each non-ASCII byte may occur in a name or a unit.
 fn is_latin(bytes: &[u8]) -> bool {
     bytes.iter().all(|byte| byte.is_ascii() || LATIN.contains(byte))
 }
@@ -63,7 +63,7 @@ fn is_number(cell: &str) -> bool {
     )
 }
 
-/// A table whose columns blanks divide, with tabs in their place: as many words in the header as
+/// Replaces blanks by tabs in a table separated by blanks, with as many words in the header as
 /// numbers in each line.
 fn between_tabs(text: &str) -> Option<String> {
     let mut lines = text.lines().filter(|line| !is_aside(line));
@@ -87,8 +87,8 @@ fn between_tabs(text: &str) -> Option<String> {
     })
 }
 
-/// The text with a mark of comments in front of the lines above its header, and how many those are. The
-/// header is the first line of words over a line of as many cells, most of them numbers.
+/// Marks the lines above the header as comments, and returns their number. The header is the first
+/// line of words over a line of as many cells, most of them numbers.
 fn without_preamble(text: &str) -> Option<(usize, String)> {
     let lines: Vec<&str> = text.lines().take(LINES).collect();
     let filled: Vec<usize> = (0..lines.len()).filter(|at| !is_aside(lines[*at])).collect();
@@ -104,11 +104,11 @@ fn without_preamble(text: &str) -> Option<(usize, String)> {
     let above: Vec<usize> = filled.into_iter().filter(|at| *at < header).collect();
     let mark = char::from(separator(lines[header]));
     let cells = |at: usize| lines[at].split(mark).count();
-    // A line of as many cells is the header, and that of the units is below it.
+    // A line of as many cells is the header; the units are below it.
     if above.is_empty() || above.iter().any(|at| cells(*at) == cells(header)) {
         return None;
     }
-    // A break of lines is kept as it is.
+    // Line breaks are kept.
     let marked = |(at, line): (usize, &str)| {
         if above.contains(&at) {
             format!("#{line}")
@@ -144,7 +144,7 @@ mod tests {
             assert_eq!(plain(&bytes), (text.to_owned(), 1));
         }
         assert_eq!(plain(b"t,e [\xb0]\n0,1\n"), (String::from("t,e [°]\n0,1\n"), 1));
-        // Damage stays damage: half a unit, other bytes.
+        // Damage remains damage: half a code unit, other bytes.
         for bytes in [&b"\xff\xfet\0e"[..], b"t,e\n0,\xff1\n", b"t,e\n0,\x801\n"] {
             assert_eq!(plain(bytes).1, 0);
         }

@@ -1,4 +1,4 @@
-//! CSV: text with a header and one line a row, divided by commas, semicolons or tabs.
+//! CSV: text with a header and one line per row, separated by commas, semicolons or tabs.
 //!
 //! | module | contents |
 //! |---|---|
@@ -19,7 +19,7 @@ pub(crate) use record::write_with_commas as write_record;
 
 use crate::formats::format::{Format, Reading, Writing};
 
-/// Divided by commas where it is written; read with any separator.
+/// Written with commas; read with any separator.
 pub(super) const CSV: Format = Format {
     name: "CSV",
     endings: &["csv", "txt"],
@@ -28,7 +28,7 @@ pub(super) const CSV: Format = Format {
     record: Some(record::write_with_commas),
 };
 
-/// Divided by tabs where it is written.
+/// Written with tabs.
 pub(super) const TSV: Format = Format {
     name: "CSV",
     endings: &["tsv"],

@@ -1,29 +1,28 @@
-//! Rows of plain numbers, which nearly all rows of a recording are, straight from the bytes.
+//! Fast reader for rows of plain numbers, as nearly all rows of a recording are.
 //!
-//! A row is plain where each of its cells is a number with a decimal point, or nothing, with blanks
-//! around it at most. Any other row (texts, quotes, comments, cells too many or too few) ends the
-//! run, and is the reader's of whole CSV ([`super::table`]). The numbers are the same, correctly
+//! A row is plain if each of its cells is empty or a number with a decimal point, with at most
+//! blanks around it. Any other row (texts, quotes, comments, too many or too few cells) ends the
+//! run, and is read by the full CSV reader ([`super::table`]). The numbers are the same, correctly
 //! rounded by both (D. Lemire, *Software: Practice and Experience* 51 (2021) 1700-1727).
 //!
-//! A long text is taken in parts that end with a line, side by side. Each part reports how far it
-//! was plain; anything after the first that was not is left.
+//! A long text is read in parallel in parts that end at a line break. Each part reports how far it
+//! was plain; everything after the first row that was not is discarded.
 
 use std::ops::Range;
 use std::thread;
 
 use crate::table::Precision;
 
-/// Bytes of a part: enough rows that a thread is worth its start, few enough to be small compared
-/// with the columns.
+/// Bytes of a part: enough rows to justify a thread, and small compared with the columns.
 const PART: usize = 4 << 20;
-/// Bytes of the first part, which is read without a thread: where rows that are not plain stand often, it holds one.
+/// Bytes of the first part, which is read without a thread: if rows that are not plain are frequent, it contains one.
 const FIRST: usize = 64 << 10;
-/// Threads at most.
+/// Maximum number of threads.
 const THREADS: usize = 8;
-/// Rows between two whose place is kept.
+/// Interval of the rows whose position is kept.
 const KEPT: usize = 1024;
 
-/// Where the rows of a table start in its text: every [`KEPT`]-th, and the last.
+/// Positions of the rows of a table in its text: every [`KEPT`]-th, and the last.
 #[derive(Debug, Default)]
 pub(super) struct RowStarts {
     kept: Vec<usize>,
@@ -32,7 +31,7 @@ pub(super) struct RowStarts {
 }
 
 impl RowStarts {
-    /// One more row.
+    /// Adds a row.
     pub(super) fn push(&mut self, start: usize) {
         if self.rows.is_multiple_of(KEPT) {
             self.kept.push(start);
@@ -46,39 +45,39 @@ impl RowStarts {
         self.rows
     }
 
-    /// Where the last row starts.
+    /// Position of the last row.
     pub(super) fn last(&self) -> Option<usize> {
         (self.rows > 0).then_some(self.last)
     }
 
-    /// The nearest row at or before `row` whose place is kept, and where it starts.
+    /// The nearest row at or before `row` whose position is kept, and that position.
     pub(super) fn before(&self, row: usize) -> Option<(usize, usize)> {
         let at = self.kept.get(row / KEPT)?;
         Some((row / KEPT * KEPT, *at))
     }
 }
 
-/// Rows that were plain, one after the other.
+/// Consecutive plain rows.
 #[derive(Debug, Default)]
 pub(super) struct Plain {
     /// Values by column.
     pub(super) values: Vec<Vec<f64>>,
-    /// Precision of the columns where it was requested.
+    /// Precision of the columns for which it was requested.
     pub(super) precision: Vec<Precision>,
-    /// Where the rows start.
+    /// Positions of the rows.
     pub(super) starts: Vec<usize>,
-    /// Where the first row starts that is not plain; the end of the text where there is none.
+    /// Position of the first row that is not plain; the end of the text if there is none.
     pub(super) end: usize,
 }
 
-/// A table as its rows are read: what divides the cells, and the columns whose precision is requested.
+/// Layout of the rows: the separator, and the columns whose precision is requested.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Layout<'a> {
     pub(super) separator: u8,
     pub(super) with_precision: &'a [bool],
 }
 
-/// The plain rows from `from` on, in runs that are handed over in their order.
+/// Passes on the plain rows from `from` on, in runs, in their order.
 pub(super) fn plain_rows(bytes: &[u8], from: usize, layout: Layout<'_>, mut take: impl FnMut(Plain)) -> usize {
     let threads = thread::available_parallelism().map_or(1, |n| n.get().min(THREADS));
     let mut at = from;
@@ -108,7 +107,7 @@ pub(super) fn plain_rows(bytes: &[u8], from: usize, layout: Layout<'_>, mut take
                     scope.spawn(move || run(bytes, part, layout))
                 };
                 let running: Vec<_> = parts.iter().map(each).collect();
-                // A thread that panicked has read nothing: its part is left to the reader of whole CSV.
+                // If a thread panicked, its part is left to the full CSV reader.
                 let joined = running.into_iter().zip(&parts);
                 joined
                     .map(|(thread, part)| thread.join().unwrap_or_else(|_| Plain::nothing(layout, part.start)))
@@ -126,8 +125,7 @@ pub(super) fn plain_rows(bytes: &[u8], from: usize, layout: Layout<'_>, mut take
     at
 }
 
-/// The end of the part that starts at `start`: after the first end of a line after a given number
-/// of bytes.
+/// End of the part that starts at `start`: the first line end after `length` bytes.
 fn end_of_part(bytes: &[u8], start: usize, length: usize) -> usize {
     let behind = start.saturating_add(length).min(bytes.len());
     let line = bytes[behind..].iter().position(|byte| *byte == b'\n');
@@ -154,7 +152,7 @@ fn run(bytes: &[u8], part: Range<usize>, layout: Layout<'_>) -> Plain {
     let mut printed = vec![0..0; columns];
     while found.end < part.end {
         let start = found.end;
-        // Blank lines are none of the rows.
+        // Blank lines are not rows.
         if matches!(bytes[start], b'\n' | b'\r') {
             found.end += 1;
             continue;
@@ -174,7 +172,7 @@ fn run(bytes: &[u8], part: Range<usize>, layout: Layout<'_>) -> Plain {
     found
 }
 
-/// The numbers of a row and where they are printed, and where the row ends; `None` if it is not plain.
+/// The numbers of a row with their positions in the text, and the end of the row; `None` if it is not plain.
 #[inline]
 fn plain_row(
     bytes: &[u8],
@@ -210,6 +208,6 @@ fn plain_row(
             _ => return None,
         }
     }
-    // Rows without a value may be what a spreadsheet leaves behind its table.
+    // Rows without values may be left over by a spreadsheet after its table.
     (!empty).then_some(at)
 }

@@ -1,4 +1,4 @@
-//! A record into CSV.
+//! Records as CSV.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -8,17 +8,17 @@ use hoid_model::Record;
 use super::text::harmless;
 use crate::record::{channels, comments};
 
-/// Writes the record, divided by commas.
+/// Writes the record, separated by commas.
 pub(crate) fn write_with_commas(file: &mut dyn Write, record: &Record) -> io::Result<()> {
     write(file, record, b',')
 }
 
-/// Writes the record, divided by tabs.
+/// Writes the record, separated by tabs.
 pub(super) fn write_with_tabs(file: &mut dyn Write, record: &Record) -> io::Result<()> {
     write(file, record, b'\t')
 }
 
-/// Writes the record with the digits that give the same numbers back.
+/// Writes the record with digits that reproduce the same numbers.
 fn write(file: &mut dyn Write, record: &Record, separator: u8) -> io::Result<()> {
     let channels = channels(record);
     for comment in comments(record, &channels) {
@@ -43,8 +43,7 @@ fn write(file: &mut dyn Write, record: &Record, separator: u8) -> io::Result<()>
     csv.flush()
 }
 
-/// The fewest digits that give the same number back, with an exponent where that is shorter to
-/// read.
+/// Writes the fewest digits that reproduce the number, with an exponent if that is shorter.
 fn shortest(text: &mut String, value: f64) {
     let size = value.abs();
     let written = if size == 0.0 || (1e-5..1e16).contains(&size) {

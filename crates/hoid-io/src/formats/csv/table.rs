@@ -1,4 +1,4 @@
-//! CSV into a table.
+//! CSV as a table.
 //!
 //! ```text
 //! # units: t s, e deg, u deg          comment lines start with #; these two are understood
@@ -7,12 +7,12 @@
 //! 0,0.125,-0.5                        one line a sample, decimal points
 //! ```
 //!
-//! Where semicolons or tabs divide the cells, as in what a spreadsheet saves in half of Europe, the
+//! If the separator is a semicolon or a tab, as in spreadsheets of many European locales, the
 //! numbers may have decimal commas.
 //!
-//! Blank lines are skipped; a byte order mark and CRLF are tolerated. The stated sample time
-//! reports without rounding what t can only state up to its last digit; it counts where t agrees
-//! with it.
+//! Blank lines are skipped; a byte order mark and CRLF are accepted. The stated sample time gives
+//! without rounding the value that t gives only up to its last digit; it is used if t agrees with
+//! it.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -27,18 +27,18 @@ use crate::table::{Cell, Column, Source, Table, asides, check_names, check_numbe
 use crate::time::{Moments, is_time};
 use crate::wording::{list, shown};
 
-/// The text of the file, asked again when an error needs a line or a cell.
+/// The text of the file, read again when an error message needs a line or a cell.
 struct CsvSource<'a> {
     file: &'a str,
     text: &'a str,
     separator: u8,
     starts: RowStarts,
-    /// Where the last line starts, where it lacks its end.
+    /// Position of the last line, if it has no line end.
     open: Option<usize>,
 }
 
 impl CsvSource<'_> {
-    /// Where a row starts, and its cells.
+    /// Position of a row, and its cells.
     fn row(&self, row: usize) -> Option<(usize, csv::ByteRecord)> {
         let (mut at_row, from) = self.starts.before(row)?;
         let bytes = self.text.as_bytes();
@@ -57,12 +57,12 @@ impl CsvSource<'_> {
     }
 }
 
-/// Where a record starts, with what the reader skips before it.
+/// Position of a record, including the bytes that the reader skips before it.
 fn position(record: &csv::ByteRecord) -> usize {
     record.position().map_or(0, |p| p.byte() as usize)
 }
 
-/// Whether a record is a line of blanks: none of the rows.
+/// True if a record is a blank line, which is not a row.
 fn is_blank_line(record: &csv::ByteRecord) -> bool {
     record.len() == 1 && record[0].trim_ascii().is_empty()
 }
@@ -89,7 +89,7 @@ impl Source for CsvSource<'_> {
     }
 }
 
-/// The table in the bytes of a CSV file.
+/// Reads the table from the bytes of a CSV file.
 pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoError> {
     let text = text(bytes, file)?;
     let mut lines = text.lines().filter(|line| !is_aside(line));
@@ -123,7 +123,7 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
     let Rows {
         starts, empty_at_end, ..
     } = rows;
-    // Spreadsheets leave rows of bare separators after the table.
+    // Spreadsheets leave rows of separators only after the table.
     let count = starts.len() - empty_at_end;
     for column in &mut columns {
         column.values.truncate(count);
@@ -154,11 +154,11 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
     })
 }
 
-/// The first record that is not a blank line, and the bytes that it takes.
+/// The first record that is not a blank line, and its byte range.
 fn first_record(bytes: &[u8], separator: u8) -> Option<(csv::ByteRecord, Range<usize>)> {
     let mut reader = reader(bytes, separator);
     let mut record = csv::ByteRecord::new();
-    // The reader fails on nothing but input and output, of which there is none here.
+    // The reader fails only on I/O errors, which cannot occur here.
     while matches!(reader.read_byte_record(&mut record), Ok(true)) {
         if !is_blank_line(&record) {
             let start = row_start(bytes, position(&record));
@@ -168,17 +168,17 @@ fn first_record(bytes: &[u8], separator: u8) -> Option<(csv::ByteRecord, Range<u
     None
 }
 
-/// Rows that are read as whole CSV before plain ones are searched for again.
+/// Rows read by the full CSV reader before the fast one is tried again.
 const WHOLE: usize = 256;
 
-/// The rows of a table on their way into its columns.
+/// Rows to be added to the columns of a table.
 struct Rows<'a> {
     file: &'a str,
     bytes: &'a [u8],
     separator: u8,
     commas: bool,
     open: Option<usize>,
-    /// Whether a column may be the time.
+    /// True for columns that may be the time.
     times: Vec<bool>,
     moments: Vec<Moments>,
     starts: RowStarts,
@@ -186,7 +186,7 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// Takes the rows of plain numbers from `from` on; returns the start of the first line that is not plain.
+    /// Reads the plain rows from `from` on; returns the position of the first line that is not plain.
     fn plain(&mut self, from: usize, columns: &mut [Column]) -> usize {
         if self.commas {
             return from;
@@ -213,7 +213,7 @@ impl Rows<'_> {
         })
     }
 
-    /// Takes the rows from `from` on as whole CSV, [`WHOLE`] at most; where the next starts.
+    /// Reads at most [`WHOLE`] rows from `from` on as full CSV; returns the position of the next row.
     fn whole(&mut self, from: usize, columns: &mut [Column]) -> Result<usize, IoError> {
         let mut reader = reader(&self.bytes[from..], self.separator);
         let mut record = csv::ByteRecord::new();
@@ -252,7 +252,7 @@ impl Rows<'_> {
         self.starts.push(start);
         let each = columns.iter_mut().zip(&self.times).zip(&mut self.moments).zip(record);
         for (((column, is_time), moments), cell) in each {
-            // The text is UTF-8 as a whole and the separators are ASCII, so that each cell is as
+            // The text is valid UTF-8 and the separators are ASCII, so that each cell is valid as
             // well.
             let cell = std::str::from_utf8(cell).unwrap_or("\u{fffd}");
             let cell = &*with_decimal_point(cell, self.commas);
@@ -272,11 +272,11 @@ impl Rows<'_> {
     }
 }
 
-/// Lines above the last one whose numbers show how long one is.
+/// Lines before the last one with which the length of its numbers is compared.
 const COMPARED: usize = 8;
 
-/// The last number of a file may be cut: the last line lacks its end, and its last cell is shorter
-/// by two characters or more than that of each of the [`COMPARED`] lines before, which have digits
+/// Detects a truncated last number: the last line has no line end, and its last cell is at least
+/// two characters shorter than that of each of the [`COMPARED`] lines before, which have digits
 /// after a point.
 fn cut_number(source: &CsvSource<'_>, rows: usize) -> Option<String> {
     let last_cell = |row: usize| {
@@ -332,8 +332,8 @@ fn header(
     Ok(names.into_iter().map(column).collect())
 }
 
-/// Names that differ: columns of one name are called by their place, so that a signal can be chosen among
-/// them and the others do no harm.
+/// Makes names unique: columns with the same name are numbered by their position, so that a signal can be selected
+/// among them and the others do no harm.
 fn told_apart(names: Vec<String>, notes: &mut Vec<String>) -> Vec<String> {
     let mut count: HashMap<&str, usize> = HashMap::new();
     names.iter().for_each(|name| *count.entry(name).or_default() += 1);
@@ -358,7 +358,7 @@ fn told_apart(names: Vec<String>, notes: &mut Vec<String>) -> Vec<String> {
     found
 }
 
-/// The unit at the end of a name: `Stick [V]`, `e (deg)`. Numbers are an index or a part.
+/// The unit at the end of a name: `Stick [V]`, `e (deg)`. Numbers are an index or part of the name.
 fn unit_in(name: &str) -> Option<&str> {
     let (before, unit) = match name.strip_suffix(']') {
         Some(inside) => inside.rsplit_once('[')?,
@@ -405,8 +405,8 @@ mod tests {
         assert_eq!(names_and_rows(",t,e,u,\n0,0,1,2,\n").0, ["", "t", "e", "u", ""]);
     }
 
-    /// Cells between quotes are those of whole CSV; without them, rows of numbers are read by the fast
-    /// reader, in several parts. Both give the same bits, texts, precision and places.
+    /// Quoted cells are read by the full CSV reader; without quotes, rows of numbers are read by
+    /// the fast reader, in several parts. Both give the same bits, texts, precision and positions.
     #[test]
     fn plain_rows_are_those_of_whole_csv() {
         let mut state = 7_u64;
@@ -502,7 +502,7 @@ mod tests {
         let (t, texts, moments) = values("10:11:59.98,1\n10:12:00.00,1\n,1\n10:12:00.04,1\n");
         assert_eq!((t[0], t[1], t[3]), (0.0, 0.02, 0.06));
         assert!(t[2].is_nan() && texts.is_empty() && moments);
-        // A number or another text among them: the column is none of moments.
+        // A number or another text among them: the column does not hold clock times.
         for other in ["1", "abc"] {
             let (t, texts, moments) = values(&format!("10:11:59,1\n,1\n{other},1\n10:12:00,1\n"));
             assert_eq!(texts, if other == "1" { vec![0, 3] } else { vec![0, 2, 3] });
@@ -516,7 +516,7 @@ mod tests {
         let text = format!("t,e,u\n{rows}");
         let notes = |text: &str| parse(text.as_bytes(), "run.csv").unwrap().notes;
         assert!(notes(&text).is_empty());
-        // The end of the last line alone may be a habit of who wrote it.
+        // A missing line end alone may be a habit of the writing program.
         assert!(notes(text.trim_end()).is_empty());
         let found = notes(&text[..text.len() - 4]);
         assert!(
@@ -528,7 +528,7 @@ mod tests {
             found.contains("run.csv is cut in line 21, its last: 2 of 3 values"),
             "{found}"
         );
-        // In the middle of a file that is not a cut.
+        // In the middle of a file it is not a truncation.
         assert!(message(b"t,e,u\n0,1\n1,2,3").contains("line 2: 2 values, expected 3"));
         let table = parse(b"t,e,u\n0,1,2\n1,2,-", "run.csv").unwrap();
         let error = table.bad_value(2, 1, 0..2).to_string();

@@ -21,16 +21,16 @@ pub(crate) fn text<'a>(bytes: &'a [u8], file: &str) -> Result<&'a str, IoError> 
     })
 }
 
-/// Characters that make a spreadsheet run what starts with them.
+/// Characters that make a spreadsheet execute the cell that starts with them.
 const RUN: [char; 6] = ['=', '+', '-', '@', '\t', '\r'];
 
-/// Whether a spreadsheet may run a cell: numbers and a sign alone are none of that.
+/// True if a spreadsheet may execute a cell: numbers and a lone sign are safe.
 fn is_run(cell: &str) -> bool {
     cell.starts_with(RUN) && !["-", "+"].contains(&cell) && !matches!(Cell::parse(cell), Cell::Number(_))
 }
 
-/// A text as it is written: what a spreadsheet would run has an apostrophe in front, which makes it
-/// text for spreadsheets and which [`as_meant`] takes away again.
+/// A text as written: one that a spreadsheet would execute is prefixed by an apostrophe, which
+/// marks it as text and which [`as_meant`] removes.
 pub(crate) fn harmless(cell: &str) -> Cow<'_, str> {
     if is_run(cell.trim_start_matches('\'')) {
         Cow::Owned(format!("'{cell}"))
@@ -39,7 +39,7 @@ pub(crate) fn harmless(cell: &str) -> Cow<'_, str> {
     }
 }
 
-/// A text as it was meant, from [`harmless`].
+/// Restores the original text from [`harmless`].
 pub(crate) fn as_meant(cell: &str) -> &str {
     match cell.strip_prefix('\'') {
         Some(meant) if is_run(meant.trim_start_matches('\'')) => meant,
@@ -47,7 +47,7 @@ pub(crate) fn as_meant(cell: &str) -> &str {
     }
 }
 
-/// Whether the last line lacks its end, and where it starts.
+/// Position of the last line, if it has no line end.
 pub(crate) fn open_line(text: &str) -> Option<usize> {
     let ends = ['\n', '\r'];
     (!text.ends_with(ends)).then(|| text.rfind(ends).map_or(0, |at| at + 1))
@@ -66,7 +66,7 @@ pub(crate) fn is_aside(line: &str) -> bool {
     line.trim().is_empty() || line.starts_with('#')
 }
 
-/// The separator that the header holds most of; the comma when it holds none.
+/// The most frequent separator in the header; the comma if there is none.
 pub(crate) fn separator(header: &str) -> u8 {
     let mut quoted = false;
     let mut counts = [(b',', 0), (b';', 0), (b'\t', 0)];
@@ -82,8 +82,8 @@ pub(crate) fn separator(header: &str) -> u8 {
         .map_or(b',', |best| best.0)
 }
 
-/// Refuses a table whose cells are divided by blanks, of which everything would be one column: a
-/// header without any separator, over a line of several numbers between blanks.
+/// Refuses a table separated by blanks, which would be read as one column: a header without
+/// separator, over a line of several numbers between blanks.
 pub(crate) fn refuse_blanks(header: &str, first: Option<&str>, file: &str) -> Result<(), IoError> {
     let is_number = |word: &str| matches!(Cell::parse(word), Cell::Number(_));
     let cells = first.map_or(0, |line| line.split_whitespace().count());
@@ -97,8 +97,9 @@ pub(crate) fn refuse_blanks(header: &str, first: Option<&str>, file: &str) -> Re
     })
 }
 
-/// Whether the numbers of a table have decimal commas: some cell is a number with a comma, and none
-/// has a point, next to which a comma may be one of thousands. Commas must not divide the cells.
+/// True if the numbers of a table have decimal commas: some cell is a number with a comma, and none
+/// has a point, with which a comma may separate thousands. The comma must not be the cell
+/// separator.
 pub(crate) fn has_decimal_commas(text: &str, separator: u8) -> bool {
     let mut reader = reader(text.as_bytes(), separator);
     let mut record = csv::ByteRecord::new();
@@ -120,7 +121,7 @@ pub(crate) fn comments(text: &str) -> impl Iterator<Item = &str> {
     lines.filter_map(|line| line.strip_prefix('#'))
 }
 
-/// The start of a row, after the comments and blank lines that the reader skips with it.
+/// Position of a row after the comments and blank lines that the reader skips with it.
 pub(crate) fn row_start(bytes: &[u8], mut at: usize) -> usize {
     while let Some(byte) = bytes.get(at) {
         match byte {
@@ -135,7 +136,7 @@ pub(crate) fn row_start(bytes: &[u8], mut at: usize) -> usize {
 pub(crate) fn place(bytes: &[u8], at: usize) -> String {
     let before = &bytes[..at.min(bytes.len())];
     let count = |end| before.iter().filter(|b| **b == end).count();
-    // A file with bare carriage returns has lines as well.
+    // A file with bare carriage returns has lines too.
     let lines = if bytes.contains(&b'\n') {
         count(b'\n')
     } else {

@@ -1,10 +1,10 @@
-//! Data elements of version 5: a tag of type and length, then the data, filled up to a multiple of
-//! 8 bytes. Data of up to 4 bytes may be in the tag.
+//! Data elements of version 5: a tag of type and length, then the data, padded to a multiple of 8
+//! bytes. Data of up to 4 bytes may be in the tag.
 
 /// Length of the header of version 5.
 pub(super) const HEADER: usize = 128;
 
-/// The type of data, by MathWorks' numbers.
+/// Data types, by MathWorks' numbers.
 pub(super) mod data {
     pub(crate) const INT8: u32 = 1;
     pub(crate) const UINT8: u32 = 2;
@@ -23,14 +23,14 @@ pub(super) mod data {
     pub(crate) const UTF32: u32 = 18;
 }
 
-/// One element.
+/// A data element.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Element<'a> {
     pub(super) kind: u32,
     pub(super) bytes: &'a [u8],
 }
 
-/// Elements one after the other.
+/// Consecutive elements.
 #[derive(Debug, Clone)]
 pub(super) struct Elements<'a> {
     rest: &'a [u8],
@@ -78,7 +78,7 @@ impl<'a> Elements<'a> {
         let Some(bytes) = data.get(..length) else {
             return Err(format!("an element of {length} bytes ends after {}", data.len()));
         };
-        // Compressed elements are not filled up; the last of a file may be cut there.
+        // Compressed elements are not padded; the last one of a file may be truncated there.
         let padded = if first == data::COMPRESSED {
             length
         } else {
@@ -88,7 +88,7 @@ impl<'a> Elements<'a> {
         Ok(Element { kind: first, bytes })
     }
 
-    /// The next element of a type.
+    /// The next element, which must be of the given type.
     pub(super) fn of(&mut self, kind: u32, what: &str) -> Result<&'a [u8], String> {
         match self.next()? {
             element if element.kind == kind => Ok(element.bytes),
@@ -96,7 +96,7 @@ impl<'a> Elements<'a> {
         }
     }
 
-    /// Whole numbers of 4 bytes.
+    /// 32-bit unsigned integers.
     pub(super) fn u32s(&self, bytes: &[u8]) -> Vec<u32> {
         bytes.chunks_exact(4).filter_map(|bytes| self.u32(bytes)).collect()
     }

@@ -1,4 +1,4 @@
-//! Variables of MATLAB.
+//! MAT-files of MATLAB.
 //!
 //! | module | contents |
 //! |---|---|
@@ -12,7 +12,7 @@
 //! | `write` | version 7, one variable a column |
 //!
 //! Structures and cells become paths: `data.run(3).e`, `c{2}`; the index of an array of structures
-//! counts along its columns, as MATLAB's linear index does.
+//! is column-major, as MATLAB's linear index.
 
 mod elements;
 mod names;
@@ -34,7 +34,7 @@ pub(super) const MAT: Format = Format {
     record: None,
 };
 
-/// HDF5 of other programs: datasets in groups, whose sizes are given as numpy counts them.
+/// HDF5 of other programs: datasets in groups, with dimensions in the order of numpy.
 pub(super) const HDF5: Format = Format {
     name: "HDF5",
     endings: &["h5", "hdf5"],

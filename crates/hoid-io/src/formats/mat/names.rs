@@ -1,12 +1,11 @@
-//! Names of columns and names of variables.
+//! Names of columns and of variables.
 //!
-//! A name that MATLAB does not take, such as `K e` or `f-y`, is written as the nearest that it
-//! does, and kept alongside.
+//! A name that is invalid in MATLAB, such as `K e` or `f-y`, is replaced by the nearest valid one,
+//! and the original is stored as well.
 
 use crate::formats::arrays::{COMMENTS, Entry, Value};
 
-/// The variable that keeps the names that are not names of variables, each line a variable and the
-/// name it represents.
+/// The variable that stores the original names, each line a variable and its column name.
 pub(super) const NAMES: &str = "hoid_names";
 /// MATLAB truncates longer names.
 const LONGEST_NAME: usize = 63;
@@ -33,7 +32,7 @@ const KEYWORDS: [&str; 20] = [
     "while",
 ];
 
-/// A name of a variable for each column, all different.
+/// A distinct variable name for each column.
 pub(super) fn variables(names: &[&str]) -> Vec<String> {
     let mut variables: Vec<String> = Vec::with_capacity(names.len());
     for name in names {
@@ -47,7 +46,7 @@ pub(super) fn variables(names: &[&str]) -> Vec<String> {
             _ => format!("x{plain}"),
         };
         let mut variable: String = plain.chars().take(LONGEST_NAME).collect();
-        // A column that has the name already keeps it.
+        // A column that already has the name keeps it.
         let taken = |variable: &str| {
             variables.iter().any(|v| v == variable)
                 || [COMMENTS, NAMES].contains(&variable)
@@ -64,7 +63,7 @@ pub(super) fn variables(names: &[&str]) -> Vec<String> {
     variables
 }
 
-/// The variables under the names that they were written for.
+/// Renames the variables to their original names.
 pub(super) fn named(mut entries: Vec<Entry>) -> Vec<Entry> {
     let at = entries.iter().position(|entry| entry.path == NAMES);
     if let Some(Value::Texts(lines)) = at.map(|at| entries.remove(at).value) {

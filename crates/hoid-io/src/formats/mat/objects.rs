@@ -1,8 +1,8 @@
-//! Objects of MATLAB: only MATLAB reads what is in them, and a line there takes their numbers out.
+//! Objects of MATLAB: only MATLAB can read their contents, and one line of MATLAB extracts their numbers.
 
 use crate::formats::arrays::OBJECT;
 
-/// An object of a class as text, with the line of MATLAB that saves its numbers.
+/// Description of an object of a class, with the line of MATLAB that saves its numbers.
 pub(super) fn object(class: &str) -> String {
     let line = match class {
         "timetable" => "t = seconds(x.Properties.RowTimes - x.Properties.RowTimes(1)); e = x.e; u = x.u;",

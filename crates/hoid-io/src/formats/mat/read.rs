@@ -1,4 +1,4 @@
-//! The variables of a file of any version, given by its first bytes.
+//! The variables of a file of any version, which its first bytes determine.
 
 use super::elements::HEADER;
 use super::names::named;
@@ -9,7 +9,7 @@ use crate::formats::budget::Budget;
 
 /// The first bytes of HDF5.
 const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
-/// The variables in the bytes of a file.
+/// Reads the variables from the bytes of a file.
 pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<Contents, IoError> {
     let wrong = |found: String| IoError::WrongFormat {
         file: file.to_owned(),

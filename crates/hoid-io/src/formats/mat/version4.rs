@@ -5,11 +5,11 @@ use crate::IoError;
 use crate::formats::arrays::{Array, Entry, Kind, Numbers, Value};
 use crate::formats::budget::Budget;
 
-/// Bytes of the five numbers.
+/// Size of the five numbers, bytes.
 const HEADER: usize = 20;
 const LONGEST_NAME: usize = 256;
 
-/// The variables of a file.
+/// Reads the variables of a file.
 pub(super) fn read(bytes: &[u8], budget: &mut Budget, file: &str) -> Result<Vec<Entry>, IoError> {
     let mut rest = bytes;
     let mut entries = Vec::new();
@@ -37,8 +37,8 @@ fn variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
             u32::from_le_bytes(bytes)
         }
     };
-    // Thousands: the order of bytes and other machines; hundreds: nothing; tens: the type; ones:
-    // what it is.
+    // Thousands: byte order and machine type; hundreds: unused; tens: the type; ones: the kind of
+    // matrix.
     let big_endian = number(0, false) > 4999;
     let kinds = number(0, big_endian);
     if kinds > 1999 || !kinds.is_multiple_of(1000) && kinds % 1000 / 100 != 0 {
@@ -75,7 +75,7 @@ fn variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
         _ if imaginary != 0 => Value::Unread(String::from("complex numbers")),
         0 => {
             let numbers = numbers();
-            // Whole numbers represent any: version 4 has one class.
+            // Integers may be any numbers: version 4 has one class.
             let numbers = if kind.is_whole() {
                 Numbers::from_f64(&numbers.values())
             } else {

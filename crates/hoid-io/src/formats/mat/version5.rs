@@ -1,5 +1,5 @@
-//! Versions 5 to 7 (MathWorks, "MAT-File Format", 2019, chapter 1): since 7 each variable may be
-//! deflated.
+//! Versions 5 to 7 (MathWorks, "MAT-File Format", 2019, chapter 1): from version 7 on each variable
+//! may be deflated.
 
 use std::io::Read;
 
@@ -22,14 +22,14 @@ const SINGLE: u32 = 7;
 const UINT64: u32 = 15;
 const FUNCTION: u32 = 16;
 const OPAQUE: u32 = 17;
-/// The bit of complex numbers in the flags.
+/// Flag of complex numbers.
 const COMPLEX: u32 = 0x800;
-/// MATLAB takes 63 characters.
+/// MATLAB allows 63 characters.
 const LONGEST_NAME: usize = 256;
 /// Approximate memory of an entry in addition to its path and its values, bytes.
 const ENTRY_BYTES: u64 = 256;
 
-/// Why a variable is not read: the format is contradicted, or something else is wrong.
+/// Reason why a variable is not read: a violation of the format, or another error.
 enum Stop {
     Damaged(String),
     Other(IoError),
@@ -47,7 +47,7 @@ impl From<IoError> for Stop {
     }
 }
 
-/// The variables of a file.
+/// Reads the variables of a file.
 pub(super) fn read(bytes: &[u8], big_endian: bool, budget: &mut Budget, file: &str) -> Result<Vec<Entry>, IoError> {
     let mut elements = Elements::new(bytes.get(HEADER..).unwrap_or_default(), big_endian);
     let mut reader = Reader {
@@ -75,19 +75,19 @@ struct Reader<'a> {
     file: &'a str,
 }
 
-/// Position of something.
+/// Position of a variable.
 #[derive(Clone, Copy)]
 struct VariablePath<'a> {
-    /// The structure around it; empty at top level.
+    /// The enclosing structure; empty at top level.
     parent: &'a str,
-    /// Its path; at top level the name that the variable has itself.
+    /// Its path; at top level the name of the variable.
     path: &'a str,
     depth: usize,
 }
 
 impl Reader<'_> {
     fn variable(&mut self, elements: &mut Elements<'_>) -> Result<(), Stop> {
-        // At top level an element that goes beyond the file is what a cut leaves.
+        // At top level an element that extends beyond the file is the result of truncation.
         let cut = |found: String| format!("the file is cut, or a length is wrong: {found}");
         let element = elements.next().map_err(cut)?;
         let top = VariablePath {
@@ -101,13 +101,13 @@ impl Reader<'_> {
                 let bytes = self.inflated(element.bytes, elements.big_endian)?;
                 self.matrix(&bytes, elements.big_endian, top)
             }
-            // What programs put between the variables.
+            // Data that programs put between the variables.
             _ => Ok(()),
         }
     }
 
-    /// The data of the matrix in deflated bytes. Its tag states how long it is at most: Octave
-    /// counts the data that are in a tag twice.
+    /// Inflates the data of a matrix. Its tag gives an upper bound of its length: Octave counts the
+    /// data in a tag twice.
     fn inflated(&mut self, bytes: &[u8], big_endian: bool) -> Result<Vec<u8>, Stop> {
         let failed = |error: std::io::Error| Stop::Damaged(told(&error.to_string()));
         let mut decoder = ZlibDecoder::new(bytes);
@@ -131,9 +131,9 @@ impl Reader<'_> {
         Ok(inflated)
     }
 
-    /// An array of any class, its parts after one another.
+    /// Reads an array of any class, part by part.
     fn matrix(&mut self, bytes: &[u8], big_endian: bool, place: VariablePath<'_>) -> Result<(), Stop> {
-        // A field that was never set.
+        // An unset field.
         if bytes.is_empty() {
             return self.push(place, place.path, Value::Array(Array::vector(Numbers::from_f64(&[]))));
         }
@@ -165,7 +165,7 @@ impl Reader<'_> {
             return Err(format!("an array of {} dimensions", dims.len()).into());
         }
         let name = name(parts.next()?.bytes)?;
-        // What has no name is not a variable: MATLAB keeps the parts of objects there.
+        // An element without a name is not a variable: MATLAB stores the parts of objects there.
         if place.depth == 0 && name.is_empty() {
             return Ok(());
         }
@@ -182,7 +182,7 @@ impl Reader<'_> {
             }
             CHAR => {
                 let bytes = parts.clone().next().map_or(0, |element| element.bytes.len());
-                // They are taken apart into characters of four bytes.
+                // They are expanded to characters of four bytes.
                 let rows = dims.first().map_or(1, |rows| (*rows).min(bytes));
                 self.budget.take_texts(rows, 5 * bytes, self.file)?;
                 let texts = texts(&mut parts, &dims, count)?;
@@ -233,7 +233,7 @@ impl Reader<'_> {
         Ok(numbers)
     }
 
-    /// One or more structures of the same fields.
+    /// Reads one or more structures with the same fields.
     fn structure(&mut self, mut parts: Elements<'_>, count: usize, place: VariablePath<'_>) -> Result<(), Stop> {
         let depth = deeper(place)?;
         let length = parts.of(data::INT32, "the length of the names of fields")?;
@@ -265,7 +265,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// The cells, each under a path of its own; texts alone are one column.
+    /// Reads the cells, each with its own path; cells that hold only texts are one column.
     fn cell(&mut self, mut parts: Elements<'_>, count: usize, place: VariablePath<'_>) -> Result<(), Stop> {
         let depth = deeper(place)?;
         let before = self.entries.len();
@@ -315,7 +315,7 @@ fn deeper(place: VariablePath<'_>) -> Result<usize, Stop> {
     Ok(place.depth + 1)
 }
 
-/// A name, which may be filled up with zeros.
+/// Reads a name, which may be padded with zeros.
 fn name(bytes: &[u8]) -> Result<String, String> {
     let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
     if end > LONGEST_NAME {

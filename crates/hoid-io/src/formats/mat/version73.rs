@@ -1,7 +1,8 @@
-//! Version 7.3: HDF5 in MATLAB's manner, and HDF5 of other programs. Structures are groups, arrays of structures and
-//! cells are references to what is under `/#refs#`, sizes are in the order of C and so read backwards, `MATLAB_class`
-//! states what a dataset is and `MATLAB_object_decode` that it is an object. Datasets without them, as other programs
-//! write them, are numbers; where no MATLAB is expected, sizes stay in the order of C.
+//! Version 7.3: HDF5 in MATLAB's conventions, and HDF5 of other programs. Structures are groups, arrays of structures
+//! and cells are references to objects under `/#refs#`, dimensions are in the order of C and therefore reversed,
+//! `MATLAB_class` gives the class of a dataset and `MATLAB_object_decode` marks an object. Datasets without these
+//! attributes, as other programs write them, are numbers; in files that are not from MATLAB, dimensions remain in the
+//! order of C.
 
 use hdf5_pure::{AttrValue, DType, Dataset, Error, File, Group, H5Element, Object};
 
@@ -12,12 +13,12 @@ use crate::formats::budget::{Budget, MOST_NESTED};
 use crate::formats::guarded::guarded;
 use crate::wording::told;
 
-/// Cost of visiting a group or a dataset, bytes: links may be circular.
+/// Memory charged for each visit of a group or dataset, bytes: links may be circular.
 const VISIT: u64 = 1 << 13;
-/// Arrays of structures and cells of more elements are not columns.
+/// Arrays of structures and cells with more elements are not columns.
 const MOST_REFERENCES: u64 = 1 << 16;
 
-/// The variables of a file, their sizes as MATLAB or numpy counts them.
+/// Reads the variables of a file, with dimensions in the order of MATLAB or numpy.
 pub(super) fn read(bytes: Vec<u8>, file: &str, indexing: Indexing) -> Result<Vec<Entry>, IoError> {
     guarded(file, || {
         let mut reader = Reader {
@@ -40,7 +41,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// Error of the crate: damage, or an unsupported feature.
+    /// Converts an error of the crate: damage, or an unsupported feature.
     fn damaged(&self, place: &str, error: &Error) -> IoError {
         let what = error.to_string();
         let cut = if what.contains("unexpected EOF") {
@@ -62,7 +63,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Contents of a group, which is a structure or the whole file.
+    /// Reads a group, which is a structure or the whole file.
     fn group(&mut self, group: &Group, path: &str, depth: usize) -> Result<(), IoError> {
         self.budget.take(VISIT, self.file)?;
         if depth > MOST_NESTED {
@@ -84,7 +85,7 @@ impl Reader<'_> {
         }
         let groups = group.iter_groups().map_err(|error| self.damaged(path, &error))?;
         for (name, group) in groups {
-            // What MATLAB keeps for itself.
+            // Data that MATLAB stores for itself.
             if !(depth == 0 && name.starts_with('#')) {
                 self.group(&group, &inside(&name), depth + 1)?;
             }
@@ -92,8 +93,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// A dataset. The parent of one in an array of structures is the element, and its path starts
-    /// with it.
+    /// Reads a dataset. The parent of one in an array of structures is the element, and its path
+    /// starts with it.
     fn dataset(&mut self, dataset: &Dataset, parent: &str, path: &str, depth: usize) -> Result<(), IoError> {
         self.budget.take(VISIT, self.file)?;
         let error = |reader: &Self, error: Error| reader.damaged(path, &error);
@@ -162,7 +163,7 @@ impl Reader<'_> {
         self.push(parent, path, value)
     }
 
-    /// Cells, each `path{k}`, or one field of an array of structures, each `parent(k).field`.
+    /// Reads cells, each `path{k}`, or one field of an array of structures, each `parent(k).field`.
     fn references(
         &mut self,
         dataset: &Dataset,
@@ -178,7 +179,7 @@ impl Reader<'_> {
         }
         let objects = match dataset.dereference() {
             Ok(objects) => objects,
-            // A reference to nothing is not damage.
+            // A null reference is not damage.
             Err(error) => {
                 let what = format!("references that lead nowhere ({})", told(&error.to_string()));
                 return self.push(parent, path, Value::Unread(what));
@@ -202,7 +203,7 @@ impl Reader<'_> {
                 _ => {}
             }
         }
-        // Cells of texts alone are one column.
+        // Cells that hold only texts are one column.
         let text = |entry: &Entry| matches!(&entry.value, Value::Texts(texts) if texts.len() == 1);
         if cells && self.entries.len() - before == count && self.entries[before..].iter().all(text) {
             let texts = self.entries.drain(before..).filter_map(|entry| match entry.value {
@@ -264,7 +265,7 @@ fn texts(units: &[u16], dims: &[usize]) -> Vec<String> {
     }
 }
 
-/// A number as bytes, the little end first.
+/// A number as little-endian bytes.
 trait Bytes {
     fn append(&self, bytes: &mut Vec<u8>);
 }

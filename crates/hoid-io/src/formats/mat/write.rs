@@ -1,5 +1,5 @@
-//! Version 7, each variable deflated: a column of numbers is a variable of one column, of texts a
-//! cell of them.
+//! Version 7, each variable deflated: a numeric column is a variable with one column, a column of
+//! texts is a cell array.
 
 use std::io::{self, Write};
 
@@ -16,9 +16,9 @@ const CHAR: u32 = 4;
 const DOUBLE: u32 = 6;
 const UINT64: u32 = 15;
 
-/// Writes columns, and the comments as a cell of texts.
+/// Writes columns, and the comments as a cell array of texts.
 pub(super) fn write(file: &mut dyn Write, schema: &TableSchema, columns: &[Values<'_>]) -> io::Result<()> {
-    // Nothing of time or place: the same columns give the same bytes.
+    // No time or place is written: the same columns give the same bytes.
     let mut header = format!("MATLAB 5.0 MAT-file, written by hoid {}", env!("CARGO_PKG_VERSION")).into_bytes();
     header.resize(HEADER - 12, b' ');
     header.extend([0; 8]);
@@ -76,7 +76,7 @@ fn column(name: &str, values: Values<'_>) -> io::Result<Vec<u8>> {
     Ok(element.bytes)
 }
 
-/// The parts of an array, one after the other.
+/// Parts of an array in sequence.
 #[derive(Default)]
 struct Matrix {
     bytes: Vec<u8>,

@@ -1,8 +1,8 @@
-//! The zip around the arrays: each member `name.npy` is the array `name`.
+//! The zip archive around the arrays: each member `name.npy` is the array `name`.
 //!
-//! Reading takes stored and deflated members. Writing stores them, as `numpy.savez` does, without
-//! times, so that the same columns give the same bytes; texts keep no zeros at their end, which
-//! numpy's type of text cannot hold.
+//! Reading accepts stored and deflated members. Writing stores them, as `numpy.savez` does, without
+//! times, so that the same columns give the same bytes; trailing zeros of texts are lost, since
+//! numpy's text type cannot hold them.
 
 use std::io::{self, Cursor, Read, Write};
 
@@ -18,7 +18,7 @@ use crate::formats::guarded::guarded;
 use crate::results::{TableSchema, Values};
 use crate::wording::{shown, told};
 
-/// The arrays in the bytes of a file.
+/// Reads the arrays from the bytes of a file.
 pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
     if !bytes.starts_with(b"PK") {
         let start = String::from_utf8_lossy(&bytes[..bytes.len().min(12)]).into_owned();
@@ -55,7 +55,7 @@ fn members(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
         };
         let size = member.size();
         budget.take(size, file)?;
-        // What is promised is not reserved: memory grows with the existing data.
+        // The stated length is not reserved: memory grows with the existing data.
         let mut data = Vec::new();
         let read = (&mut member).take(size.saturating_add(1)).read_to_end(&mut data);
         read.map_err(|error| damaged(&told(&error.to_string())))?;

@@ -1,8 +1,8 @@
 //! The header of NPY: a Python dictionary of `descr`, `fortran_order` and `shape` (NEP 1, versions
 //! 1 to 3).
 //!
-//! The literal is read here because it is small, and because a general reader of Python literals
-//! recurses as deep as a hostile header states.
+//! The literal is parsed here because it is small, and because a general parser of Python literals
+//! recurses as deep as a hostile header demands.
 
 /// Content of a header.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,13 +15,13 @@ pub(super) struct Header {
 /// The type of an item.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Descr {
-    /// Such as `<f8`.
+    /// A plain type, such as `<f8`.
     Plain(String),
-    /// The fields of a structured array, each with anything after its type, if anything does.
+    /// The fields of a structured array, each with its type if it is plain.
     Fields(Vec<(String, Option<String>)>),
 }
 
-/// A Python literal as far as a header needs it.
+/// A Python literal, as far as a header needs it.
 #[derive(Debug, Clone, PartialEq)]
 enum Literal {
     Text(String),
@@ -30,10 +30,10 @@ enum Literal {
     Sequence(Vec<Literal>),
 }
 
-/// Sequences inside of sequences: a shape in a field in a list.
+/// Maximum nesting of sequences: a shape in a field in a list.
 const DEEPEST: usize = 6;
 
-/// Reads the text between the length and the numbers.
+/// Parses the text between the length and the numbers.
 pub(super) fn parse(text: &str) -> Option<Header> {
     let mut reader = Reader { rest: text };
     reader.token('{')?;
@@ -70,7 +70,7 @@ pub(super) fn parse(text: &str) -> Option<Header> {
     })
 }
 
-/// A field: name and type, or name, type and shape. The name may be a pair of title and name.
+/// Parses a field: name and type, or name, type and shape. The name may be a pair of title and name.
 fn field(field: &Literal) -> Option<(String, Option<String>)> {
     let Literal::Sequence(parts) = field else { return None };
     let name = match parts.first()? {
@@ -111,7 +111,7 @@ impl Reader<'_> {
                 }
                 (_, '\\') => match characters.next()?.1 {
                     c @ ('\\' | '\'' | '"') => text.push(c),
-                    // Python's other escapes do not be in names that hoid could show.
+                    // Other Python escapes do not occur in names that hoid can display.
                     c => text.extend(['\\', c]),
                 },
                 (_, c) => text.push(c),
@@ -143,7 +143,7 @@ impl Reader<'_> {
             '0'..='9' => {
                 let end = self.rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(self.rest.len());
                 let (digits, rest) = self.rest.split_at(end);
-                // Python 2 wrote long integers with an L.
+                // Python 2 wrote long integers with a trailing L.
                 self.rest = rest.strip_prefix('L').unwrap_or(rest);
                 digits.parse().ok().map(Literal::Whole)
             }
@@ -160,7 +160,7 @@ impl Reader<'_> {
     }
 }
 
-/// A Python string literal.
+/// Writes a Python string literal.
 pub(super) fn quoted(text: &str) -> String {
     format!("'{}'", text.replace('\\', "\\\\").replace('\'', "\\'"))
 }

@@ -1,4 +1,4 @@
-//! NPZ, the archive of arrays of numpy, and NPY, one array of it.
+//! NPZ, numpy's archive of arrays, and NPY, a single array of it.
 //!
 //! | module | contents |
 //! |---|---|

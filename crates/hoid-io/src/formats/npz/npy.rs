@@ -1,4 +1,4 @@
-//! One array of numpy.
+//! A single numpy array.
 
 use std::rc::Rc;
 
@@ -10,9 +10,9 @@ use crate::results::Values;
 use crate::wording::shown;
 
 const MAGIC: &[u8] = b"\x93NUMPY";
-/// A header of more bytes is damage.
+/// A longer header is damage, bytes.
 const LONGEST_HEADER: usize = 1 << 20;
-/// The numbers start at a multiple of it.
+/// The numbers start at a multiple of this, bytes.
 const ALIGNMENT: usize = 64;
 
 /// Problems with an array.
@@ -29,7 +29,7 @@ impl From<IoError> for NpyError {
     }
 }
 
-/// The type of an item: `<f8` and so on.
+/// Type of an item: `<f8` and so on.
 enum Item {
     Numbers {
         kind: Kind,
@@ -44,7 +44,7 @@ enum Item {
     Bytes {
         length: usize,
     },
-    /// Whole numbers of a unit, which is a power of ten of s: moments, or times between such.
+    /// Integer counts of a unit, which is a power of ten of s: clock times, or time differences.
     Clock {
         big_endian: bool,
         unit_s: f64,
@@ -97,7 +97,7 @@ impl Item {
         Self::Numbers { kind, big_endian }
     }
 
-    /// The unit that a type states.
+    /// Unit stated by the type.
     fn unit(&self) -> String {
         String::from(match self {
             Self::Clock { moments: true, .. } => MOMENTS,
@@ -117,8 +117,7 @@ impl Item {
     }
 }
 
-/// Contents of an array: one entry, or one for each field, at the top level where there is no other
-/// array.
+/// Contents of an array: one entry, or one for each field, at top level if there is no other array.
 pub(super) fn entries(
     bytes: Vec<u8>,
     name: &str,
@@ -144,7 +143,7 @@ pub(super) fn entries(
     Ok(entries)
 }
 
-/// Memory of the items when read, in addition to their bytes.
+/// Reserves the memory of the items when read, in addition to their bytes.
 fn unpacked(header: &Header, budget: &mut Budget, file: &str) -> Result<(), IoError> {
     let count = header
         .shape
@@ -190,14 +189,14 @@ fn header_of(bytes: &[u8]) -> Result<(Header, usize), NpyError> {
     let text = bytes
         .get(before..before + length)
         .ok_or_else(|| damaged("the array ends in its header"))?;
-    // Latin 1 before version 3; what hoid needs is ASCII in both, except for names.
+    // Latin 1 before version 3; all that hoid needs is ASCII in both, except for names.
     let text = String::from_utf8_lossy(text);
     let header = header::parse(&text)
         .ok_or_else(|| NpyError::Damaged(format!("the header of an array reads {}", shown(&text))))?;
     Ok((header, before + length))
 }
 
-/// The count of items, where they fill the bytes.
+/// Number of items, if they fill the bytes.
 fn count(header: &Header, size: usize, bytes: usize) -> Result<usize, NpyError> {
     let count = header
         .shape
@@ -224,7 +223,7 @@ fn plain(item: &Item, header: &Header, data: Vec<u8>) -> Result<Value, NpyError>
             dims: header.shape.clone(),
             last_fastest: !header.fortran_order,
         }),
-        // Of no length there may be any number.
+        // Items of length zero may be any number.
         Item::Unicode { length: 0, .. } | Item::Bytes { length: 0 } => Value::Texts(vec![String::new(); count]),
         Item::Unicode { big_endian, .. } => {
             Value::Texts(data.chunks_exact(size).map(|text| unicode(text, *big_endian)).collect())
@@ -243,7 +242,7 @@ fn plain(item: &Item, header: &Header, data: Vec<u8>) -> Result<Value, NpyError>
     })
 }
 
-/// The unit in `M8[ns]` and `m8[10us]`, s. Months and years have no fixed length.
+/// The unit in `M8[ns]` and `m8[10us]`, s. Months and years have no fixed duration.
 fn clock_unit(descr: &str) -> Option<f64> {
     let unit = descr.strip_prefix(['M', 'm'])?.strip_prefix("8[")?.strip_suffix(']')?;
     let from = unit.find(|c: char| !c.is_ascii_digit())?;
@@ -261,13 +260,13 @@ fn clock_unit(descr: &str) -> Option<f64> {
     Some(count * unit_s)
 }
 
-/// The numbers of a clock in s, moments from the first; invalid ones (NaT) are NaN.
+/// The counts of a clock in s, clock times relative to the first; invalid ones (NaT) are NaN.
 fn clock(counts: &Numbers, unit_s: f64, moments: bool) -> Numbers {
     let known: Vec<Option<i64>> = (0..counts.len())
         .map(|at| counts.whole(at).filter(|n| *n != i64::MIN))
         .collect();
     let first = known.iter().flatten().next().copied().filter(|_| moments).unwrap_or(0);
-    // A quotient keeps the digits that a product with 1e-9 loses.
+    // A quotient keeps the digits that a product with 1e-9 would lose.
     let seconds = |count: i64| {
         let count = (i128::from(count) - i128::from(first)) as f64;
         if unit_s < 1.0 {
@@ -328,7 +327,7 @@ fn structured(
             Item::Bytes { .. } if size > 0 => texts(&latin),
             other => unread(&other),
         };
-        // Fields without a name fill a gap.
+        // Fields without a name are padding.
         if !name.is_empty() {
             values.push((name.clone(), value));
         }
@@ -354,7 +353,7 @@ fn latin(bytes: &[u8]) -> String {
     String::from_utf8_lossy(&bytes[..end]).into_owned()
 }
 
-/// An array of one dimension, as numpy writes it.
+/// A one-dimensional array, as numpy writes it.
 pub(super) fn written(values: Values<'_>) -> Vec<u8> {
     let (descr, data): (String, Vec<u8>) = match values {
         Values::Real(values) => (

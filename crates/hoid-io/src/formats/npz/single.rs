@@ -5,8 +5,8 @@ use crate::IoError;
 use crate::formats::arrays::{Contents, Indexing};
 use crate::formats::budget::Budget;
 
-/// The one array in an NPY file; it is named as `numpy.savez` names an array without a name. The
-/// fields of a structured array are columns of their own.
+/// Reads the array of an NPY file; it is named as `numpy.savez` names an unnamed array. The fields
+/// of a structured array are separate columns.
 pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<Contents, IoError> {
     let mut budget = Budget::of(bytes.len());
     let entries = entries(bytes, "arr_0", true, (&mut budget, file)).map_err(|error| match error {

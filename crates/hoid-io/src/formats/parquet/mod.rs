@@ -1,5 +1,5 @@
-//! Apache Parquet (<https://parquet.apache.org/docs/file-format/>) by the crate `parquet`, as far
-//! as flat tables need it.
+//! Apache Parquet (<https://parquet.apache.org/docs/file-format/>) by the crate `parquet`, for flat
+//! tables.
 //!
 //! | module | contents |
 //! |---|---|

@@ -1,11 +1,11 @@
 //! Unpacked size of the pages of a column, before unpacking.
 //!
-//! The footer states how long a column is when unpacked, each page states it again in its header, and no one has to be
-//! right: a page of a few kB may state 2 GB, which Snappy and LZ4 then fill with zeros, and gzip unpacks until it ends,
-//! whatever was stated. So the headers are read here first, in the compact protocol of Thrift
+//! The footer states the unpacked size of a column, each page states its own in its header, and neither has to be
+//! right: a page of a few kB may state 2 GB, which Snappy and LZ4 then fill with zeros, and gzip unpacks to its end
+//! regardless of the stated size. So the headers are read here first, in the compact protocol of Thrift
 //! (<https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md>): a field is a byte
-//! `delta << 4 | type`, numbers are zigzag varints, and a struct ends with a 0. Of `PageHeader`
-//! (<https://github.com/apache/parquet-format>, `parquet.thrift`) are taken
+//! `delta << 4 | type`, numbers are zigzag varints, and a struct ends with a 0. From `PageHeader`
+//! (<https://github.com/apache/parquet-format>, `parquet.thrift`) are read
 //!
 //! | field | what |
 //! |---|---|
@@ -13,15 +13,15 @@
 //! | 5.1, 8.1 | values of a data page |
 //! | 8.5, 8.6, 8.7 | bytes of levels in front of the values, and whether these are packed |
 //!
-//! Pages without compression, or with Snappy and LZ4, have the stated length or are refused by the crate. A page in
-//! gzip is unpacked here into nothing, as far as it is stated and one byte further.
+//! Pages without compression, or with Snappy and LZ4, have the stated length or are refused by the crate. A gzip page
+//! is unpacked here without storing it, up to one byte beyond the stated size.
 
 use std::io::{self, Read as _};
 
 use flate2::read::MultiGzDecoder;
 use parquet::basic::Compression;
 
-/// Structures inside of structures that a header may have; the format has three.
+/// Maximum nesting of structures in a header; the format has three levels.
 const MOST_NESTED: usize = 8;
 /// Types of the compact protocol.
 const STOP: u8 = 0;
@@ -41,13 +41,13 @@ struct PageHeader {
     unpacked: u64,
     packed: u64,
     values: u64,
-    /// Bytes of levels that are in front of what is packed.
+    /// Bytes of levels that precede the packed data.
     levels: u64,
     is_packed: bool,
 }
 
-/// Bytes that the pages of a column state to unpack to; `None` if a header is none, or a page in gzip is longer than it
-/// states. `column` holds the pages, and `values` are in all of them.
+/// Stated unpacked size of the pages of a column, bytes; `None` if a header is invalid, or a gzip page is longer than
+/// stated. `column` holds the pages, which contain `values` values in all.
 pub(super) fn unpacked(column: &[u8], compression: Compression, values: u64) -> Option<u64> {
     let (mut rest, mut all, mut seen) = (column, 0_u64, 0_u64);
     while !rest.is_empty() && seen < values {
@@ -56,7 +56,7 @@ pub(super) fn unpacked(column: &[u8], compression: Compression, values: u64) -> 
         if matches!(compression, Compression::GZIP(_)) && header.is_packed {
             let packed = page.get(usize::try_from(header.levels).ok()?..)?;
             let stated = header.unpacked.checked_sub(header.levels)?;
-            // What is damaged otherwise is reported by who reads it.
+            // Other damage is reported by the reader.
             let mut limited = MultiGzDecoder::new(packed).take(stated.saturating_add(1));
             if io::copy(&mut limited, &mut io::sink()).is_ok_and(|bytes| bytes > stated) {
                 return None;
@@ -82,7 +82,7 @@ impl PageHeader {
         Some(header)
     }
 
-    /// The fields of a structure, which is field `inside` of the header.
+    /// Reads the fields of a structure, which is field `inside` of the header.
     fn structure(&mut self, bytes: &mut &[u8], inside: Option<i64>, depth: usize) -> Option<()> {
         if depth > MOST_NESTED {
             return None;
@@ -127,7 +127,7 @@ impl PageHeader {
         Some(())
     }
 
-    /// A value that carries no information here.
+    /// Skips a value that is not used here.
     fn pass_over(&mut self, bytes: &mut &[u8], kind: u8, depth: usize) -> Option<()> {
         match kind {
             TRUE | FALSE | BYTE => drop(byte(bytes)?),
@@ -159,7 +159,7 @@ impl PageHeader {
     }
 
     fn each(&mut self, bytes: &mut &[u8], count: u64, kinds: &[u8], depth: usize) -> Option<()> {
-        // Each takes a byte at least.
+        // Each takes at least one byte.
         if depth > MOST_NESTED || count > bytes.len() as u64 {
             return None;
         }
@@ -207,7 +207,7 @@ mod tests {
 
     const GZIP: fn() -> Compression = || Compression::GZIP(GzipLevel::default());
 
-    /// A header of a data page with a text and a list that carry no information, and its page.
+    /// A data page whose header has a text and a list that are not used.
     fn page(unpacked: i64, values: i64, packed: &[u8]) -> Vec<u8> {
         let put = |bytes: &mut Vec<u8>, value: i64| {
             let mut rest = ((value << 1) ^ (value >> 63)).cast_unsigned();
@@ -241,7 +241,7 @@ mod tests {
     fn pages_say_what_they_unpack_to_and_gzip_is_held_to_it() {
         let honest = page(800, 100, &zipped(&[0; 800]));
         assert_eq!(unpacked(&honest, GZIP(), 100), Some(800));
-        // For two pages, the second after the last value is not examined.
+        // Of two pages, the second lies after the last value and is not examined.
         let two = [honest.clone(), vec![0xff; 40]].concat();
         assert_eq!(unpacked(&two, GZIP(), 100), Some(800));
         assert_eq!(unpacked(&two, GZIP(), 101), None);
@@ -260,7 +260,7 @@ mod tests {
             assert_eq!(unpacked(&whole[..cut], GZIP(), 100), None, "{cut}");
         }
         assert_eq!(unpacked(&page(-1, 100, &[]), Compression::SNAPPY, 100), None);
-        // Structures without an end, and a list of more than there is.
+        // Structures without an end, and a list longer than its data.
         assert_eq!(unpacked(&[0x1c; 100], GZIP(), 1), None);
         assert_eq!(unpacked(&[0x19, 0xf5, 0xff, 0xff, 0xff, 0x7f, 0, 0], GZIP(), 1), None);
     }

@@ -1,7 +1,7 @@
-//! Tables of any program.
+//! Parquet tables of any program.
 //!
-//! A file is not trusted: values are fetched in parts, so that memory grows with what was decoded
-//! and not with what the file promises, and a panic of the crate becomes an error.
+//! A file is not trusted: values are read in parts, so that memory grows with the decoded data and
+//! not with the stated size, and a panic of the crate becomes an error.
 
 use bytes::Bytes;
 use half::f16;
@@ -27,26 +27,26 @@ use crate::wording::{shown, told};
 
 /// The magic bytes at both ends.
 const MAGIC: &[u8; 4] = b"PAR1";
-/// A month at 100 samples/s; more rows are taken for damage before they take all memory.
+/// A month at 100 samples/s; more rows are treated as damage, before they exhaust the memory.
 const MOST_ROWS: usize = 1 << 28;
 const TIME: &str = "a date or time";
 /// ns in a µs and in a ms.
 const MICRO: i64 = 1_000;
 const MILLI: i64 = 1_000_000;
-/// Memory of a value as a number and as an index of missing ones, and of a text in addition to its
+/// Memory of a value as a number and as an index of a missing one, and of a text in addition to its
 /// characters, bytes.
 const VALUE: u64 = 16;
 const TEXT: u64 = 24;
-/// Values that are fetched together.
+/// Values read at a time.
 const PART: usize = 1 << 16;
 
-/// The columns in the bytes of a file.
+/// Reads the columns from the bytes of a file.
 pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<ReadFile, IoError> {
     check_ends(&bytes, file)?;
     guarded(file, || columns(bytes.into(), file))
 }
 
-/// Whether this is Parquet at all, as text that describes the actual content.
+/// Checks that the file is Parquet; the error describes the actual content.
 fn check_ends(bytes: &[u8], file: &str) -> Result<(), IoError> {
     let file = || file.to_owned();
     let found = if bytes.is_empty() {
@@ -98,7 +98,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
             budget.take(u64::try_from(chunk.uncompressed_size()).unwrap_or(u64::MAX), file)?;
         }
     }
-    // Every column becomes numbers, also one that is not read.
+    // Every column becomes numbers, even if it is not used.
     budget.take((rows as u64).saturating_mul(VALUE).saturating_mul(leaves as u64), file)?;
     let mut grouped = 0_usize;
     for group in reader.metadata().row_groups() {
@@ -127,7 +127,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
                     place()
                 )));
             };
-            // The footer has been counted.
+            // The footer has already been counted.
             let counted = u64::try_from(chunk.uncompressed_size()).unwrap_or(0);
             budget.take(stated.saturating_sub(counted), file)?;
         }
@@ -173,8 +173,8 @@ struct ColumnPath<'a> {
 }
 
 impl ColumnPath<'_> {
-    /// The values by their logical type or, in older files, the converted one, which the crate
-    /// fills in where there is such.
+    /// Reads the values by their logical type or, in older files, the converted type, which the
+    /// crate provides if there is one.
     fn data(&mut self, column: &ColumnDescriptor) -> Result<Data, IoError> {
         use ConvertedType as C;
         let unit = 10_f64.powi(column.type_scale());
@@ -216,7 +216,7 @@ impl ColumnPath<'_> {
         })
     }
 
-    /// One value a row; the rows without are noted.
+    /// One value per row; missing ones are noted.
     fn values<T: DataType, V: Default + Weight>(&mut self, of: impl Fn(&T::T) -> V) -> Result<Vec<V>, IoError> {
         let mut values = Vec::new();
         for group in 0..self.reader.num_row_groups() {
@@ -278,14 +278,14 @@ impl ColumnPath<'_> {
         Ok(())
     }
 
-    /// Takes what values hold next to themselves.
+    /// Reserves the memory that values own.
     fn weigh<V: Weight>(&mut self, values: &[V]) -> Result<(), ParquetError> {
         let bytes = values.iter().map(Weight::bytes).sum();
         let taken = self.budget.take(bytes, self.file);
         taken.map_err(|error| ParquetError::External(Box::new(error)))
     }
 
-    /// Report of the crate, with the place.
+    /// Converts an error of the crate, with its place.
     fn error(&self, group: usize, error: ParquetError) -> IoError {
         let file = self.file.to_owned();
         let place = format!("column {}, row group {}", shown(&self.name), group + 1);
@@ -310,9 +310,9 @@ impl ColumnPath<'_> {
     }
 }
 
-/// Memory of a value in addition to itself.
+/// Memory owned by a value in addition to its own size.
 trait Weight {
-    /// Bytes.
+    /// Number of bytes.
     fn bytes(&self) -> u64 {
         0
     }
@@ -328,7 +328,7 @@ impl Weight for String {
     }
 }
 
-/// ns in the unit of a column of moments.
+/// Unit of a column of clock times, ns.
 fn clock_ns(column: &ColumnDescriptor) -> Option<i64> {
     let unit = match column.logical_type_ref() {
         Some(LogicalType::Timestamp(clock)) => &clock.unit,
@@ -348,17 +348,17 @@ fn clock_ns(column: &ColumnDescriptor) -> Option<i64> {
     })
 }
 
-/// Valid content that is not supported here.
+/// Error for valid content that is not supported here.
 fn refused(what: &str) -> ParquetError {
     ParquetError::NYI(what.to_owned())
 }
 
-/// IEEE 754 binary16, the little end first.
+/// IEEE 754 binary16, little-endian.
 fn half(bytes: &[u8]) -> f64 {
     <[u8; 2]>::try_from(bytes).map_or(f64::NAN, |bytes| f16::from_le_bytes(bytes).to_f64())
 }
 
-/// An integer of up to 16 bytes, the big end first.
+/// An integer of up to 16 bytes, big-endian.
 fn signed(bytes: &[u8]) -> i128 {
     let sign = -i128::from(bytes.first().is_some_and(|first| *first >= 0x80));
     bytes.iter().fold(sign, |value, byte| value << 8 | i128::from(*byte))

@@ -1,7 +1,7 @@
 //! Records in Parquet.
 //!
-//! Numeric columns of any type are numbers here, a null is a missing value, and text counts as in
-//! CSV. Units and sample time are in the comments, in the words of CSV.
+//! Numeric columns of any type are read as numbers, a null is a missing value, and text is handled
+//! as in CSV. Units and sample time are in the comments, in the format of CSV.
 
 use super::columns::{Data, ReadColumn};
 use super::read::read;
@@ -16,7 +16,7 @@ struct ParquetSource<'a> {
     columns: Vec<Cells>,
 }
 
-/// The cells of a column, as far as its values do not report it.
+/// Cells of a column, as far as its values do not give them.
 enum Cells {
     Numbers {
         nulls: Vec<usize>,
@@ -60,7 +60,7 @@ impl Source for ParquetSource<'_> {
     }
 }
 
-/// The table in the bytes of a Parquet file.
+/// Reads the table from the bytes of a Parquet file.
 pub(super) fn parse<'a>(bytes: Vec<u8>, file: &'a str) -> Result<Table<'a>, IoError> {
     let read = read(bytes, file)?;
     let rows = read.rows;

@@ -6,7 +6,7 @@ use crate::IoError;
 use crate::results::{ColumnValues, OutputColumn, OutputTable};
 use crate::wording::shown;
 
-/// The columns of a file, with the kinds that they were written with.
+/// Reads the columns of a file, with their original kinds.
 pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<OutputTable, IoError> {
     let read = read_columns(bytes, file)?;
     let unread = |name: &str, what: &str| IoError::Unsupported {

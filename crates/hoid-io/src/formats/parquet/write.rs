@@ -1,6 +1,6 @@
-//! A file of row groups, plain and by Snappy, which every reader knows.
+//! A file of row groups, plain encoding and Snappy, which every reader supports.
 //!
-//! The same columns give the same bytes: nothing of time or place is written.
+//! The same columns give the same bytes: no time or place is written.
 
 use std::io::{self, Write};
 use std::mem;
@@ -20,10 +20,10 @@ use crate::results::{ColumnKind, ColumnSchema, TableSchema, Values};
 
 const CREATED_BY: &str = concat!("hoid version ", env!("CARGO_PKG_VERSION"));
 
-/// The state of a file between its row groups.
+/// State of a file between its row groups.
 struct Writer {
-    /// Writes into memory, from where each row group goes into the file: the file is lent for one
-    /// call at a time.
+    /// Writes to memory, from which each row group is copied to the file: the file is borrowed for
+    /// one call at a time.
     inner: SerializedFileWriter<Vec<u8>>,
 }
 

@@ -15,7 +15,7 @@ const SAMPLES: u16 = 3;
 const CLOCK_OFFSET: u16 = 4;
 const STREAM_FOOTER: u16 = 6;
 
-/// One stream as it is in the file.
+/// A stream as stored in the file.
 #[derive(Debug)]
 pub(super) struct Stream {
     pub(super) id: u32,
@@ -23,11 +23,11 @@ pub(super) struct Stream {
     /// Time stamps on the clock of the stream, s.
     pub(super) stamps: Vec<f64>,
     pub(super) samples: Samples,
-    /// When the offset to the clock of the recorder was measured, and the offset, s.
+    /// Times of the measurements of the offset to the recorder's clock, and the offsets, s.
     pub(super) offsets: Vec<(f64, f64)>,
-    /// None if the recorder has not closed the file, or its end is lost.
+    /// None if the recorder did not close the file, or its end is lost.
     pub(super) footer: Option<Footer>,
-    /// Why a footer that is there cannot be read.
+    /// Reason why an existing footer cannot be read.
     pub(super) unread_footer: Option<String>,
 }
 
@@ -38,7 +38,7 @@ pub(super) enum Samples {
     Texts(Vec<String>),
 }
 
-/// Bytes that are taken from the front.
+/// A reader of bytes from the front.
 struct Bytes<'a> {
     rest: &'a [u8],
 }
@@ -54,7 +54,7 @@ impl<'a> Bytes<'a> {
         self.take(N)?.try_into().ok()
     }
 
-    /// A length of 1, 4 or 8 bytes after their number.
+    /// Reads a length of 1, 4 or 8 bytes after its size.
     fn length(&mut self) -> Option<usize> {
         match self.array::<1>()? {
             [1] => self.array().map(|[n]| usize::from(n)),
@@ -69,8 +69,8 @@ impl<'a> Bytes<'a> {
     }
 }
 
-/// The streams of a file that starts with its magic bytes, in the order of their headers; and where
-/// it is cut: the place of a last chunk that goes beyond the end. What is before it is whole.
+/// Reads the streams of a file, which starts with its magic bytes, in the order of their headers;
+/// and the position of a truncated last chunk, if there is one. Everything before it is complete.
 pub(super) fn streams(bytes: &[u8]) -> Result<(Vec<Stream>, Option<usize>), String> {
     let mut rest = Bytes {
         rest: bytes.get(4..).unwrap_or_default(),
@@ -115,7 +115,7 @@ pub(super) fn streams(bytes: &[u8]) -> Result<(Vec<Stream>, Option<usize>), Stri
         let stream = known.get(&id).and_then(|at| streams.get_mut(*at));
         let stream = stream.ok_or_else(|| damaged(String::from("its header is missing")))?;
         if tag == STREAM_FOOTER {
-            // The samples do not need it: it is only held against them.
+            // The samples do not need it; it is only compared with them.
             match header::footer(content.rest) {
                 Ok(footer) => stream.footer = Some(footer),
                 Err(why) => stream.unread_footer = Some(why),
@@ -153,7 +153,7 @@ impl Stream {
     /// Compares the footer with the data.
     ///
     /// # Errors
-    /// What is missing.
+    /// Returns the missing part.
     pub(super) fn check_footer(&self) -> Result<(), String> {
         let Some(footer) = self.footer else { return Ok(()) };
         let read = self.stamps.len();
@@ -171,7 +171,7 @@ impl Stream {
             .into_iter()
             .flat_map(|((from, to), (first, last))| [("first", from, *first), ("last", to, *last)])
         {
-            // Recorders print them with six digits, and may leave out what a sample time reports.
+            // Recorders print them with six digits, and may omit those that the sample time implies.
             let slack_s = self.nominal_step_s().max(1e-5 * stated.abs()).max(1e-6);
             if (stated - found).abs() > slack_s {
                 return Err(format!(
@@ -186,7 +186,7 @@ impl Stream {
     }
 
     fn samples(&mut self, content: &mut Bytes<'_>) -> Option<()> {
-        // Nothing is reserved for the promised count; each sample takes one byte at least.
+        // No memory is reserved for the stated count; each sample takes at least one byte.
         for _ in 0..content.length()? {
             let stamp = match content.array::<1>()? {
                 [0] => self.stamps.last().copied().unwrap_or(0.0) + self.nominal_step_s(),

@@ -4,34 +4,34 @@
 //!
 //! The offset `o_k` of the recorder's clock was measured at the times `c_k`. A line `o = b_0 + b_1 c` is fitted under
 //! Huber's loss by the alternating direction method of multipliers (Boyd et al., 2011, section 6.1.1), in units of 1e-4
-//! s, so that a measurement over a busy network counts little. Then `t <- t + b_0 + b_1 t`. Where the clock was set
-//! again, each part has a line of its own. At last, of a stream with a nominal rate, the time stamps between two breaks
-//! are replaced by their least-squares line over the number of the sample.
+//! s, so that measurements over a busy network have little weight. Then `t <- t + b_0 + b_1 t`. If the clock was reset,
+//! each part has its own line. Finally, in a stream with a nominal rate, the time stamps between two breaks are
+//! replaced by their least-squares line over the sample index.
 //!
-//! Beyond pyxdf, lost samples are a break as well: a step of more than [`LOST_SAMPLES`] nominal sample times `T` after
-//! which the time stamps stay late, even after as many samples as are late, by the medians of `t_k - k T` on both
-//! sides. Samples that are late and then catch up are jitter. Without this a second that is lost would be spread over
-//! the recording, as a lower rate without a gap.
+//! Unlike in pyxdf, lost samples are a break as well: a step of more than [`LOST_SAMPLES`] nominal sample times `T`
+//! after which the time stamps stay late, even after as many samples as are late, by the medians of `t_k - k T` on both
+//! sides. Late samples that catch up are jitter. Otherwise a lost second would be spread over the recording as a lower
+//! rate without a gap.
 
 use super::chunks::Stream;
 use crate::wording::shown;
 
-/// The unit of the fit, s: deviations beyond it count linearly.
+/// Unit of the fit, s: the loss of larger deviations is linear.
 const UNIT_S: f64 = 1e-4;
 const ITERATIONS: usize = 1000;
-/// A reset: time between offsets off its median by more than a given number of deviations and s,
-/// and the offsets likewise.
+/// A reset: the time between offsets deviates from its median by more than this number of
+/// deviations and s, and so do the offsets.
 const RESET_TIME: (f64, f64) = (5.0, 5.0);
 const RESET_VALUE: (f64, f64) = (10.0, 1.0);
-/// A break: the longer of a given number of s and so many samples.
+/// A break: the longer of this time, s, and this number of samples.
 const BREAK_S: f64 = 1.0;
 const BREAK_SAMPLES: f64 = 500.0;
 
-/// Lost samples: a step, and then a lateness, of a given number of sample times.
+/// Lost samples: a step, followed by a lateness, of this number of sample times.
 const LOST_SAMPLES: f64 = 4.0;
-/// Samples on each side whose median shows how late they are.
+/// Samples on each side whose median gives their lateness.
 const BESIDE: usize = 25;
-/// Share by which the rate may be off the stated one before that is reported.
+/// Relative deviation of the rate from the stated one above which it is reported.
 const OFF: f64 = 0.02;
 
 /// The times of the samples, s.
@@ -77,7 +77,7 @@ pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
     times
 }
 
-/// Puts time stamps onto the clock of the recorder; the number of lines that it took.
+/// Converts time stamps to the clock of the recorder; returns the number of fitted lines.
 fn synchronise(times: &mut [f64], offsets: &[(f64, f64)]) -> usize {
     let parts = resets(offsets);
     let mut from = 0;
@@ -98,7 +98,7 @@ fn synchronise(times: &mut [f64], offsets: &[(f64, f64)]) -> usize {
     parts.len()
 }
 
-/// First and last offset of each part between two resets of the clock.
+/// First and last offset of each part between resets of the clock.
 fn resets(offsets: &[(f64, f64)]) -> Vec<(usize, usize)> {
     if offsets.is_empty() {
         return Vec::new();
@@ -112,8 +112,8 @@ fn resets(offsets: &[(f64, f64)]) -> Vec<(usize, usize)> {
     parts(breaks, offsets.len())
 }
 
-/// Where a step differs from the median by more than a given number of median absolute deviations,
-/// and by more than so much.
+/// True where a step differs from the median by more than the given number of median absolute
+/// deviations, and by more than `least`.
 fn glitches(steps: &[f64], (deviations, least): (f64, f64)) -> Vec<bool> {
     let middle = median(steps);
     let off: Vec<f64> = steps.iter().map(|step| (step - middle).abs()).collect();
@@ -133,7 +133,7 @@ fn median(values: &[f64]) -> f64 {
     }
 }
 
-/// First and last of `count` if there are breaks after some.
+/// First and last index of each of the parts into which breaks divide `count` items.
 fn parts(breaks: impl Iterator<Item = usize>, count: usize) -> Vec<(usize, usize)> {
     let mut parts = Vec::new();
     let mut first = 0;
@@ -145,7 +145,7 @@ fn parts(breaks: impl Iterator<Item = usize>, count: usize) -> Vec<(usize, usize
     parts
 }
 
-/// The line `b_0 + b_1 c` through offsets under Huber's loss; none if they carry no information.
+/// The line `b_0 + b_1 c` through offsets under Huber's loss; zero if they carry no information.
 fn line(offsets: &[(f64, f64)]) -> (f64, f64) {
     if let [(_, offset)] = offsets {
         return (*offset, 0.0);
@@ -182,7 +182,7 @@ fn line(offsets: &[(f64, f64)]) -> (f64, f64) {
     (UNIT_S * (x.0 - x.1 * start), x.1)
 }
 
-/// Whether samples were lost before the k-th: a long step, and then all are late by it.
+/// True if samples were lost before the k-th: a long step, after which all are late by it.
 fn lost(times: &[f64], k: usize, nominal_s: f64) -> bool {
     let late_s = times[k] - times[k - 1] - nominal_s;
     if nominal_s.is_nan() || nominal_s <= 0.0 || late_s.is_nan() || late_s <= LOST_SAMPLES * nominal_s {
@@ -194,15 +194,15 @@ fn lost(times: &[f64], k: usize, nominal_s: f64) -> bool {
             .collect();
         median(&of)
     };
-    // Once those that are late together have come.
+    // After all samples that arrive late together.
     let come = k.saturating_add((late_s / nominal_s).ceil() as usize);
     let from = come.min(times.len().saturating_sub(BESIDE)).max(k);
     let shift_s = lateness(from, (from + BESIDE).min(times.len())) - lateness(k.saturating_sub(BESIDE), k);
     shift_s > LOST_SAMPLES * nominal_s && shift_s > 0.5 * late_s
 }
 
-/// Replaces the time stamps between two breaks by their line; the number of parts, and the mean
-/// rate in Hz.
+/// Replaces the time stamps between two breaks by their line; returns the number of parts, and the
+/// mean rate in Hz.
 fn straighten(times: &mut [f64], longest_s: f64, nominal_s: f64) -> (usize, Option<f64>) {
     let breaks: Vec<usize> = (1..times.len())
         .filter(|k| (times[*k] - times[k - 1]).abs() > longest_s || lost(times, *k, nominal_s))
@@ -212,7 +212,7 @@ fn straighten(times: &mut [f64], longest_s: f64, nominal_s: f64) -> (usize, Opti
     let (mut steps, mut duration_s) = (0_usize, 0.0);
     for &(first, last) in &parts {
         let part = &mut times[first..=last];
-        // About the middle, where the numbers are small and the sums uncorrelated.
+        // Relative to the middle, where the numbers are small and the sums uncorrelated.
         let middle = (part.len() - 1) as f64 / 2.0;
         let mean = part.iter().sum::<f64>() / part.len() as f64;
         let (mut products, mut squares) = (0.0, 0.0);
@@ -241,12 +241,12 @@ mod tests {
             .map(|k| (1e5 + 5.0 * f64::from(k), 3.0 - 1e-4 * 5.0 * f64::from(k)))
             .collect();
         let (b0, b1) = line(&offsets);
-        // The offsets near 1e5 s carry rounding of 1e-11 s.
+        // The offsets near 1e5 s have a rounding error of 1e-11 s.
         assert!(
             (b0 + b1 * 1e5 - 3.0).abs() < 1e-9 && (b1 + 1e-4).abs() < 1e-11,
             "{b0} {b1}"
         );
-        // Off by 0.5 s: the line moves by a ten-thousandth of it.
+        // An outlier of 0.5 s moves the line by a ten-thousandth of it.
         offsets[7].1 += 0.5;
         let (b0, b1) = line(&offsets);
         assert!(
@@ -277,7 +277,7 @@ mod tests {
         let (parts, hz) = straighten(&mut times, 1.0, 0.01);
         assert_eq!(parts, 2);
         assert!((hz.unwrap() - 100.0).abs() < 0.1);
-        // Alternating jitter of 1e-4 s tilts a line over 40 samples by less than 1e-6 s a sample.
+        // Alternating jitter of 1e-4 s tilts a line over 40 samples by less than 1e-6 s per sample.
         assert!(
             times
                 .windows(2)
@@ -303,7 +303,7 @@ mod tests {
                 "{lost}"
             );
         }
-        // Half a second that arrives at once, stamped on arrival, is not a loss.
+        // Half a second of samples that arrive together, stamped on arrival, is not a loss.
         let mut times: Vec<f64> = (0..1200)
             .map(|k| {
                 if (500..550).contains(&k) {

@@ -5,21 +5,21 @@ use roxmltree::{Document, Node};
 
 use crate::wording::told;
 
-/// A stream of more channels is damage.
+/// A stream with more channels is damage.
 const MOST_CHANNELS: usize = 1 << 12;
 
-/// Prior knowledge of a stream before its samples.
+/// Properties of a stream stated before its samples.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Header {
     pub(super) name: String,
     pub(super) channels: usize,
-    /// Hz; 0 for samples that come when they come.
+    /// Nominal rate, Hz; 0 for irregular samples.
     pub(super) nominal_hz: f64,
-    /// Such as `float32`.
+    /// Type of the values, such as `float32`.
     pub(super) format: String,
-    /// Label and unit of the channels, as far as they have any.
+    /// Label and unit of each channel, if stated.
     pub(super) labels: Vec<(String, String)>,
-    /// The stream leaves samples out rather than being late, so that its time stamps are kept.
+    /// True if the stream drops samples rather than delaying them, so that its time stamps are kept.
     pub(super) can_drop: bool,
 }
 
@@ -71,7 +71,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header, String> {
     })
 }
 
-/// Report of a recorder on a stream when it closes the file.
+/// Summary of a stream, written by the recorder when it closes the file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Footer {
     pub(super) samples: Option<u64>,
@@ -130,7 +130,7 @@ mod tests {
             let damaged = text.replace(from, to);
             assert!(parse(damaged.as_bytes()).is_err() || to.is_empty(), "{damaged}");
         }
-        // Neither depth nor entities cost anything.
+        // Neither nesting nor entities take memory.
         assert!(parse("<a>".repeat(1_000_000).as_bytes()).is_err());
         let bomb = "<!DOCTYPE a [<!ENTITY b \"bbbb\"><!ENTITY c \"&b;&b;&b;\">]><info>&c;</info>";
         assert!(parse(bomb.as_bytes()).is_err());

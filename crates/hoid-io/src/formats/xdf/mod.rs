@@ -1,4 +1,4 @@
-//! XDF, the recordings of the Lab Streaming Layer: streams with clocks of their own.
+//! XDF, the recordings of the Lab Streaming Layer: streams with their own clocks.
 //!
 //! | module | contents |
 //! |---|---|

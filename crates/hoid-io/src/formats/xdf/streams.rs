@@ -1,4 +1,4 @@
-//! The streams of a file as arrays: a path for each channel and for the times of each stream.
+//! The streams of a file as arrays: one path for each channel and for the times of each stream.
 
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
@@ -13,7 +13,7 @@ use crate::wording::shown;
 /// Approximate memory of an entry, bytes.
 const ENTRY: u64 = 512;
 
-/// The streams in the bytes of a file.
+/// Reads the streams from the bytes of a file.
 pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
     if !bytes.starts_with(b"XDF:") {
         let start = String::from_utf8_lossy(&bytes[..bytes.len().min(12)]).into_owned();
@@ -134,11 +134,11 @@ fn entries_of(stream: Stream, parent: &str, times: &[f64]) -> Vec<Entry> {
     entries
 }
 
-/// Names, the second of one kind with a number.
+/// Unique names: the second of the same name has a number.
 #[derive(Default)]
 struct Names {
     known: HashSet<String>,
-    /// The number that the next of a name tries first.
+    /// Number to be tried next for a name.
     next: HashMap<String, usize>,
 }
 
@@ -172,8 +172,8 @@ mod tests {
             for line in expected.lines().filter_map(|line| line.strip_prefix(start.as_str())) {
                 let (row, t) = line.split_once(',').unwrap();
                 let (found, t) = (times[row.parse::<usize>().unwrap()], t.parse::<f64>().unwrap());
-                // Sums in another order; an offset of 3000 s in units of 1e-4 s leaves 1e-9 s of
-                // rounding.
+                // The sums have a different order; an offset of 3000 s in units of 1e-4 s leaves a
+                // rounding error of 1e-9 s.
                 assert!((found - t).abs() < 2e-9, "{} {row}: {found} {t}", stream.header.name);
                 compared += 1;
             }
@@ -181,7 +181,7 @@ mod tests {
         assert!(compared > 50, "{compared}");
     }
 
-    /// A file of one stream at 100 Hz with these times, and a footer.
+    /// A file with one stream at 100 Hz with these times, and a footer.
     fn file_of(times: &[f64], footer: Option<&str>) -> Vec<u8> {
         let chunk = |tag: u16, content: &[u8]| {
             let mut bytes = vec![4];
@@ -235,12 +235,12 @@ mod tests {
                 "{message}"
             );
         }
-        // A footer that is cut inside its text, in a chunk of the right length: all samples are there.
+        // A footer whose text is truncated, in a chunk of the right length: all samples are there.
         let cut = &footer(50.0, 59.99, 1000)[..70];
         let contents = read(&file_of(&times, Some(cut)), "a.xdf").unwrap();
         let said = |n: &String| n.contains("its footer") && n.contains("1000 samples are read");
         assert!(contents.notes.iter().any(said), "{:?}", contents.notes);
-        // The end of the file is lost between two chunks: nothing contradicts itself, but it is reported.
+        // The file ends between two chunks: this is not a contradiction, but it is reported.
         let notes = read(&file_of(&times, None), "a.xdf").unwrap().notes;
         assert!(
             notes
@@ -277,7 +277,7 @@ mod tests {
                 "{notes:?}"
             );
         }
-        // Before the first stream nothing is left to use.
+        // Before the first stream there are no data.
         let message = read(&bytes[..20], "a.xdf").map(drop).unwrap_err().to_string();
         assert!(message.contains("a.xdf is damaged: the chunk at byte"), "{message}");
     }

@@ -1,5 +1,5 @@
-//! HDF5 (version 7.3 of MATLAB): the sizes of arrays, chunks, attributes and lists in a good file become huge. What is
-//! not in the file is read as zeros.
+//! HDF5 (version 7.3 of MATLAB): huge sizes of arrays, chunks, attributes and lists in a valid file. Data beyond the
+//! file are read as zeros.
 
 use std::{fs, path::Path};
 
@@ -8,7 +8,7 @@ use crate::mutations::draw::Draw;
 /// Sizes of the arrays of the file, and of their chunks.
 const SIZES: [u64; 3] = [40, 16, 2];
 
-/// One of them.
+/// Makes a bomb.
 pub fn bomb(draw: &mut Draw) -> Vec<u8> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/mat/h5py_v73.mat");
     let mut file = fs::read(path).unwrap();

@@ -1,4 +1,4 @@
-//! MATLAB's version 5 and 7: zeros that are packed, sizes that lie, cells in cells, fields without number.
+//! MATLAB's versions 5 and 7: compressed zeros, wrong sizes, nested cells, excessive numbers of fields.
 
 use super::zeros::{self, MEGABYTE};
 use crate::mutations::draw::Draw;
@@ -9,11 +9,11 @@ const STRUCTURE: u32 = 2;
 pub const CHARACTERS: u32 = 4;
 pub const DOUBLE: u32 = 6;
 
-/// One of them.
+/// Makes a bomb.
 pub fn bomb(draw: &mut Draw) -> Vec<u8> {
     let megabytes = 1 << (3 + draw.below(8));
     let bytes = megabytes * MEGABYTE;
-    // Numbers as they may be in a file: 8 bytes, 4, 1.
+    // Stored types of numbers: 8 bytes, 4, 1.
     let (stored, size) = *draw.one_of(&[(9, 8), (7, 4), (2, 1), (1, 1)]);
     let class = *draw.one_of(&[DOUBLE, DOUBLE, CHARACTERS, 9, 5]);
     match draw.below(6) {
@@ -26,7 +26,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
             let several = || variable(DOUBLE, [32 << 20, 1], 2, 32 << 20, 32);
             file(&[several(), several(), several(), several()])
         }
-        // Cells and structures of any size with nothing in them.
+        // Empty cells and structures of any size.
         4 => {
             let class = *draw.one_of(&[CELL, STRUCTURE]);
             let many = 1 << (10 + draw.below(21));
@@ -37,7 +37,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
             }
             file(&[packed(&element(&inside))])
         }
-        // Cells in cells.
+        // Nested cells.
         _ => {
             let deep = 1 << (4 + draw.below(10));
             let inside = (0..deep).fold(array(DOUBLE, [0, 0], ""), |inside, _| {
@@ -78,7 +78,7 @@ fn packed(element: &[u8]) -> Vec<u8> {
     zeros::zlib(element, 0)
 }
 
-/// A file of packed variables.
+/// A file of compressed variables.
 pub fn file(variables: &[Vec<u8>]) -> Vec<u8> {
     let mut file = vec![b' '; 128];
     file[..19].copy_from_slice(b"MATLAB 5.0 MAT-file");

@@ -1,5 +1,5 @@
-//! Files of a few bytes to two megabytes that unpack, or report that they unpack, to any size, and what all readers
-//! have to make of them: values or an error as text, in bounded memory.
+//! Files of a few bytes to two megabytes that unpack, or state that they unpack, to any size, and the required result
+//! of all readers: values or an error message, in bounded memory.
 //!
 //! Bomb `k` of a format is the same bytes on every machine.
 //!
@@ -29,7 +29,7 @@ use crate::mutations::{
 /// Makes a bomb.
 type Maker = fn(&mut Draw) -> Vec<u8>;
 
-/// The formats, with the endings that their readers go by.
+/// The formats, with the extensions that determine their readers.
 pub const FORMATS: [(&str, &str, Maker); 7] = [
     ("Parquet", "parquet", parquet::bomb),
     ("NPZ", "npz", npz::bomb),
@@ -40,7 +40,7 @@ pub const FORMATS: [(&str, &str, Maker); 7] = [
     ("JSON", "json", texts::json),
 ];
 
-/// Bomb `number` of a format at a path, given to all its readers; how long they took.
+/// Makes bomb `number` of a format at a path and gives it to all its readers; returns the time taken.
 pub fn burst(path: &Path, maker: Maker, number: u64) -> (Answers, Duration) {
     let bytes = maker(&mut Draw::new(54, number));
     fs::write(path, &bytes).unwrap();
@@ -60,12 +60,12 @@ pub fn burst(path: &Path, maker: Maker, number: u64) -> (Answers, Duration) {
     (answers, start.elapsed())
 }
 
-/// What was before a bomb is not of it, on systems that can determine.
+/// Resets the peak memory before a bomb, on systems that support it.
 fn forget_peak() {
     let _ = fs::write("/proc/self/clear_refs", "5");
 }
 
-/// Most memory of the process, kB, on systems that report it.
+/// Largest memory of the process, kB, on systems that report it.
 pub fn peak_kb() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM"))?;

@@ -1,10 +1,10 @@
-//! NPZ: members of zeros, shapes that lie, types that are small in the file and large as numbers, heads and archives
-//! without end.
+//! NPZ: members of zeros, wrong shapes, types that are small in the file and large as numbers, endless headers and
+//! archives.
 
 use super::zeros::{self, MEGABYTE};
 use crate::mutations::draw::Draw;
 
-/// One of them.
+/// Makes a bomb.
 pub fn bomb(draw: &mut Draw) -> Vec<u8> {
     let megabytes = 1 << (3 + draw.below(8));
     let bytes = megabytes * MEGABYTE;
@@ -24,9 +24,9 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
             let shape = *draw.one_of(&[[rows, 0], [1, rows], [rows / 4, 4], [1 << 40, 0]]);
             archive(&[member("e", &head(kind.0, &shape), megabytes)])
         }
-        // Two that are small enough each.
+        // Two members, each of them small enough.
         3 => archive(&["e", "u", "x", "y", "z"].map(|name| member(name, &head("|b1", &[32 * MEGABYTE, 0]), 32))),
-        // A structure of many fields.
+        // A structure with many fields.
         4 => {
             let fields: String = (0..1 << (8 + draw.below(8)))
                 .map(|k| format!("('c{k}', '|b1'), "))
@@ -45,7 +45,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
     }
 }
 
-/// The head of an array; a second size of 0 is none.
+/// The header of an array; a second size of 0 is omitted.
 pub fn head(kind: &str, shape: &[usize; 2]) -> String {
     let second = if shape[1] == 0 {
         String::new()

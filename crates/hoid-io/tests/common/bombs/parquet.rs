@@ -1,4 +1,4 @@
-//! Parquet: pages that lie, runs of millions of values, columns and groups without number.
+//! Parquet: wrong page headers, runs of millions of values, excessive numbers of columns and groups.
 
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ pub const GROUP: usize = 1 << 18;
 const PLAIN: u64 = 0;
 const RUN_LENGTHS: u64 = 3;
 
-/// A page of which anything can be reported.
+/// A page with an arbitrary header.
 pub struct Page<'a> {
     pub compression: Compression,
     pub optional: bool,
@@ -31,13 +31,13 @@ pub struct Page<'a> {
     pub packed: &'a [u8],
 }
 
-/// One of them.
+/// Makes a bomb.
 pub fn bomb(draw: &mut Draw) -> Vec<u8> {
     let gzip = || Compression::GZIP(GzipLevel::default());
     let megabytes = 1 << (4 + draw.below(8));
     let values = 1 << (20 + draw.below(12));
     match draw.below(9) {
-        // It unpacks to more than it reports.
+        // It unpacks to more than stated.
         0 => page(&Page {
             compression: gzip(),
             optional: false,
@@ -45,7 +45,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
             unpacked: 800,
             packed: &zeros::gzip(megabytes),
         }),
-        // It states more than it holds.
+        // It states more than it contains.
         1 => page(&Page {
             compression: *draw.one_of(&[
                 gzip(),
@@ -134,7 +134,7 @@ fn writer(schema: &str, compression: Compression, dictionary: bool) -> Serialize
     SerializedFileWriter::new(Vec::new(), schema, Arc::new(properties)).unwrap()
 }
 
-/// A number as the heads of pages have them (Thrift, compact: a sign at the lowest bit, seven bits a byte).
+/// A number as in page headers (Thrift, compact: the sign in the lowest bit, seven bits per byte).
 fn signed(page: &mut Vec<u8>, value: u64) {
     number(page, value << 1);
 }

@@ -1,8 +1,9 @@
-//! Settings: brackets in brackets, keys, tables and values without number, up to and beyond the longest text that is read.
+//! Settings: nested brackets, excessive numbers of keys, tables and values, up to and beyond the longest text that is
+//! read.
 
 use crate::mutations::draw::Draw;
 
-/// One of a scenario.
+/// Makes a bomb of a scenario.
 pub fn toml(draw: &mut Draw) -> Vec<u8> {
     let bytes = length(draw);
     let times = |text: &str| text.repeat(bytes / text.len());
@@ -24,7 +25,7 @@ pub fn toml(draw: &mut Draw) -> Vec<u8> {
     .into_bytes()
 }
 
-/// One of a fit.
+/// Makes a bomb of a fit.
 pub fn json(draw: &mut Draw) -> Vec<u8> {
     let bytes = length(draw);
     let times = |text: &str| text.repeat(bytes / text.len());

@@ -1,4 +1,4 @@
-//! XDF: channels, samples, texts and streams without number, leaps in time, nested headers.
+//! XDF: excessive numbers of channels, samples, texts and streams, jumps in time, nested headers.
 
 use crate::mutations::draw::Draw;
 
@@ -6,14 +6,14 @@ const HEADER: u16 = 2;
 const SAMPLES: u16 = 3;
 const OFFSET: u16 = 4;
 
-/// One of them.
+/// Makes a bomb.
 pub fn bomb(draw: &mut Draw) -> Vec<u8> {
     let mut file = b"XDF:".to_vec();
     let large = 1_u64 << (10 + draw.below(21));
     let many = 1 << (10 + draw.below(7));
     let kind = *draw.one_of(&["double64", "int8", "string", "float32"]);
     match draw.below(8) {
-        // Channels that do not exist, and samples.
+        // Missing channels, and samples.
         0 => {
             chunk(&mut file, HEADER, &header(1, large, kind, "100", ""));
             chunk(&mut file, SAMPLES, &samples(&large.to_le_bytes(), &[0; 64]));
@@ -22,7 +22,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
             chunk(&mut file, HEADER, &header(1, 2, kind, "100", ""));
             chunk(&mut file, SAMPLES, &samples(&u64::MAX.to_le_bytes(), &[0; 64]));
         }
-        // Texts of any length, and without any.
+        // Texts of any length, and empty ones.
         2 => {
             chunk(&mut file, HEADER, &header(1, 1, "string", "0", ""));
             let text = [&[0, 8][..], &large.to_le_bytes()].concat();
@@ -37,7 +37,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
                 &samples(&(count as u64).to_le_bytes(), &[0, 1, 0].repeat(count)),
             );
         }
-        // A byte each.
+        // One byte each.
         4 => {
             let count = 8 * many;
             chunk(&mut file, HEADER, &header(1, 2, "int8", "1e-3", ""));
@@ -47,13 +47,13 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
                 &samples(&(count as u64).to_le_bytes(), &vec![0; 3 * count]),
             );
         }
-        // Elements in elements.
+        // Nested elements.
         5 => {
             let nested = ["<a>".repeat(many), "</a>".repeat(many)].concat();
             chunk(&mut file, HEADER, &header(1, 2, kind, "100", &nested));
         }
         6 => (0..many as u32 / 4).for_each(|id| chunk(&mut file, HEADER, &header(id, 2, kind, "100", ""))),
-        // A leap of years between two samples, and as many offsets of the clock.
+        // A jump of years between two samples, and the same in the clock offsets.
         _ => {
             chunk(&mut file, HEADER, &header(1, 2, "int8", "1e6", ""));
             let at = |t: f64| [&[8][..], &t.to_le_bytes(), &[1, 2]].concat();

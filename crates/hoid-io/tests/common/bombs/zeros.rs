@@ -1,14 +1,13 @@
-//! Zeros that are packed: a block of a megabyte, as often as it takes. Sums over them are computed where they are small
-//! enough to be read.
+//! Compressed zeros: a block of a megabyte, repeated. Checksums are computed if the data are small enough to be read.
 
 use flate2::{Compress, Compression, Crc, FlushCompress};
 
 /// A megabyte.
 pub const MEGABYTE: usize = 1 << 20;
-/// What is read takes no more: after it no one comes to the sum.
+/// Data up to this size, MB, have a valid checksum: for larger ones no reader reaches the checksum.
 const SUMMED: usize = 100;
 
-/// Deflated: so many megabytes of zeros after a start.
+/// Deflated: a number of megabytes of zeros after a start.
 pub fn deflated(beginning: &[u8], megabytes: usize) -> Vec<u8> {
     let mut packer = Compress::new(Compression::default(), false);
     let mut packed = |bytes: &[u8]| {
@@ -30,7 +29,7 @@ pub fn gzip(megabytes: usize) -> Vec<u8> {
 
 /// In zlib, after a start.
 pub fn zlib(beginning: &[u8], megabytes: usize) -> Vec<u8> {
-    // Adler-32 (RFC 1950, section 9): of zeros the second sum alone grows.
+    // Adler-32 (RFC 1950, section 9): for zeros only the second sum grows.
     let (mut a, mut b) = (1_u64, 0_u64);
     for byte in beginning {
         a = (a + u64::from(*byte)) % 65_521;
@@ -41,7 +40,7 @@ pub fn zlib(beginning: &[u8], megabytes: usize) -> Vec<u8> {
     [&[0x78, 0x9c][..], &deflated(beginning, megabytes), &sum.to_be_bytes()].concat()
 }
 
-/// The sum of a zip archive.
+/// The checksum of a zip archive.
 pub fn crc(beginning: &[u8], megabytes: usize) -> u32 {
     let mut sum = Crc::new();
     sum.update(beginning);

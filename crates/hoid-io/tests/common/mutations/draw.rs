@@ -1,6 +1,6 @@
-//! Numbers that look like chance: SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom
-//! number generators", 2014). Each case has a sequence of its own, so that one can be made again
-//! without those before it.
+//! Pseudo-random numbers: SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number
+//! generators", 2014). Each case has its own sequence, so that it can be reproduced without those
+//! before it.
 
 /// A sequence.
 pub struct Draw(u64);
@@ -22,12 +22,12 @@ impl Draw {
         z ^ (z >> 31)
     }
 
-    /// A whole number below `n`; 0 where there is none.
+    /// An integer below `n`; 0 if `n` is 0.
     pub fn below(&mut self, n: usize) -> usize {
         (self.bits() % (n.max(1) as u64)) as usize
     }
 
-    /// One of some.
+    /// One element of a slice.
     pub fn one_of<'a, T>(&mut self, of: &'a [T]) -> &'a T {
         &of[self.below(of.len())]
     }

@@ -1,5 +1,5 @@
-//! What is packed in a file under a checksum: the members of a zip archive (CRC-32), the variables of
-//! MATLAB's version 7 (Adler-32).
+//! Compressed contents of a file with checksums: the members of a zip archive (CRC-32), the
+//! variables of MATLAB's version 7 (Adler-32).
 
 use std::io::{Cursor, Read, Write};
 
@@ -19,7 +19,7 @@ const MATLAB_HEADER: usize = 128;
 const COMPRESSED: u32 = 15;
 
 impl Inside {
-    /// Contents of the bytes of a good file; none if nothing is packed.
+    /// Contents of a valid file; none if nothing is compressed.
     pub fn of(extension: &str, bytes: &[u8]) -> Option<Self> {
         match extension {
             "npz" => zip(bytes),
@@ -28,7 +28,7 @@ impl Inside {
         }
     }
 
-    /// The parts that may be changed.
+    /// The parts that may be modified.
     pub fn parts(&mut self) -> Vec<&mut Vec<u8>> {
         match self {
             Self::Zip(members) => members.iter_mut().map(|(_, bytes)| bytes).collect(),
@@ -36,7 +36,7 @@ impl Inside {
         }
     }
 
-    /// The file with right checksums.
+    /// The file with valid checksums.
     pub fn packed(&self) -> Vec<u8> {
         match self {
             Self::Zip(members) => {

@@ -1,9 +1,9 @@
-//! Files that were damaged on purpose, and what each reader has to make of them: values, or an error
-//! as text, within a second and 300 MB, and never a panic.
+//! Damaged files, and the required result of each reader: values, or an error message, within a
+//! second and 300 MB, and never a panic.
 //!
-//! Case `k` of a seed is the same bytes on every machine: a good file is drawn, then some mutations
-//! of it. Formats that keep checksums over what is compressed are taken apart first and packed
-//! again, for damage after a wrong checksum would only try the checksum.
+//! Case `k` of a seed is the same bytes on every machine: a valid file is drawn, then some
+//! mutations of it. Formats with checksums over compressed data are unpacked first and packed
+//! again, since otherwise only the checksum would be tested.
 //!
 //! | file | contents |
 //! |---|---|
@@ -27,17 +27,17 @@ use originals::Original;
 
 /// A damaged file.
 pub struct Case {
-    /// The extension that its reader goes by.
+    /// The extension that determines its reader.
     pub extension: &'static str,
-    /// What was damaged.
+    /// Description of the damage.
     pub name: String,
     /// The damaged bytes.
     pub bytes: Vec<u8>,
-    /// Chooses among the options of the readers.
+    /// Selects the options of the readers.
     pub choice: u64,
 }
 
-/// The case of a number.
+/// The case with a number.
 pub fn case(originals: &[Original], seed: u64, number: u64) -> Case {
     let mut draw = Draw::new(seed, number);
     let original = &originals[draw.below(originals.len())];

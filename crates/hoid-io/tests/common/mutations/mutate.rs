@@ -1,14 +1,14 @@
-//! The mutations: bits that flip, ends that are cut, parts that stand elsewhere or twice, numbers
-//! that become huge, words of the format in wrong places.
+//! The mutations: flipped bits, truncation, moved or duplicated parts, huge numbers, words of the
+//! format in wrong places.
 
 use super::{draw::Draw, originals::Original};
 
-/// A file is not grown beyond this.
+/// Maximum length of a mutated file.
 const LONGEST: usize = 1 << 18;
-/// Most of the mutations of one case.
+/// Maximum number of mutations of a case.
 const MOST: usize = 8;
 
-/// Whole numbers at which counts, sizes and sums go wrong.
+/// Integers at which counts, sizes and sums overflow.
 const EDGES: [u64; 20] = [
     0,
     1,
@@ -53,7 +53,7 @@ const NUMBERS: [&str; 16] = [
 
 /// The bytes of a damaged file.
 pub fn mutated(original: &Original, other: &Original, draw: &mut Draw) -> Vec<u8> {
-    // One mostly: after many nothing behind the first check is reached.
+    // Mostly one: with many mutations only the first checks are reached.
     let count = 1 + draw.below(MOST).min(draw.below(MOST)).min(draw.below(MOST));
     if let Some(inside) = original.inside.as_ref().filter(|_| draw.below(3) > 0) {
         let mut inside = inside.clone();
@@ -75,7 +75,7 @@ pub fn mutated(original: &Original, other: &Original, draw: &mut Draw) -> Vec<u8
 
 /// One mutation.
 fn mutate(bytes: &mut Vec<u8>, other: &[u8], original: &Original, draw: &mut Draw) {
-    // After a byte too many or too few a file of numbers is refused at once.
+    // With a byte too many or too few a file of numbers is refused at once.
     let keeps_length = !original.is_text() && draw.below(3) > 0;
     let kind = if keeps_length {
         *draw.one_of(&[0, 1, 2, 7, 8, 9, 11])
@@ -150,7 +150,7 @@ fn mutate(bytes: &mut Vec<u8>, other: &[u8], original: &Original, draw: &mut Dra
     }
 }
 
-/// A place in a given number of bytes: anywhere, or near the head or the end, which report most.
+/// A place among a number of bytes: anywhere, or near the head or the end, which contain most of the structure.
 fn place(length: usize, draw: &mut Draw) -> usize {
     match draw.below(4) {
         0 => draw.below(length.min(256)),
@@ -159,7 +159,7 @@ fn place(length: usize, draw: &mut Draw) -> usize {
     }
 }
 
-/// A part of a given number of bytes, short mostly.
+/// A part of a number of bytes, mostly short.
 fn part(length: usize, draw: &mut Draw) -> (usize, usize) {
     let at = place(length, draw).min(length);
     let most = if draw.below(4) == 0 { length } else { 64 };
@@ -173,7 +173,7 @@ fn insert(bytes: &mut Vec<u8>, at: usize, what: &[u8]) {
     bytes.splice(at..at, what.iter().copied());
 }
 
-/// A decimal number in the bytes becomes another.
+/// Replaces a decimal number in the bytes.
 fn number(bytes: &mut Vec<u8>, draw: &mut Draw) {
     let from = place(bytes.len(), draw);
     let Some(start) = bytes.iter().skip(from).position(u8::is_ascii_digit).map(|at| at + from) else {

@@ -1,5 +1,4 @@
-//! The good files: those that hoid writes, those of other programs (`fixtures/`), and texts with all that a CSV may
-//! hold.
+//! The valid files: those that hoid writes, those of other programs (`fixtures/`), and texts with all features of CSV.
 
 use std::{fs, path::Path};
 
@@ -8,7 +7,7 @@ use hoid_model::{Channel, Record, SampleTime};
 
 use super::inside::Inside;
 
-/// A good file.
+/// A valid file.
 #[derive(Debug, Clone)]
 pub struct Original {
     pub extension: &'static str,
@@ -20,7 +19,7 @@ pub struct Original {
 }
 
 impl Original {
-    /// Whether it is a table of text.
+    /// True for a table of text.
     pub fn is_text(&self) -> bool {
         ["csv", "txt", "tsv"].contains(&self.extension)
     }
@@ -34,7 +33,7 @@ const TEXTS: [&str; 5] = [
     "frame,e,u,f_t,phase\r0,1,2,3,0\r1,2,3,4,0\r2,3,4,5,1\r",
 ];
 
-/// All good files, in one order.
+/// All valid files, in a fixed order.
 pub fn originals() -> Vec<Original> {
     let mut all: Vec<Original> = TEXTS
         .iter()
@@ -92,7 +91,7 @@ fn original(extension: &'static str, name: String, bytes: Vec<u8>) -> Original {
     }
 }
 
-/// Some runs, with names that some formats do not take.
+/// Some rows, with names that are invalid in some formats.
 fn record(n: usize, start: f64) -> Record {
     let channel = |name: &str, k: f64| {
         let values = (0..n).map(|i| (k * i as f64).sin()).collect();

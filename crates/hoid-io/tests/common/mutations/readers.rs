@@ -1,6 +1,6 @@
-//! All readers over one file, and what must hold: a record is even, finite and not longer than the
-//! file gives reason for; an error names the file, is short, and holds nothing that a terminal
-//! obeys.
+//! All readers applied to one file, and the required properties: a record is even, finite and not
+//! excessively long; an error names the file, is short, and contains no terminal control
+//! characters.
 
 use std::path::Path;
 
@@ -11,12 +11,12 @@ use hoid_io::{
 
 use super::draw::Draw;
 
-/// Characters that a message may have.
+/// Maximum length of a message, characters.
 const LONGEST_MESSAGE: usize = 4000;
-/// Samples that a byte of a file may give: `--resample` makes some out of one.
+/// Maximum number of samples per byte of a file: `--resample` makes several out of one.
 const SAMPLES_PER_BYTE: usize = 200;
 
-/// How often something was read and refused.
+/// Numbers of successful and refused reads.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Answers {
     pub read: u64,
@@ -26,7 +26,7 @@ pub struct Answers {
 /// Gives a file to all readers.
 ///
 /// # Panics
-/// If a condition of the function is violated.
+/// If a required property is violated.
 pub fn all(path: &Path, bytes: usize, choice: u64) -> Answers {
     let mut answers = Answers::default();
     let mut draw = Draw::new(choice, 0);
@@ -81,7 +81,7 @@ fn whole(read: &ReadRecord, bytes: usize, options: &ReadOptions) {
     finite(read);
     let record = &read.record;
     assert!(record.sample_time().s() > 0.0 && record.sample_time().s().is_finite());
-    // Compressed zeros take next to nothing.
+    // Compressed zeros take very few bytes.
     let most = SAMPLES_PER_BYTE * bytes + (1 << 25);
     assert!(record.len() <= most, "{} samples of {bytes} bytes", record.len());
     assert!(!record.is_empty(), "an empty record by {options:?}");

@@ -1,11 +1,11 @@
-//! What a case costs, on a machine that has other work.
+//! Cost of a case on a loaded machine.
 
 use std::{
     fs,
     time::{Duration, Instant},
 };
 
-/// Processor time if the system reports it, else wall time.
+/// Processor time if the system reports it, otherwise elapsed time.
 pub struct Spent {
     on_processor: Option<Duration>,
     by_clock: Instant,

@@ -1,13 +1,13 @@
-//! Findings in the files of a group, for the line of the manifest that it belongs to.
+//! Evidence from the files of a group for lines of its manifest.
 
-/// The findings, for the line of the manifest that starts with `key`: below the table `table`.
+/// Evidence for the line of the manifest that starts with `key`, in the table `table`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
-    /// Table of the manifest, as `[read]`; empty for its head.
+    /// Table of the manifest, such as `[read]`; empty for its head.
     pub table: String,
     /// Key in that table; empty for the table itself.
     pub key: &'static str,
-    /// The findings, and how.
+    /// The evidence as text.
     pub words: String,
 }
 

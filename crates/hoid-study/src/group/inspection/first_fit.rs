@@ -1,4 +1,4 @@
-//! Form and order of the noise model of the first run: evidence for the analysis, not its result.
+//! Form and order of the noise model of the first run: evidence for the settings of the analysis, not its result.
 
 use hoid_ident::{
     Estimator,
@@ -9,9 +9,9 @@ use hoid_model::{Record, Structure};
 
 use super::evidence::Evidence;
 
-/// Orders of the noise model that are tried.
+/// Orders of the noise model to try.
 const ORDERS: std::ops::RangeInclusive<usize> = 1..=6;
-/// Orders above the one that was chosen which the analysis may take for other runs.
+/// Number of orders above the selected one that the analysis may use for other runs.
 const ROOM: usize = 2;
 
 /// Results of the first run.
@@ -20,7 +20,7 @@ pub struct FirstFit {
     pub evidence: Vec<Evidence>,
 }
 
-/// Box-Jenkins models of the operator over orders of the noise, and the forms of the family.
+/// Fits Box-Jenkins models of the operator over orders of the noise model, and the forms of the family.
 pub fn evidence(record: &Record) -> FirstFit {
     let mut evidence = Vec::new();
     let mut nd = None;

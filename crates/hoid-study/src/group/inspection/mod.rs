@@ -1,5 +1,5 @@
-//! A look at the files of a group before they are analysed ([`Look`]): what is found in them is in the manifest with
-//! the evidence next to it, to be looked through by a person; the request is not searched for.
+//! Inspection of the files of a group before the analysis ([`Look`]): results are written to the manifest with their
+//! evidence, to be checked by the user; settings given by the user are not searched for.
 //!
 //! | file | contents |
 //! |---|---|
@@ -18,11 +18,11 @@ pub use evidence::Evidence;
 use super::{condition_settings::ConditionSettings, manifest::Manifest};
 use crate::StudyError;
 
-/// Completes a manifest by what its files state: the first run of each condition is examined.
+/// Completes a manifest from its files: the first run of each condition is examined.
 ///
 /// # Errors
-/// [`StudyError::Io`] where the first file cannot be read at all; what cannot be found is reported
-/// in the evidence.
+/// [`StudyError::Io`] if the first file cannot be read at all; anything that cannot be determined
+/// is reported in the evidence.
 pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -> Result<Vec<Evidence>, StudyError> {
     let mut evidence = Vec::new();
     let first = Look::at(&directory.join(&manifest.runs[0].file), known)?;
@@ -50,7 +50,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -
     let (input, output) = (first.roles.input.clone(), first.roles.output.clone());
     evidence.push(Evidence::new("[read]", "input", input.why));
     evidence.push(Evidence::new("[read]", "output", output.why));
-    // All files are read by the columns of the first.
+    // All files are read with the columns of the first.
     let of_all = LookOptions {
         input: Some(input.column.clone()),
         output: Some(output.column.clone()),
@@ -88,12 +88,12 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -
         };
         let table = format!("[conditions.{}]", key_of(condition));
         let settings = look_at(&seen, condition, &table, known, &mut evidence, &mut spans);
-        // A run without the name of a condition has no table of its own.
+        // A run without a condition name has no table of its own.
         if !condition.is_empty() && settings != ConditionSettings::default() {
             manifest.conditions.insert(condition.clone(), settings);
         }
     }
-    // One span for all, complete in each condition.
+    // A common span, complete in each condition.
     if let (None, None, Some(first)) = (known.from_s, known.to_s, spans.first())
         && spans.iter().all(|span| span == first)
     {
@@ -123,7 +123,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -
     Ok(evidence)
 }
 
-/// Statement of the first run of a condition about it.
+/// Examines the first run of a condition.
 fn look_at(
     seen: &RecordSummary,
     condition: &str,
@@ -158,7 +158,7 @@ fn look_at(
     settings
 }
 
-/// A name as TOML writes it in the head of a table.
+/// A name as a TOML key in a table heading.
 fn key_of(name: &str) -> String {
     let bare = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if !name.is_empty() && name.chars().all(bare) {
@@ -168,7 +168,7 @@ fn key_of(name: &str) -> String {
     }
 }
 
-/// The text of a manifest with the evidence as comments above the lines that it belongs to.
+/// The text of a manifest with the evidence as comments above the corresponding lines.
 #[must_use]
 pub fn commented(text: &str, evidence: &[Evidence]) -> String {
     let mut written = String::from(
@@ -214,7 +214,7 @@ mod tests {
             "{written}"
         );
         assert!(written.contains("# 10 lines\nexcitation"), "{written}");
-        // The comments change nothing.
+        // Comments do not change the settings.
         let read = |text: &str| toml::from_str::<toml::Table>(text).unwrap();
         assert_eq!(read(&written), read(text));
     }

@@ -59,7 +59,7 @@ fn decimation(item: &Item, results: &Results) -> ItemOutput {
                 }
             }
             // Blue for ARX, vermillion and orange for Box-Jenkins with a whole and a fractional
-            // delay, shades of purple for those of Pade, green for the grey box.
+            // delay, shades of purple for Pade delays, green for the grey box.
             let of = |method, level, levels| Shade { method, level, levels };
             let shade = match i {
                 0 => of(0, 0, 1),

@@ -1,4 +1,4 @@
-//! A forgetting factor against a forgetting matrix.
+//! Comparison of a forgetting factor with a forgetting matrix.
 
 use hoid_report::figures::{BoxSeries, Shade};
 use hoid_study::{Query, Results};

@@ -1,5 +1,5 @@
-//! Extensions that the thesis leaves open: decimation, T_n = 0.2 s, the second definition of the
-//! noise level, memories, forgetting matrix; and the example of a study of one's own.
+//! Extensions beyond the thesis: decimation, T_n = 0.2 s, the second definition of the noise level,
+//! memories, forgetting matrix; and the example of a custom study.
 
 mod boxes;
 mod decimation;
