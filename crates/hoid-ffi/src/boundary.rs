@@ -1,8 +1,8 @@
-//! Pointers of the caller, the only unsafe assumptions of this crate.
+//! Pointers of the caller: all that this crate believes.
 //!
-//! A null or unaligned pointer is refused. Two conditions cannot be checked and are the contract of
-//! every function here: the pointer refers to an object as described in the header, and no other
-//! thread uses it at the same time.
+//! A pointer that is null or not aligned is refused. Two conditions cannot be checked and are the
+//! contract of every function here: the pointer refers to an object as the header describes it, and
+//! no other thread uses it at the same time.
 
 use std::{
     ffi::{CStr, c_char},
@@ -45,7 +45,7 @@ pub(crate) unsafe fn text<'a>(pointer: *const c_char, what: &str) -> Result<Opti
     if pointer.is_null() {
         return Ok(None);
     }
-    // SAFETY: not null; the contract requires that it ends with a zero and stays valid.
+    // SAFETY: not null; that it ends with a zero and stays is the contract.
     let text = unsafe { CStr::from_ptr(pointer) };
     let wrong = |_| Failure::new(HOID_BAD_TEXT, format!("{what} is not in UTF-8"));
     text.to_str().map(Some).map_err(wrong)
@@ -63,8 +63,8 @@ pub(crate) unsafe fn bytes<'a>(pointer: *const u8, length: usize, what: &str) ->
             format!("{what}: no memory has {length} bytes"),
         ));
     }
-    // SAFETY: not null, and no longer than a slice may be; the contract requires this number of
-    // elements.
+    // SAFETY: not null, and no longer than a slice may be; that there are this many is the
+    // contract.
     Ok(unsafe { slice::from_raw_parts(pointer, length) })
 }
 
@@ -74,7 +74,7 @@ pub(crate) unsafe fn bytes<'a>(pointer: *const u8, length: usize, what: &str) ->
 /// `pointer` is null or points to room for one value.
 pub(crate) unsafe fn put<T>(pointer: *mut T, value: T, what: &str) -> Result<(), Failure> {
     check(pointer, what)?;
-    // SAFETY: not null, aligned; the contract requires enough space. The previous content needs no drop.
+    // SAFETY: not null, aligned; that there is room is the contract. What was there needs no drop.
     unsafe { pointer.write(value) };
     Ok(())
 }
@@ -103,7 +103,7 @@ pub(crate) unsafe fn put_all<T: Copy>(
             format!("{what} has room for {room}, there are {}", values.len()),
         ));
     }
-    // SAFETY: not null, aligned, and by the contract with space for `room` values, which is enough;
+    // SAFETY: not null, aligned, and by the contract with room for `room` values, which is enough;
     // memory of the caller does not overlap with ours.
     unsafe { list.copy_from_nonoverlapping(values.as_ptr(), values.len()) };
     Ok(())
@@ -131,7 +131,7 @@ pub(crate) unsafe fn take_back(tracker: *mut HoidTracker) {
     if tracker.is_null() {
         return;
     }
-    // SAFETY: it came from `hand_over`, and by the contract is passed only once.
+    // SAFETY: it came from `hand_over`, by the contract for the only time.
     drop(unsafe { Box::from_raw(tracker) });
 }
 
@@ -145,7 +145,7 @@ pub(crate) unsafe fn with_tracker(
 ) -> HoidStatus {
     guarded(|| {
         check(tracker, "the tracker")?;
-        // SAFETY: not null, aligned; by the contract it is ours and is not modified.
+        // SAFETY: not null, aligned; by the contract it is ours and no one changes it.
         let tracker = unsafe { &*tracker };
         tracker.check()?;
         call(&tracker.session)
@@ -237,17 +237,17 @@ mod tests {
         let refused = unsafe { put(ptr::null_mut(), 1.0, "the place") }.unwrap_err();
         assert_eq!(refused.status, HOID_BAD_POINTER);
         let mut room = [0.0_f64; 2];
-        // SAFETY: the byte after the end is not written.
+        // SAFETY: one byte further is not written to.
         let refused = unsafe { put(room.as_mut_ptr().wrapping_byte_add(1), 1.0, "the place") }.unwrap_err();
         assert!(refused.text.contains("aligned"));
         let mut count = 0;
-        // SAFETY: space for two.
+        // SAFETY: room for two.
         let refused = unsafe { put_all(&[1.0, 2.0, 3.0], room.as_mut_ptr(), 2, &mut count, "the list") };
         assert_eq!(
             (refused.unwrap_err().status, count, room),
             (HOID_TOO_SMALL, 3, [0.0; 2])
         );
-        // SAFETY: nothing is written.
+        // SAFETY: nothing to be written to.
         let told = unsafe { put_all(&[1.0], ptr::null_mut(), 0, &mut count, "the list") };
         assert_eq!((told, count), (Ok(()), 1));
         // SAFETY: ends with a zero.

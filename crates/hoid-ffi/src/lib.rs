@@ -1,10 +1,10 @@
-//! The tracker of `hoid track` and `hoid stream` with a C ABI.
+//! The tracker of `hoid track` and `hoid stream` after a C ABI.
 //!
 //! The one crate of the workspace with unsafe code. What is unsafe about a C boundary is that pointers are trusted, so
 //! that is all the unsafe code does: `boundary` reads texts and writes results through pointers of the caller, and
 //! nothing else dereferences one. After it comes the safe `session`, which has no information about C.
 //!
-//! Three rules apply to every function:
+//! Three rules hold for every function:
 //!
 //! - **It answers with a status**, zero for done, positive where there is no value now, negative for an error. What is
 //!   after it is in [`hoid_last_error`] of the calling thread.

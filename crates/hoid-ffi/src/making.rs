@@ -1,4 +1,4 @@
-//! Creating, saving and freeing trackers.
+//! Making, saving and freeing trackers.
 
 use std::ffi::{CStr, c_char};
 

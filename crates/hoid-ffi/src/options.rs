@@ -1,4 +1,4 @@
-//! Options of a tracker: method, sample time, options in JSON, a fit.
+//! Signals to be tracked: method, sample time, options in JSON, a fit.
 //!
 //! The options are one object with the keywords of `pyhoid.Tracker`: `structure`, `na` to `nk` (a
 //! number, or a pair that is searched on the warm-up), `criterion`, `start` (coefficients by name, or
@@ -94,7 +94,7 @@ impl TrackerRequest {
     }
 }
 
-/// Sets the options of the method, those on which others depend first, and the fit.
+/// Options of the method, those first that others belong to, and the fit.
 fn set(method: &mut Method, mut options: Map<String, Value>, fit: Option<&str>) -> Result<(), Failure> {
     let mut fitted = fit.map(|text| operator(text, "the fit")).transpose()?;
     if let Some(prior) = options.get("prior") {
@@ -148,7 +148,7 @@ fn object(text: &str) -> Result<Map<String, Value>, Failure> {
     })
 }
 
-/// Removes an option and returns it; none if it is missing or null.
+/// Takes an option out; none if it is missing or null.
 fn taken<T>(
     options: &mut Map<String, Value>,
     name: &str,
@@ -218,7 +218,7 @@ fn range(value: &Value, name: &str) -> Result<RangeInclusive<usize>, String> {
     }
 }
 
-/// A value in the format of the command line; none if it is empty.
+/// A value as the command line writes it; none if it carries no information.
 fn text(value: &Value) -> Option<String> {
     Some(match value {
         Value::Null | Value::Bool(false) => return None,

@@ -1,4 +1,4 @@
-//! A description in JSON followed by bytes, with a checksum.
+//! A description in JSON and bytes after it, of which damage shows.
 //!
 //! | bytes | |
 //! |---|---|
@@ -8,7 +8,7 @@
 //! | | the bytes |
 //! | 8 | FNV-1a over all before (G. Fowler, L. C. Noll, K.-P. Vo, 1991; 64 bits) |
 //!
-//! Little-endian. The checksum protects against damage, not against an adversary.
+//! Little-endian. The sum guards against damage, not against an adversary.
 
 use serde_json::Value;
 

@@ -1,7 +1,7 @@
-//! Reading the estimates of a tracker.
+//! Report of a tracker.
 //!
-//! A list is requested with its space and the place for its count; with NULL and no space only the
-//! count is returned.
+//! A list is requested with its room and the place for its count; with NULL and no room only the
+//! count is reported.
 
 use std::ffi::c_char;
 

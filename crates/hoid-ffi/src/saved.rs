@@ -1,4 +1,4 @@
-//! A tracker as bytes, for continuing elsewhere with the same digits.
+//! A tracker as bytes, to continue elsewhere with the same digits.
 //!
 //! The description is the request and the orders, the bytes are the numbers of
 //! [`hoid_track::Live::saved`] (`packed`).
@@ -81,7 +81,7 @@ mod tests {
     const AT_ONCE: &str =
         r#"{"nk": 29, "nd": 1, "start": {"b0": 0.04, "b1": -0.04, "d1": -0.8, "f1": -1.9, "f2": 0.92}}"#;
 
-    /// Number of samples before it is saved, and of all; under Miri a few suffice.
+    /// Samples until it is saved, and in all; under Miri a few will do.
     const TAKEN: [usize; 2] = if cfg!(miri) { [5, 8] } else { [1500, 2500] };
 
     fn samples() -> Vec<Sample> {
@@ -104,7 +104,7 @@ mod tests {
     fn a_saved_tracker_goes_on_with_the_same_digits() {
         let samples = samples();
         let [taken, all] = TAKEN;
-        // The second is an earlier name, as in data saved under it.
+        // The second is an earlier name, as it is in what was saved under it.
         let of_bank = [("adaptive", None), ("population", None)];
         let at_work = [("rpem", Some(AT_ONCE))];
         let warm = [
@@ -156,7 +156,7 @@ mod tests {
             changed[place] ^= 0x40;
             refused(&changed);
         }
-        // With a valid checksum, the description must still be valid.
+        // With a true sum, the description still has to be one.
         for (from, to) in [
             ("adaptive", "ldaptive"),
             ("\"orders\":[", "\"orders\":{"),

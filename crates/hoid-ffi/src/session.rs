@@ -1,5 +1,5 @@
-//! A tracker from its warm-up on. This module is independent of C, except for the names, which C
-//! keeps.
+//! A tracker as it was requested, from its warm-up on. Nothing here knows of C, except for the
+//! names, which C wants to keep.
 
 use std::ffi::{CStr, CString};
 
@@ -274,7 +274,7 @@ mod tests {
         for ((name, unit, _), (name_c, unit_c)) in rows.into_iter().zip(OPERATOR) {
             assert_eq!((name, unit), (name_c.to_str().unwrap(), unit_c.to_str().unwrap()));
         }
-        // Each quantity by itself is the one that is reported to have changed.
+        // Each quantity alone is the one that is reported to have changed.
         for (i, name) in SHIFTED.into_iter().enumerate() {
             let fixed = [Estimate::fixed(1.0); 2];
             let mut change = Change {

@@ -1,6 +1,6 @@
-//! Status codes, and the message of the last one.
+//! Statuses, and the text after the last one.
 //!
-//! The message belongs to the thread: two threads with one tracker each do not interfere.
+//! The text belongs to the thread: two threads with a tracker each do not mix theirs up.
 
 use std::{
     any::Any,
@@ -103,7 +103,7 @@ pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> String {
 
 fn remember(text: &str) {
     let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
-    // At the end of a thread its storage may no longer exist.
+    // At the end of a thread there may be no place for it any more.
     let _ = LAST.try_with(|last| *last.borrow_mut() = text);
 }
 

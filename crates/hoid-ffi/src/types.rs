@@ -1,4 +1,4 @@
-//! The types of the data passed on. Unknown numbers are NaN.
+//! The data passed on. Numbers that are not known are NaN.
 
 use std::{ffi::c_char, ptr};
 

@@ -1,12 +1,14 @@
-//! Two combined methods, as the thesis proposes (section VII): recursive least squares for the gains, with the
-//! neuromuscular coefficients "adjusted based on recursive Box-Jenkins calculations".
+//! Two methods in one, as the thesis proposes it (section VII): recursive least squares for the
+//! gains, with the neuromuscular coefficients "adjusted based on recursive Box-Jenkins
+//! calculations".
 //!
-//! The prediction-error method with a forgetting matrix gives F and D; least squares has to estimate only B,
+//! The prediction-error method with a forgetting matrix gives F and D; least squares has only B
+//! left to find,
 //!
 //! `F u = B q^-nk e + eps`,
 //!
-//! with the F of the sample, and forgets by the memory of b. The bias of the poles due to coloured noise is removed,
-//! that of B is not: the equation error `F n` is as coloured as in an ARX model.
+//! with the F of the sample, and forgets by the memory of b. The bias that coloured noise gives to
+//! the poles is gone, that of B is not: the equation error `F n` is as coloured as in an ARX model.
 
 use hoid_core::{
     delay::DelayLine,
@@ -28,7 +30,7 @@ use hoid_track::{
     },
 };
 
-/// Number of coefficients of B.
+/// Coefficients of B.
 const B: usize = 2;
 
 settings! {
@@ -108,7 +110,7 @@ impl RecursiveMethod for FusedOptions {
     }
 }
 
-/// RLS combined with RPEM.
+/// RLS next to RPEM.
 pub(crate) struct FusedRecursion {
     rpem: Box<dyn Recursion>,
     rls: Rls<AnyShape, B, Gain<B>>,
@@ -132,10 +134,10 @@ impl State for FusedRecursion {
 }
 
 impl FusedRecursion {
-    /// Starts from the same start as the prediction-error method; least squares has no limit of its own.
+    /// From the same start as the prediction-error method; least squares has no limit of its own.
     ///
     /// # Errors
-    /// As there.
+    /// As that.
     pub(crate) fn new(
         setup: &Setup,
         limit_of_b: f64,
@@ -227,7 +229,7 @@ impl Recursion for FusedRecursion {
     fn bridge(&mut self, sample: Sample) {
         let x = self.delay.step(sample.e);
         self.rpem.bridge(sample);
-        // For an output of zero, eps is the negative prediction.
+        // eps of an output of zero is the prediction with its sign changed.
         let y = self.filtered(0.0);
         let predicted = -self.rls.step_without_update(x, y).innovation;
         self.remember(bounded(predicted));
@@ -241,7 +243,7 @@ impl Recursion for FusedRecursion {
         &self.theta
     }
 
-    /// Covariances within each method; those between them are unknown and set to zero.
+    /// The value for each method; between them nothing is known, and zero is put.
     fn covariance(&self, into: &mut [f64]) -> bool {
         let known = self.rpem.covariance(into);
         let p = self.theta.len();

@@ -1,16 +1,16 @@
-//! A network of a single linear layer that learns the equalization parameters, as in section 2.4 of the thesis, after
-//! its reference [14]. Learning rule: B. Widrow and M. E. Hoff, *Adaptive switching circuits*, IRE WESCON 1960.
+//! A network of a single linear layer that learns the equalization parameters, as section 2.4 of the thesis describes
+//! that of its reference [14]. The rule: B. Widrow and M. E. Hoff, *Adaptive switching circuits*, IRE WESCON 1960.
 //!
-//! The inputs are the discretised pilot model with unit equalization: y_0 and y_1, the responses of the neuromuscular
-//! part to the delayed error and to its rate, each over its size s_i, the root mean square so far. The output of the
-//! neuron is their weighted sum,
+//! The inputs are the discretised pilot model with unit equalization: y_0 and y_1, the responses of
+//! the neuromuscular part to the delayed error and to its rate, each over its size s_i, the root mean
+//! square so far. One neuron weighs them,
 //!
 //! `u^(k) = w_0 y_0(k)/s_0 + w_1 y_1(k)/s_1`, `w_i <- w_i + (Ts/T) (y_i/s_i) (u - u^)`,
 //!
-//! and `K_e = w_0/s_0`, `K_e_dot = w_1/s_1`. A signal and its rate are orthogonal over time and the inputs have unit
-//! power, so that each weight forgets with the time constant T. The neuromuscular part, the delay and the initial
-//! weights are those of the Box-Jenkins fit of the start span, and everything except the equalization stays constant.
-//! The rule has no covariance.
+//! and `K_e = w_0/s_0`, `K_e_dot = w_1/s_1`. A signal and its rate are orthogonal over time and the
+//! inputs have unit power, so that each weight forgets with the time constant T. Neuromuscular part,
+//! delay and first weights are those of the Box-Jenkins fit of the start span, and what does not
+//! belong to the equalization stays. The rule has no covariance.
 
 use hoid_core::{
     delay::DelayLine,
@@ -51,7 +51,7 @@ impl RecursiveMethod for LinearNetworkOptions {
         }
     }
 
-    /// The memory follows from the time constant of learning.
+    /// It follows from the time constant of learning.
     fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Infinite
     }
@@ -117,7 +117,7 @@ impl RecursiveMethod for LinearNetworkOptions {
 struct Neuron {
     /// K_e and K_e_dot: the weights over the sizes of the inputs.
     gains: [f64; 2],
-    /// Mean squares of the inputs so far, and the number of samples.
+    /// Mean squares of the inputs so far, of how many samples.
     squares: [f64; 2],
     samples: f64,
     /// Ts/T.
@@ -175,7 +175,7 @@ impl State for LinearNetwork {
 }
 
 impl LinearNetwork {
-    /// Takes an error; returns y_0 and y_1.
+    /// Takes an error; y_0 and y_1.
     fn responses(&mut self, e: f64) -> [f64; 2] {
         let square = self.nms[0] * self.nms[0];
         self.state = self.held.step(self.state, self.delay.step(e));
@@ -277,7 +277,7 @@ mod tests {
         assert!((k_e_dot - 0.3).abs() < 0.03, "{k_e_dot}");
     }
 
-    /// Comparison with the batch form: y_0 and y_1 weighted by K_e and K_e_dot are the response of the held operator.
+    /// The batch twin: y_0 and y_1 weighed by K_e and K_e_dot are the response of the held operator.
     #[test]
     fn the_inputs_add_up_to_the_held_operator() {
         let operator = OperatorParameters {
@@ -328,7 +328,7 @@ mod tests {
             let trace = track(&simulator.run(seed, false).unwrap(), &options, 100).unwrap();
             mean += trace.operator(64).unwrap().k_e_dot.value / 0.084 / RUNS as f64;
         }
-        // The loop biases a direct fit without a noise model; the standard error of the mean is 3 %.
+        // The loop biases a direct fit without a noise model; standard error of the mean 3 %.
         assert!((mean - 1.0).abs() < 0.25, "{mean}");
     }
 }

@@ -1,15 +1,17 @@
 //! The batch fit over a sliding window.
 //!
-//! The last W samples are kept, and every k samples they are fitted by the batch estimator, from the last theta;
-//! between the fits theta stays constant. The estimate therefore has the rectangular memory of W samples, and initial
-//! states, bounds and all other properties of the estimator; the covariance is that of the fit.
+//! The last W samples are kept, and every k samples they are fitted by the batch estimator, from
+//! the last theta; between the fits theta stays. So the estimate has the rectangular memory of W
+//! samples, initial states, bounds and all else that the estimator has, and the covariance is that
+//! of the fit.
 //!
-//! **Local minima.** A search from the last theta stays near its local minimum. The starting points of the estimator
-//! are searched as well if there is no last theta or that search does not converge, if the loss has risen by
-//! [`SUSPICIOUS`] since the last comparison, and at least at every [`COMPARE`]-th fit; the lower of the two minima is
-//! taken.
+//! **Wrong minima.** A search from the last theta stays in the valley it is in. The estimator's own
+//! starts are searched as well where there is no last theta or that search does not converge, where
+//! the loss has risen by [`SUSPICIOUS`] since the last comparison, and at every [`COMPARE`]-th fit
+//! at the latest; the lower of the two minima is taken.
 //!
-//! **Failures.** If a fit fails, as for a window without excitation, theta and covariance stay unchanged.
+//! **Failures.** Where a fit fails, as for a window without excitation, theta and covariance stay
+//! as they were.
 
 use hoid_core::state::{State, visit_all};
 use std::collections::VecDeque;
@@ -28,13 +30,13 @@ use hoid_track::{
     },
 };
 
-/// Number of fits from the last theta between two comparisons with the starting points of the estimator.
+/// Fits from the last theta between two comparisons with the estimator's own starts.
 const COMPARE: usize = 8;
-/// Rise of the loss relative to that of the last comparison that triggers the next one.
+/// Relative rise of the loss over that of the last comparison that calls for the next one.
 const SUSPICIOUS: f64 = 0.25;
-/// Divisor of the window length that gives the number of samples for a first fit.
+/// Share of the window that is enough for a first fit.
 const FIRST_SHARE: usize = 4;
-/// Residuals per unknown that are enough for a first fit.
+/// Residuals for each unknown that are enough for a first fit.
 const RESIDUALS_EACH: usize = 5;
 
 settings! {
@@ -109,13 +111,13 @@ pub(crate) struct WindowRecursion {
     sample_time: SampleTime,
     window: usize,
     every: usize,
-    /// Number of samples for the first fit.
+    /// Samples for the first fit.
     enough: usize,
     e: VecDeque<f64>,
     u: VecDeque<f64>,
     predictor: Predictor,
     theta: Vec<f64>,
-    /// True if theta is an estimate, or was given.
+    /// True when theta is an estimate, or was given.
     known: bool,
     covariance: Option<Vec<f64>>,
     variance: f64,
@@ -131,7 +133,7 @@ pub(crate) struct WindowRecursion {
 
 impl State for WindowRecursion {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
-        // The number of kept samples and of the entries of the covariance come first.
+        // The samples that are kept, and the covariance that may be there: first how many.
         for kept in [&mut self.e, &mut self.u] {
             let mut length = kept.len();
             length.visit(each);
@@ -164,8 +166,8 @@ impl State for WindowRecursion {
 }
 
 impl WindowRecursion {
-    /// Uses windows of `window` samples, fitted every `every` samples, from theta and its covariance if they are
-    /// known.
+    /// Windows of `window` samples, fitted every `every` samples, from theta and its covariance
+    /// where they are known.
     ///
     /// # Errors
     /// [`IdentError`] for options, orders, a start or a window that cannot be used.
@@ -248,7 +250,7 @@ impl WindowRecursion {
         })
     }
 
-    /// Returns the number of fits that updated theta.
+    /// Fits that gave theta.
     #[cfg(test)]
     pub fn fits(&self) -> usize {
         self.fits
@@ -279,7 +281,8 @@ impl WindowRecursion {
                 self.theta.copy_from_slice(fit.model().theta());
                 self.covariance = fit.covariance().map(<[f64]>::to_vec);
                 self.variance = fit.innovation_variance();
-                // Future innovations must not contain the effect of the previous theta on the filters.
+                // Innovations of the samples to come shall not hold what the theta before has left
+                // in the filters.
                 self.predictor.reset();
                 for (e, u) in self.e.iter().zip(&self.u) {
                     self.predictor.step(&self.theta, *e, *u);
@@ -305,7 +308,7 @@ impl WindowRecursion {
         Ok(record.labelled("of the window"))
     }
 
-    /// Returns the best minimum from the last theta and, if needed, from the starting points of the estimator.
+    /// The best minimum that the last theta and, where called for, the own starts lead to.
     fn fit(&mut self, record: &Record) -> Result<Fit, IdentError> {
         let records = std::slice::from_ref(record);
         let own = |estimator: &Estimator| estimator.fit(records).and_then(settled);
@@ -346,8 +349,8 @@ impl WindowRecursion {
     }
 }
 
-/// Returns a fit whose search converged; otherwise the result depends more on the limit of iterations than on the
-/// window.
+/// A fit whose search came to rest; one that did not carries more information about the limit of
+/// iterations than about the window.
 fn settled(fit: Fit) -> Result<Fit, IdentError> {
     if fit.termination().converged() {
         Ok(fit)

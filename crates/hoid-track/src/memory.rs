@@ -1,4 +1,4 @@
-//! Memory of a recursion: the time in which the weight of an observation falls to 1/e.
+//! How long an observation counts: the time in which its weight falls to 1/e.
 
 use std::{collections::BTreeMap, str::FromStr};
 
@@ -8,19 +8,19 @@ use hoid_ident::{
 };
 use hoid_model::SampleTime;
 
-/// Memory: the time in which the weight of an observation falls to 1/e.
+/// How long an observation counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Memory {
     /// N samples: `lambda = 1 - 1/N`.
     Samples(f64),
     /// T seconds: `lambda = 1 - Ts/T`. (`exp(-Ts/T)` agrees to first order.)
     Seconds(f64),
-    /// Infinite: `lambda = 1`.
+    /// For ever: `lambda = 1`.
     Infinite,
 }
 
 impl Memory {
-    /// Returns the factor lambda.
+    /// The factor lambda.
     ///
     /// # Errors
     /// [`IdentError::BadOption`] unless the memory is longer than one sample.
@@ -31,10 +31,10 @@ impl Memory {
         }
     }
 
-    /// Returns the length in samples of a window as long as the memory.
+    /// Whole samples of a window as long as the memory.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for an infinite memory, or one that is not longer than one sample.
+    /// [`IdentError::BadOption`] for a memory without end, or not longer than one sample.
     pub fn samples(self, sample_time: SampleTime) -> Result<usize, IdentError> {
         Ok(self.length(sample_time)?.round() as usize)
     }
@@ -58,7 +58,7 @@ impl Memory {
     }
 }
 
-/// Reads `256` samples, `2.56s`, or `inf`.
+/// `256` samples, `2.56s`, or `inf`.
 impl Value for Memory {
     const KIND: Kind = Kind::Memory;
 
@@ -95,7 +95,7 @@ impl FromStr for Memory {
     }
 }
 
-/// The memory of all parameters: given directly, or by its factor of forgetting.
+/// The memory of all parameters: as such, or by its factor of forgetting.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct CommonMemory(pub Option<Memory>);
 
@@ -157,7 +157,7 @@ settings! {
 }
 
 impl MemoryOptions {
-    /// Returns options with the same memory for all parameters.
+    /// The same memory for all parameters.
     pub fn of_all(memory: Memory) -> Self {
         Self {
             memory: CommonMemory(Some(memory)),
@@ -165,21 +165,21 @@ impl MemoryOptions {
         }
     }
 
-    /// Returns the memory of a parameter if one was given: by its name, by its letter, or for all.
+    /// The memory of a parameter where one was given: of its name, of its letter, or of all.
     pub(crate) fn given(&self, name: &str) -> Option<Memory> {
         let by_letter = self.memory_of.iter().find(|(key, _)| is_named(name, key));
         let by_letter = by_letter.map(|(_, memory)| *memory);
         self.memory_of.get(name).copied().or(by_letter).or(self.memory.0)
     }
 
-    /// Returns the first name of a memory that is neither a parameter nor a letter of one.
+    /// The first name of a memory that is neither a parameter nor a letter of one.
     pub(crate) fn unknown(&self, names: &[String]) -> Option<&String> {
         let known = |key: &String| names.iter().any(|name| is_named(name, key));
         self.memory_of.keys().find(|key| !known(key))
     }
 }
 
-/// True if `key` is the name, or the letter of its polynomial.
+/// True when `key` is the name, or the letter of its polynomial.
 fn is_named(name: &str, key: &str) -> bool {
     name == key || (key.len() == 1 && name.starts_with(key) && name[1..].bytes().all(|b| b.is_ascii_digit()))
 }

@@ -10,16 +10,16 @@ use hoid_ident::{
 
 use crate::{forgetting::ForgettingRule, memory::MemoryOptions};
 
-/// Limit of the variances of P where nothing excites a parameter.
+/// How far the variances of P may grow where nothing excites a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum WindupGuard {
-    /// No limit: equations 5.26 and 31 of the thesis unchanged.
+    /// As far as forgetting takes them: equations 5.26 and 31 of the thesis unchanged.
     Off,
-    /// This multiple of their initial value.
+    /// To this multiple of their initial value.
     Bound(f64),
 }
 
-/// Reads `off`, or the bound.
+/// `off`, or the bound.
 impl Value for WindupGuard {
     const KIND: Kind = Kind::NumberOrOff;
 
@@ -71,7 +71,7 @@ settings! {
 }
 
 impl GainOptions {
-    /// Returns the limit in use: none for a sliding window, whose sums contain every sample as recorded.
+    /// The limit in use: none for a sliding window, whose sums hold every sample as it came.
     pub fn limit_or(&self, default: f64) -> f64 {
         match self.forgetting {
             ForgettingRule::Window => f64::INFINITY,
@@ -79,15 +79,16 @@ impl GainOptions {
         }
     }
 
-    /// Returns the guard against windup in use; `None` if it follows from the start. It is off for the recursion of
-    /// the thesis: P at the start is given, P forgets exponentially, and innovations are not limited.
+    /// The guard against windup in use; `None` if it follows from the start. It is off for the
+    /// recursion of the thesis: P at the start is given, P forgets exponentially, and no innovation
+    /// is too large.
     pub fn windup_guard(&self, limit: f64) -> Option<WindupGuard> {
         let of_the_text =
             self.covariance.is_some() && self.forgetting == ForgettingRule::Exponential && limit == f64::INFINITY;
         self.windup_guard.or(of_the_text.then_some(WindupGuard::Off))
     }
 
-    /// Removes the options of parameters that do not exist.
+    /// Leaves out what was reported about parameters that are not known.
     pub fn retain(&mut self, known: &dyn Fn(&str) -> bool) {
         self.memories.memory_of.retain(|key, _| known(key));
         if let ForgettingRule::RandomWalk(drift) = &mut self.forgetting {

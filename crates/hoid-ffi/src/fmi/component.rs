@@ -46,7 +46,7 @@ impl Logger {
         match self {
             Self::Nobody => {}
             Self::Two { function, environment } => {
-                // SAFETY: texts end with a zero and stay valid during the call; the format takes one of them.
+                // SAFETY: texts end with a zero and stay during the call; the format takes one of them.
                 unsafe {
                     function(
                         environment,
@@ -59,7 +59,7 @@ impl Logger {
                 }
             }
             Self::Three { function, environment } => {
-                // SAFETY: texts end with a zero and stay valid during the call.
+                // SAFETY: texts end with a zero and stay during the call.
                 unsafe { function(environment, status, CATEGORY.as_ptr(), message.as_ptr()) };
             }
         }
@@ -104,7 +104,7 @@ pub(super) unsafe fn free(component: *mut Component) {
     if component.is_null() {
         return;
     }
-    // SAFETY: it came from `made`, and by the contract is passed only once.
+    // SAFETY: it came from `made`, by the contract for the only time.
     drop(unsafe { Box::from_raw(component) });
 }
 
@@ -116,7 +116,7 @@ pub(super) unsafe fn with(component: *mut Component, call: impl FnOnce(&mut Inst
     if component.is_null() || !component.is_aligned() {
         return ERROR;
     }
-    // SAFETY: not null, aligned; by the contract it is exclusively ours.
+    // SAFETY: not null, aligned; by the contract it is ours alone.
     let component = unsafe { &mut *component };
     if component.is_broken {
         return FATAL;
@@ -146,7 +146,7 @@ pub(super) unsafe fn list<'a, T>(pointer: *const T, count: usize) -> Done<&'a [T
     if pointer.is_null() || !pointer.is_aligned() {
         return Err("a list is null or not aligned".to_owned());
     }
-    // SAFETY: not null, aligned; the contract requires this number of elements.
+    // SAFETY: not null, aligned; that there are this many is the contract.
     Ok(unsafe { slice::from_raw_parts(pointer, count) })
 }
 
@@ -161,7 +161,7 @@ pub(super) unsafe fn list_mut<'a, T>(pointer: *mut T, count: usize) -> Done<&'a 
     if pointer.is_null() || !pointer.is_aligned() {
         return Err("a list is null or not aligned".to_owned());
     }
-    // SAFETY: not null, aligned; the contract requires this much space.
+    // SAFETY: not null, aligned; that there is so much room is the contract.
     Ok(unsafe { slice::from_raw_parts_mut(pointer, count) })
 }
 
@@ -184,7 +184,7 @@ pub(super) fn folder(uri: &str) -> Option<PathBuf> {
         return Some(PathBuf::from(uri));
     };
     let path = match rest.strip_prefix("//") {
-        // After the host, which is empty or localhost.
+        // After the host, which is empty or this one.
         Some(rest) => rest.find('/').map_or("", |slash| &rest[slash..]),
         None => rest,
     };

@@ -1,8 +1,8 @@
 //! The functions of FMI 2.0 for co-simulation (Modelica Association, *Functional Mock-up Interface for
 //! Model Exchange and Co-Simulation* 2.0.4, 2022, chapters 2 and 4).
 //!
-//! Names, types and order are those of `fmi2Functions.h`; a component is one that `fmi2Instantiate` has created and
-//! `fmi2FreeInstance` has not freed, and a list has as many elements as the call states.
+//! Names, types and order are those of `fmi2Functions.h`; a component is one that `fmi2Instantiate` has made and
+//! `fmi2FreeInstance` has not freed, and a list has as many elements as the call reports.
 #![allow(missing_docs, non_snake_case, clippy::missing_safety_doc)]
 
 use std::ffi::{c_char, c_int, c_uint, c_void};
@@ -48,7 +48,7 @@ pub unsafe extern "C" fn fmi2Instantiate(
     _visible: c_int,
     _logging: c_int,
 ) -> *mut Component {
-    // SAFETY: null or that of the importer, which stays valid for the life of the component.
+    // SAFETY: null or that of the importer, which stays for the life of the component.
     let callbacks = unsafe { callbacks.as_ref() };
     let logger = match callbacks.and_then(|c| Some((c.logger?, c.environment))) {
         Some((function, environment)) => Logger::Two { function, environment },

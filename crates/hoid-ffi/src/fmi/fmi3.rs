@@ -2,7 +2,7 @@
 //! Specification* 3.0.1, 2023, chapters 2 and 4).
 //!
 //! Names, types and order are those of `fmi3FunctionTypes.h`; an instance is one that `fmi3InstantiateCoSimulation` has
-//! created and `fmi3FreeInstance` has not freed, and a list has as many elements as the call states.
+//! made and `fmi3FreeInstance` has not freed, and a list has as many elements as the call reports.
 #![allow(missing_docs, non_snake_case, clippy::missing_safety_doc)]
 
 use std::{
@@ -121,12 +121,12 @@ pub unsafe extern "C" fn fmi3DoStep(
         instance.step(t, step)?;
         for flag in [event, terminate, early] {
             if !flag.is_null() {
-                // SAFETY: not null, and by the contract of the interface with space for a flag.
+                // SAFETY: not null, and by the contract of the interface with room for a flag.
                 unsafe { flag.write(false) };
             }
         }
         if !last.is_null() {
-            // SAFETY: not null, and by the contract of the interface with space for a number.
+            // SAFETY: not null, and by the contract of the interface with room for a number.
             unsafe { last.write_unaligned(t + step) };
         }
         Ok(())

@@ -2,7 +2,7 @@
 //!
 //! Samples are taken at `t_0 + k Ts`, t_0 the start of the experiment. A step may be as long as the
 //! sample time, or shorter: then the inputs of the first step within a sample are those of the
-//! sample. A longer step would lose a sample, and is refused.
+//! sample. In a longer one a sample would be lost, and it is refused.
 
 use std::{ffi::CString, fs, path::Path};
 
@@ -13,7 +13,7 @@ use super::{
     values::{Done, VariableValues},
 };
 
-/// Largest deviation of a time, relative to the sample time.
+/// Share of the sample time by which a time may be off.
 const OFF: f64 = 1e-6;
 
 /// Where an instance is.
@@ -268,7 +268,7 @@ mod tests {
         }
     }
 
-    /// Steps of a tenth of the sample time give the same estimate as steps of the sample time.
+    /// A step of a tenth of the sample time gives the estimate of steps of the sample time.
     #[test]
     #[cfg_attr(miri, ignore = "safe code, and a simulated run takes minutes there")]
     fn shorter_steps_take_the_same_samples() {
@@ -280,7 +280,7 @@ mod tests {
             instance.start().unwrap();
             for k in 0..1000 {
                 for part in 0..parts {
-                    // The inputs change within a sample.
+                    // Within a sample the inputs move on.
                     let moved = f64::from(part);
                     set(&mut instance, "e", FmuStart::Real(record.input()[k] + moved));
                     set(&mut instance, "u", FmuStart::Real(record.output()[k] + moved));
@@ -360,7 +360,7 @@ mod tests {
         set(&mut instance, "method", FmuStart::Text("kalman".to_owned()));
         assert!(why(instance.start()).contains("adaptive"));
         instance.reset();
-        // The fastest method; the choice is irrelevant.
+        // The cheapest there is: its method does not matter.
         set(&mut instance, "method", FmuStart::Text("rpem".to_owned()));
         set(&mut instance, "options", FmuStart::Text("{\"nk\": 9}".to_owned()));
         instance.start().unwrap();

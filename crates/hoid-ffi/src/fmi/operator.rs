@@ -1,4 +1,4 @@
-//! The operator of a scenario, of the thesis or of the family, in a unit.
+//! The operator of a scenario, of the thesis or of the family, as a unit has it.
 
 use hoid_io::{AnyScenario, fmu::FmuSettings, parse_any_scenario};
 use hoid_sim::{FamilyOperatorRun, FamilySimulator, OperatorRun, RunSeed, Simulator};

@@ -1,4 +1,4 @@
-//! The state of an instance, for restoring it or continuing elsewhere with the same digits (FMI 2.0.4, section 2.1.8;
+//! The state of an instance, to go back to it or to continue elsewhere with the same digits (FMI 2.0.4, section 2.1.8;
 //! FMI 3.0.1, section 2.2.10).
 //!
 //! A state in the hands of an importer is what it is serialised to (`packed`). The description is the token of the
@@ -26,7 +26,7 @@ const MAGIC: [u8; 8] = *b"hoidfmu\x01";
 pub struct State(Vec<u8>);
 
 impl Instance {
-    /// Returns the state as bytes, without changing it.
+    /// The state as bytes. It does not change.
     fn saved(&mut self) -> Vec<u8> {
         let phase = match self.phase {
             Phase::Setup => "setup",
@@ -48,7 +48,7 @@ impl Instance {
         packed(MAGIC, &description, &bytes)
     }
 
-    /// Restores a state of this unit; an invalid one leaves everything unchanged.
+    /// Goes to a state of this unit; one that cannot be leaves all as it is.
     fn restore(&mut self, bytes: &[u8]) -> Done {
         let wrong = || "the state is none of this unit, or was changed or cut since it was taken".to_owned();
         let (description, bytes) = opened(MAGIC, bytes).map_err(|_| wrong())?;
@@ -135,7 +135,7 @@ unsafe fn hand_over(bytes: Vec<u8>, place: *mut *mut State) -> Done {
         *place = Box::into_raw(Box::new(State(bytes)));
         return Ok(());
     }
-    // SAFETY: not null: by the contract a state created here.
+    // SAFETY: not null: by the contract a state that was made here.
     let there = unsafe { list_mut(*place, 1) }?;
     there.iter_mut().for_each(|state| state.0.clone_from(&bytes));
     Ok(())
@@ -223,7 +223,7 @@ macro_rules! states {
                         bytes.len()
                     ));
                 }
-                // SAFETY: by the contract of the interface there is this much space, and no more is used.
+                // SAFETY: by the contract of the interface there is this room, and no more is used.
                 let room = unsafe { list_mut(room, bytes.len()) }?;
                 room.copy_from_slice(bytes);
                 Ok(())

@@ -1,11 +1,11 @@
 //! The declaration of options.
 
-/// Declares a struct of options, with documentation, unit, bounds and default of each field. It implements `Default`
-/// and [`Settings`](crate::settings::Settings). Options that several methods share are a struct of their own, listed
-/// under `groups`.
+/// Declares a struct of options: of each field documentation, unit, bounds and default. It
+/// implements `Default` and [`Settings`](crate::settings::Settings). Options that several methods
+/// share are a struct of their own, named under `groups`.
 ///
-/// `#[setting(..)]` contains methods of [`Setting`](crate::settings::Setting): `unit`, `bounds`, `default` (as text),
-/// `name` (if it differs from that of the field).
+/// In `#[setting(..)]` stand methods of [`Setting`](crate::settings::Setting): `unit`, `bounds`,
+/// `default` (as text), `name` (where it is not that of the field).
 #[macro_export]
 macro_rules! settings {
     (

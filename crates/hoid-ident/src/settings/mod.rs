@@ -1,8 +1,9 @@
 //! Options that describe themselves.
 //!
-//! An estimator or a recursive method declares its options once, by [`settings!`](crate::settings!): name, type, unit,
-//! default, bounds and a line of help. The command line, plans of studies, Python and the pages of the book read that
-//! declaration and have no list of their own.
+//! An estimator or a recursive method declares its options once, by
+//! [`settings!`](crate::settings!): name, type, unit, default, bounds and a line of help. The
+//! command line, plans of studies, Python and the pages of the book read that declaration and have
+//! no list of their own.
 //!
 //! ```
 //! use hoid_ident::{settings, settings::{Bounds, Settings}};
@@ -26,8 +27,9 @@
 //! # Ok::<(), hoid_ident::IdentError>(())
 //! ```
 //!
-//! A value is written as on the command line: `256`, `true`, `0.2..0.4`, `b0=256,f=inf`. Values of plans or Python in
-//! their own types are first converted to this form, so that each type has a single parser ([`Value`]).
+//! A value is written as on the command line: `256`, `true`, `0.2..0.4`, `b0=256,f=inf`. What a
+//! plan or Python has in its own types is brought into that form first, so that there is one reader
+//! of each type ([`Value`]).
 
 mod batch_option;
 mod declare;
@@ -46,15 +48,16 @@ use crate::IdentError;
 
 /// Options with names.
 pub trait Settings {
-    /// Returns the settings, in the order of the declaration, with the defaults.
+    /// Available settings, in the order of the declaration, with the defaults.
     fn list(&self) -> Vec<Setting>;
 
-    /// Sets an option from its text; returns false if the name is unknown.
+    /// Sets an option from its text; false when the name is not among them.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a text that is not a value of the option, or out of its bounds.
+    /// [`IdentError::BadOption`] for a text that is not a value of the option, or out of its
+    /// bounds.
     fn set(&mut self, name: &str, text: &str) -> Result<bool, IdentError>;
 
-    /// Returns the value of an option as text; `None` if it has none, or the name is unknown.
+    /// The value of an option as text; `None` if it has none, or the name is not among them.
     fn get(&self, name: &str) -> Option<String>;
 }

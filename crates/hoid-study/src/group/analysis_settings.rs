@@ -47,10 +47,10 @@ pub struct AnalysisSettings {
     pub response_at_rad_s: Vec<f64>,
 }
 
-/// Structures that can be fitted to a group.
+/// The structures that a group may fit.
 const POLYNOMIALS: [Structure; 2] = [Structure::Arx, Structure::BoxJenkins];
 
-/// Selection of the form by held-out runs.
+/// The form that held-out runs choose.
 const AUTO: &str = "auto";
 
 /// The names of the forms, for the schema.
@@ -85,19 +85,19 @@ impl Default for AnalysisSettings {
 }
 
 impl AnalysisSettings {
-    /// The recursions with their default options.
+    /// The recursions with their defaults.
     ///
     /// # Errors
-    /// An unknown name of a method.
+    /// A name that no method has.
     pub(super) fn recursions(&self) -> Result<Vec<Method>, String> {
         let of = |name: &String| hoid_survey::method(name).map_err(|error| format!("analysis.methods: {error}"));
         self.methods.iter().map(of).collect()
     }
 
-    /// The polynomial models to fit, in their default order.
+    /// The polynomial models that are fitted, in their default order.
     ///
     /// # Errors
-    /// An unknown or unsupported structure.
+    /// A name of another structure, or of none.
     pub(super) fn polynomials(&self) -> Result<Vec<Structure>, String> {
         let names = POLYNOMIALS.map(Structure::name);
         if let Some(name) = self.polynomials.iter().find(|name| !names.contains(&name.as_str())) {
@@ -110,8 +110,7 @@ impl AnalysisSettings {
         Ok(POLYNOMIALS.into_iter().filter(asked).collect())
     }
 
-    /// The structures whose orders are needed: those of the polynomial models, and of the recursions that start from
-    /// one.
+    /// The structures whose orders are needed: of the polynomial models, and of the recursions that start from one.
     ///
     /// # Errors
     /// As [`Self::polynomials`] and [`Self::recursions`].
@@ -125,10 +124,10 @@ impl AnalysisSettings {
         Ok(POLYNOMIALS.into_iter().filter(needed).collect())
     }
 
-    /// Estimator of the family, with the form given or selected from the data.
+    /// How the family is fitted, the form left to the data or given.
     ///
     /// # Errors
-    /// An unknown form, prior or parameter.
+    /// A form, a prior or a parameter that there is not.
     pub(super) fn family(&self) -> Result<FamilyEstimator, String> {
         let mut estimator = FamilyEstimator::default();
         if self.form != AUTO {
@@ -146,7 +145,7 @@ impl AnalysisSettings {
         Ok(estimator)
     }
 
-    /// The reason why the settings are invalid.
+    /// Why the settings have no meaning.
     pub(super) fn check(&self) -> Result<(), String> {
         self.structures()?;
         self.family()?;

@@ -109,12 +109,13 @@ impl Manifest {
     /// Reads and checks a manifest.
     ///
     /// # Errors
-    /// [`StudyError::Plan`] with the file, the line if known, and the remedy; [`StudyError::Io`].
+    /// [`StudyError::Plan`] with the file, the line where there is one, and the remedy;
+    /// [`StudyError::Io`].
     pub fn read(path: &Path) -> Result<Self, StudyError> {
         Self::parse(&hoid_io::read_settings(path)?, &path.display().to_string())
     }
 
-    /// Parses a manifest; `path` is for messages.
+    /// A manifest from its text; `path` is for messages.
     ///
     /// # Errors
     /// As [`Manifest::read`].
@@ -182,11 +183,11 @@ impl Manifest {
         self.analysis.check()
     }
 
-    /// Creates a manifest of the files in a directory that match a pattern, in the order of their
-    /// names; also returns the names of those that do not match.
+    /// A manifest of the files in a directory that match a pattern, in the order of their names;
+    /// and the names of those that do not.
     ///
     /// # Errors
-    /// [`StudyError::Io`] if the directory cannot be read, [`StudyError::NoRuns`] if no file
+    /// [`StudyError::Io`] when the directory cannot be read, [`StudyError::NoRuns`] when nothing
     /// matches.
     pub fn of_directory(directory: &Path, pattern: &Pattern) -> Result<(Self, Vec<String>), StudyError> {
         let mut names = hoid_io::file_names(directory)?;
@@ -237,16 +238,16 @@ impl Manifest {
         Ok((manifest, others))
     }
 
-    /// Returns the preparation of the runs of a condition.
+    /// Treatment of the runs of a condition.
     ///
     /// # Errors
-    /// The invalid key and the reason.
+    /// The key that has no meaning, and why.
     pub fn preparation(&self, condition: &str) -> Result<Preparation, String> {
         let of_condition = self.conditions.get(condition).and_then(|facts| facts.prepare.as_ref());
         self.prepare.preparation(of_condition)
     }
 
-    /// Returns the decimation of the runs of a condition due to a high rate.
+    /// Decimation of the runs of a condition because of a high rate.
     ///
     /// # Errors
     /// As [`Manifest::preparation`].
@@ -255,7 +256,7 @@ impl Manifest {
         self.prepare.by_rate(of_condition)
     }
 
-    /// Returns the manifest as TOML.
+    /// The manifest as TOML.
     pub fn text(&self) -> String {
         toml::to_string_pretty(self).unwrap_or_default()
     }

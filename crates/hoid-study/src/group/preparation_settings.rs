@@ -71,12 +71,12 @@ impl NumberOrText {
 }
 
 impl PreparationSettings {
-    /// True if it is empty.
+    /// Whether it carries no information.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
 
-    /// The two keys of the rate; they belong together: a condition that gives one of them overrides both.
+    /// Report about the rate: it is one thing with two keys, and a condition that names one of them names the rate.
     fn rate<'a>(&'a self, condition: Option<&'a Self>) -> (Option<&'a NumberOrText>, Option<f64>) {
         let of = condition.unwrap_or(self);
         let named = of.decimate.is_some() || of.rate_hz.is_some();
@@ -84,10 +84,10 @@ impl PreparationSettings {
         (of.decimate.as_ref(), of.rate_hz)
     }
 
-    /// Decimation of the runs of a condition due to a high rate: none if the rate is given.
+    /// Decimation of the runs of a condition because of a high rate: nothing if the rate is named.
     ///
     /// # Errors
-    /// The invalid key and the reason.
+    /// The key that has no meaning, and why.
     pub fn by_rate(&self, condition: Option<&Self>) -> Result<Decimation, String> {
         let (decimate, rate_hz) = self.rate(condition);
         Ok(match decimation(decimate)? {
@@ -96,10 +96,11 @@ impl PreparationSettings {
         })
     }
 
-    /// Preparation of the runs of a condition: its own settings, completed by those of the group.
+    /// Treatment of the runs of a condition: what the condition states, and what the group reports
+    /// about the rest.
     ///
     /// # Errors
-    /// The invalid key and the reason.
+    /// The key that has no meaning, and why.
     pub fn preparation(&self, condition: Option<&Self>) -> Result<Preparation, String> {
         let of = condition.unwrap_or(self);
         let (decimate, rate_hz) = self.rate(condition);
@@ -127,7 +128,7 @@ impl PreparationSettings {
     }
 }
 
-/// A factor, or a word for it; auto if nothing is given.
+/// A factor, or the words for it; auto where nothing is specified.
 fn decimation(typed: Option<&NumberOrText>) -> Result<Decimation, String> {
     let Some(typed) = typed else {
         return Ok(Decimation::Auto);
@@ -137,7 +138,7 @@ fn decimation(typed: Option<&NumberOrText>) -> Result<Decimation, String> {
         .map_err(|_| format!("decimate is {text}, expected \"auto\", \"off\", or by how many samples, 1 or more"))
 }
 
-/// Parses the settings of each channel; the second list takes precedence.
+/// Report about each channel; the second list wins.
 fn parsed<T>(
     group: &BTreeMap<String, NumberOrText>,
     condition: &BTreeMap<String, NumberOrText>,

@@ -53,7 +53,7 @@ pub enum FaultTreatment {
 }
 
 impl FaultTreatment {
-    /// The corresponding option of the reading of recordings.
+    /// The same for callers that repairs.
     pub(super) fn handling(self) -> FaultHandling {
         match self {
             Self::Bridge => FaultHandling::Bridge,

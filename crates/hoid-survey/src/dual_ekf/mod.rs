@@ -1,25 +1,26 @@
-//! Two alternating extended Kalman filters: one of the state for fixed parameters, one of the parameters for a fixed
-//! state (E. A. Wan and A. T. Nelson, *Dual extended Kalman filter methods*, chapter 5 of S. Haykin (ed.), *Kalman
-//! Filtering and Neural Networks*, 2001; of operators: A. Popovici, P. M. T. Zaal and D. M. Pool, *Dual extended
-//! Kalman filter for the identification of time-varying human manual control behavior*, AIAA 2017).
+//! Two extended Kalman filters that take turns: one of the state with the parameters held, one of
+//! the parameters with the state held (E. A. Wan and A. T. Nelson, *Dual extended Kalman filter
+//! methods*, chapter 5 of S. Haykin (ed.), *Kalman Filtering and Neural Networks*, 2001; of
+//! operators: A. Popovici, P. M. T. Zaal and D. M. Pool, *Dual extended Kalman filter for the
+//! identification of time-varying human manual control behavior*, AIAA 2017).
 //!
 //! State `x = [y_0, y_1, .., n]`: neuromuscular position and rate, and the remnant as AR(1),
 //!
 //! `x(k) = A(w) x(k-1) + B(w) e(k - nk) + w_x`, `u = C(w) x`, `C = [K_e, K_e_dot, 1]`,
 //!
-//! A and B held exactly. The parameters `w = [K_e, K_e_dot, omega_nm, zeta_nm]` are a random walk. At each sample the
-//! parameters are predicted (they stay constant, P_w grows), the state is predicted with them, and the innovation
-//! `eps = u - C x` corrects both: the parameters along `h = d(C x)/dw`, the total derivative, which includes the
-//! dependence of the state,
+//! A and B held exactly. Parameters `w = [K_e, K_e_dot, omega_nm, zeta_nm]` are a random walk. At
+//! each sample the parameters are predicted (they stay, P_w grows), the state is predicted with
+//! them, and the innovation `eps = u - C x` corrects both: the parameters along `h = d(C x)/dw`, the
+//! whole derivative, in which the state's own dependence goes along,
 //!
 //! `D(k|k-1) = A D(k-1|k-1) + (dA/dw) x + (dB/dw) e`, `h = C D(k|k-1) + (dC/dw) x`,
 //! `D(k|k) = D(k|k-1) - g h` with the gain g of the state filter (its own dependence on w left out).
 //!
-//! A joint filter ([`crate::joint_filter`]) keeps the covariance between state and parameters, which two alternating
-//! filters do not have. By default the delay is a whole number of samples, as for all other methods. With `pade` of 1
-//! to 3 it is a parameter too, with the approximation of that order, as in the source and in the discussion of the
-//! thesis for a delay that is not a multiple of the sample time or changes ([`super::pade`]); its states are between
-//! y_1 and n.
+//! A joint filter ([`crate::joint_filter`]) keeps the covariance between state and parameters, which
+//! two filters that take turns do not have. By default the delay is whole samples, as all other
+//! methods have it. With `pade` of 1 to 3 it is a parameter too, after the approximation of that
+//! order, as the source and the discussion of the thesis have it for a delay that is not a multiple
+//! of the sample time or changes ([`super::pade`]); its states are between y_1 and n.
 
 mod filters;
 mod pade;
@@ -48,9 +49,9 @@ use crate::known_noise::{check_first_order, lead_of};
 use filters::{Filters, LARGEST};
 
 const NAME: &str = "dual-ekf";
-/// Range of the delay that is tracked with a Padé approximation, s.
+/// Delays that are followed behind a Padé approximation, s.
 const DELAYS_S: (f64, f64) = (0.05, 0.6);
-/// Least standard error of every parameter at the start for an unknown delay, as a share of its value.
+/// Least error of every parameter at the start where the delay is open, share of its value.
 const UNKNOWN: f64 = 0.1;
 
 settings! {
@@ -91,7 +92,7 @@ impl RecursiveMethod for DualEkfOptions {
         }
     }
 
-    /// The memory follows from a random walk of the parameters.
+    /// It follows from a random walk of the parameters.
     fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Infinite
     }
@@ -160,12 +161,12 @@ struct DualEkf {
     bounds: [[f64; 2]; LARGEST],
     delay: DelayLine<Vec<f64>>,
     reported: Reported,
-    /// Additional noise of e, as a share of its size; the mean square of e so far, if the size is not given.
+    /// Additional noise of e, as a share of its size; the mean square of e so far, where it is not given.
     state_noise: f64,
     size_is_given: bool,
     power: f64,
     samples: f64,
-    /// Predicted innovation variance of the last sample.
+    /// Innovation variance as expected at the last sample.
     expected: f64,
     restarts: u64,
 }
@@ -193,7 +194,7 @@ impl DualEkf {
             errors.push(0.0);
             drifts.push(own.delay_drift);
         }
-        // The errors of the start fit are those for its delay: if the delay is unknown, they are larger.
+        // The errors of the start fit are those for its delay: where that is open, so are they.
         let least = if own.pade > 0 { UNKNOWN } else { 0.0 };
         let power = own.error_size.map_or(0.0, |size| size * size);
         let (n, p) = (3 + own.pade, values.len());
@@ -216,7 +217,7 @@ impl DualEkf {
             slope: DMatrix::zeros(n, p),
         };
         let [k_e, k_e_dot, omega, zeta] = physical_bounds::<OPERATOR>(setup, sample_time)?;
-        // With a Padé approximation the delay is in the filters, except for the hold.
+        // After a Padé approximation the delay is the filters' own, except for the hold.
         let late = if own.pade == 0 { setup.orders.nk } else { 1 };
         Ok(Self {
             first: filters.clone(),
@@ -287,7 +288,7 @@ impl State for DualEkf {
             &mut self.restarts,
         ];
         visit_all(parts, each);
-        // Saved numbers that were changed must not leave the bounds.
+        // For numbers that were changed none may leave its bounds.
         self.filters.bound(&self.bounds);
     }
 }
@@ -381,7 +382,7 @@ mod tests {
         assert!((mean[0] - 1.0).abs() < 0.12 && (mean[1] - 1.0).abs() < 0.1, "{mean:?}");
     }
 
-    /// A filter with the delay as a parameter finds a delay that is wrong by two samples.
+    /// A delay that is wrong by two samples is found by the filter that has it as a parameter.
     #[test]
     fn a_delay_behind_pade_is_followed() {
         let record = run(Condition::C1, 0.01, 0).span(0.0, 30.72).unwrap();
@@ -392,7 +393,7 @@ mod tests {
         let trace = track(&record, &options(own.clone(), (0.0, 10.24), 27), 100).unwrap();
         let delay = |row: usize| trace.operator(row).unwrap().tau_e_s.value;
         assert!((delay(4) - 0.26).abs() < 1e-9, "it stays until the start span ends");
-        // The estimate ends within a sample of the truth.
+        // The filter leaves it within a sample of the truth.
         assert!((delay(29) - 0.28).abs() < 0.01, "{}", delay(29));
         let many = DualEkfOptions { pade: 4, ..own };
         let refused = track(&record, &options(many, (0.0, 10.24), 27), 100).unwrap_err();

@@ -1,4 +1,5 @@
-//! Joint estimation of state and parameters, as in the literature on time-varying human control: for comparison.
+//! Joint estimation of state and parameters, as the literature on time-varying human control has
+//! it: for comparison.
 //!
 //! The state of the neuromuscular system, p (its response to the delayed error) and v (the rate of
 //! p), is estimated together with the parameters, which drift:
@@ -10,16 +11,18 @@
 //!
 //! `p <- e - (1 - A) m + (R/omega^2) v`, `v <- R m + (1 - A - 2 zeta R/omega) v`;
 //!
-//! the parameters are a random walk, and the remnant is assumed to be white noise in u and in the input of v. Neither
-//! is true of a coloured remnant in a closed loop, but the published estimators assume it. [`ekf`] linearises (A.
-//! Popovici, P. M. T. Zaal, D. M. Pool, *Dual extended Kalman filter for the identification of time-varying human
-//! manual control behavior*, AIAA 2017-3666, there with two alternating filters), [`ukf`] propagates sigma points (J.
-//! Rojer, D. M. Pool, M. M. van Paassen, M. Mulder, *UKF-based identification of time-varying manual control
+//! the parameters make a random walk, the remnant is taken to be white noise in u and in the drive
+//! of v. Neither is true of a coloured remnant in a closed loop; it is what the published
+//! estimators suppose. [`ekf`] linearises (A. Popovici, P. M. T. Zaal, D. M. Pool, *Dual extended
+//! Kalman filter for the identification of time-varying human manual control behavior*, AIAA
+//! 2017-3666, there with two filters that take turns), [`ukf`] sends points through (J. Rojer, D.
+//! M. Pool, M. M. van Paassen, M. Mulder, *UKF-based identification of time-varying manual control
 //! behaviour*, IFAC-PapersOnLine 52-19 (2019)).
 //!
-//! The noise of both is proportional to the variance of the remnant of the start fit, `sigma^2` times the power of the
-//! impulse response of 1/D, and the drift to the start values; the factors were set on conditions C3 and C5 with
-//! remnants of order 2 and 3, as for the method multiple-model.
+//! The noise of both is in proportion to the variance of the remnant of the start fit, `sigma^2`
+//! times the power of the impulse response of 1/D, and the drift in proportion to the start values;
+//! the factors were set on conditions C3 and C5 with remnants of order 2 and 3, as those of the
+//! method multiple-model were.
 
 mod belief;
 mod ekf;
@@ -40,7 +43,7 @@ use crate::known_noise::check_model_of_change;
 
 use filter::JointFilter;
 
-/// Description and step differ between the filters, the rest is common.
+/// The words and the step of each filter are its own, the rest is the same.
 macro_rules! joint_filter {
     ($options:ident, $name:literal, $help:literal, $source:literal, $step:path) => {
         impl RecursiveMethod for $options {
@@ -54,7 +57,7 @@ macro_rules! joint_filter {
                 }
             }
 
-            /// The memory follows from a random walk of the parameters.
+            /// It follows from a random walk of the parameters.
             fn default_memory(&self, _parameter: &str) -> Memory {
                 Memory::Infinite
             }

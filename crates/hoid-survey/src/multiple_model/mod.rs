@@ -1,7 +1,7 @@
-//! The bank of hypotheses of the real-time kernel ([`crate::kernel::multiple_model`]) as a method: its prior of a
-//! person, in seconds.
+//! The bank of hypotheses of the real-time kernel ([`crate::kernel::multiple_model`]) after the face of a recursion:
+//! what it supposes of a person, in seconds.
 //!
-//! If the delay is tracked, other delays are proposed every 1.28 s.
+//! Where the delay is tracked, other delays are proposed every 1.28 s.
 //!
 //! The numbers were set on conditions C3 and C5 with remnants of order 2 and 3; the errors change
 //! by a tenth or less when any of them is halved or doubled.
@@ -38,12 +38,12 @@ use crate::{
 };
 use prior::{bad, change_prior, delays, first_hypothesis, outside};
 
-/// Capacity for hypotheses with a known delay, and with a tracked one.
+/// Room for hypotheses where the delay is known, and where it is not.
 const HYPOTHESES: usize = 16;
 const WITH_DELAYS: usize = 48;
-/// Limit of an innovation in the update, in standard deviations.
+/// Standard deviations beyond which an innovation moves the estimate no further.
 const LIMIT: f64 = 3.5;
-/// Default order of the noise model: the odds need white innovations.
+/// Order of the noise model when none is named: the odds need innovations that are white.
 const DEFAULT_ND: usize = 6;
 
 settings! {
@@ -83,7 +83,7 @@ impl RecursiveMethod for MultipleModelOptions {
         Some(DEFAULT_ND)
     }
 
-    /// The memory follows from a model of the change.
+    /// It follows from a model of the change.
     fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Infinite
     }
@@ -166,7 +166,7 @@ impl RecursiveMethod for MultipleModelOptions {
     }
 }
 
-/// The bank with its filters and its delay line, which has the length of the shortest delay.
+/// The bank with its filters and its delay line, which is as long as the shortest delay.
 struct MultipleModelRecursion<const M: usize> {
     model: Box<MultipleModelFilter<M, LARGEST_ND, Vec<Signals>>>,
     delay: DelayLine<Vec<f64>>,
@@ -205,8 +205,8 @@ impl<const M: usize> MultipleModelRecursion<M> {
         })
     }
 
-    /// Returns tau_e in s from mean and variance of the delay in samples beyond the shortest; without variance if it
-    /// is known.
+    /// tau_e in s from a mean and a variance of the delay in samples beyond the shortest; no
+    /// variance where it is known.
     fn delay_s(&self, [later, variance]: [f64; 2]) -> Estimate {
         let ts = self.sample_time.s();
         let tau_e_s = (self.shortest as f64 - 1.0 + later) * ts;
@@ -217,7 +217,7 @@ impl<const M: usize> MultipleModelRecursion<M> {
     }
 }
 
-/// Converts a change of the kernel to seconds, with the delay tau_e before and after.
+/// A change of the kernel in seconds, with the delay tau_e before and after.
 fn declared(change: &kernel_change::Change, tau_e_s: [Estimate; 2], sample_time: SampleTime) -> Change {
     let (before, now) = (&change.before, &change.after);
     let pair = |i: usize| {

@@ -1,5 +1,5 @@
-//! The recursive prediction-error method in physical parameters: its gradient is that of the polynomials times the
-//! Jacobian of theta.
+//! The recursive prediction-error method in the operator's parameters: its gradient is that of the
+//! polynomials times the Jacobian of theta.
 
 mod recursion;
 
@@ -47,7 +47,7 @@ impl RecursiveMethod for PhysicalOptions {
         }
     }
 
-    /// Infinite, since a person hardly changes the other parameters within a run.
+    /// A person hardly changes the others within a run.
     fn default_memory(&self, parameter: &str) -> Memory {
         match parameter {
             "K_e" => Memory::Seconds(5.0),

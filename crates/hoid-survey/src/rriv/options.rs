@@ -1,4 +1,4 @@
-//! Options of the method, and its construction.
+//! Report of the method may be, and how it is built.
 
 use hoid_ident::{IdentError, iv::FORCING_CHANNEL, settings};
 use hoid_model::{Record, SampleTime, Structure};

@@ -1,16 +1,16 @@
-//! Fourier coefficients at the lines of the forcing function, in a moving window (M. M. van Paassen
-//! and M. Mulder, *Identification of human operator control behaviour in multiple-loop tracking
-//! tasks*, IFAC Man-Machine Systems, 1998).
+//! Fourier coefficients at the lines of the forcing function, in a window that moves (M. M. van
+//! Paassen and M. Mulder, *Identification of human operator control behaviour in multiple-loop
+//! tracking tasks*, IFAC Man-Machine Systems, 1998).
 //!
-//! The forcing function is a sum of sines, and so are e and u, except for the remnant. In a window
+//! The forcing function is a sum of sines, and so are e and u except for the remnant. In a window
 //! of length T around t,
 //!
 //! `x(k) = sum_i (a_i cos omega_i t_k + b_i sin omega_i t_k) + r(k)`
 //!
 //! for x = e and x = u, all lines at once by least squares: over a whole period of the forcing
-//! function these are its Fourier coefficients; over a shorter window the lines are separated as
+//! function these are its Fourier coefficients, over less than one the lines are distinguished as
 //! far as their distances allow. `H(j omega_i) = U(j omega_i)/E(j omega_i)`, `X = a_i - j b_i`. The
-//! window extends T/2 beyond t; at the ends of the record it is the first or last T.
+//! window reaches T/2 into anything after t; at the ends of the record it is the first or last T.
 
 use hoid_ident::{settings, settings::Bounds};
 use num_complex::Complex64;
@@ -22,7 +22,7 @@ use super::{
 use crate::ThesisError;
 
 const NAME: &str = "fourier";
-/// Regularises lines that a short window does not resolve: share of their power.
+/// Keeps lines apart that a short window does not distinguish: share of their power.
 const RIDGE: f64 = 1e-4;
 
 settings! {
@@ -105,12 +105,12 @@ mod tests {
             ..task_of(&record, &[255], &omega)
         };
         let found = FourierCoefficients { window: 5.12 }.follow(&task).unwrap();
-        // The ridge attenuates e and u equally.
+        // The ridge takes the same share of e and u.
         let expected = [Complex64::new(2.0, 0.0), Complex64::from_polar(1.0, -omega[1] * 0.2)];
         for (found, expected) in found.response[0].iter().zip(expected) {
             assert!((found - expected).norm() < 1e-9, "{found} {expected}");
         }
-        // Frequencies other than the lines have no coefficient.
+        // What is not a line has no coefficient.
         let other = Task {
             omega_rad_s: &[1.0],
             ..task
@@ -127,7 +127,7 @@ mod tests {
         let run = Run::of(hoid_model::scenario::Condition::C1, 1, 0.0);
         let whole = FourierCoefficients { window: 1e4 }.follow(&run.task()).unwrap();
         let truth = run.responses();
-        // 81.92 s are a period: without remnant each line is exact, except for the ridge.
+        // 81.92 s are a period: without remnant each line is exact except for the ridge.
         for (found, expected) in whole.response[0].iter().zip(&truth[0]) {
             assert!((found / expected - 1.0).norm() < 1e-3, "{found} {expected}");
         }

@@ -1,22 +1,22 @@
-//! Maximum likelihood estimation of an operator whose gains follow a sigmoid, with a genetic search
-//! (P. M. T. Zaal, D. M. Pool, Q. P. Chu, M. M. van Paassen, M. Mulder and J. A. Mulder, *Modeling
-//! human multimodal perception and control using genetic maximum likelihood estimation*, J.
-//! Guidance, Control, and Dynamics 32 (2009) 1089-1099; with a sigmoid: P. M. T. Zaal and B. T.
-//! Sweet, AIAA 2011-6474).
+//! Maximum likelihood of an operator whose gains follow a sigmoid, from a genetic search (P. M. T.
+//! Zaal, D. M. Pool, Q. P. Chu, M. M. van Paassen, M. Mulder and J. A. Mulder, *Modeling human
+//! multimodal perception and control using genetic maximum likelihood estimation*, J. Guidance,
+//! Control, and Dynamics 32 (2009) 1089-1099; with a sigmoid: P. M. T. Zaal and B. T. Sweet, AIAA
+//! 2011-6474).
 //!
 //! The likelihood has many maxima over t_M, G and the delay. The genetic search needs no start: a
-//! population of parameter vectors is drawn from wide ranges; each generation keeps the best, and
-//! produces the others from two parents each, the better of three drawn ones (a *tournament*),
-//! every gene from a range that extends half of the parents' distance beyond both (*blend
-//! crossover*, L. J. Eshelman and J. D. Schaffer 1993), sometimes perturbed by a normal deviate. It
-//! minimises the one-step prediction error,
+//! population of parameter vectors drawn from wide ranges, of which each generation keeps the best,
+//! and makes the others from two parents each, the better of three drawn ones (a *tournament*),
+//! every gene from a range that reaches half of the parents' distance beyond both (*blend
+//! crossover*, L. J. Eshelman and J. D. Schaffer 1993), at intervals moved by a normal deviate. What
+//! it minimises is the one-step prediction error,
 //!
 //! `eps(k) = v(k) + d1 v(k-1)`, `v = u - K_e(t) y_0 - K_e_dot(t) y_1`, `K_e_dot = K_e T_L`,
 //!
 //! with the unit responses y_0, y_1 of [`super::unit_responses`] and K_e, T_L along the sigmoid
 //! `1/(1 + e^(-G (t - t_M)))`; d1 is the least-squares value for each v. The best of the last
 //! generation is the start of [`SigmoidChange`], which continues by Gauss-Newton steps to the
-//! maximum of the likelihood, as in the source.
+//! maximum of the likelihood, as the source does.
 
 use std::f64::consts::TAU;
 
@@ -46,13 +46,13 @@ const RANGES: [(f64, f64); 9] = [
 ];
 /// Genes.
 const N: usize = RANGES.len();
-/// Index of t_M.
+/// Place of t_M.
 const MIDPOINT: usize = 4;
-/// Number of members that are kept unchanged.
+/// Members that continue as they are.
 const ELITE: usize = 2;
-/// Number of members drawn for each parent.
+/// Members that are drawn for each parent.
 const DRAWN: usize = 3;
-/// Range of a gene beyond its parents, as a fraction of their distance.
+/// How far beyond its parents a gene may lie, share of their distance.
 const BLEND: f64 = 0.5;
 
 settings! {
@@ -80,11 +80,11 @@ struct Member {
 }
 
 impl GeneticSigmoid {
-    /// Returns the member of the last generation with the lowest cost.
+    /// The cheapest member of the last generation.
     fn search(&self, cost: &dyn Fn(&[f64; N]) -> f64) -> Member {
         let member = |genes: [f64; N]| {
             let found = cost(&genes);
-            // A member without a cost is never chosen.
+            // What has no cost is never chosen.
             let cost = if found.is_finite() { found } else { f64::INFINITY };
             Member { genes, cost }
         };
@@ -105,11 +105,11 @@ impl GeneticSigmoid {
             all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
             let mut numbers = drawn(generation, self.population * (2 * DRAWN + 4 * N));
             let mut next = || numbers.next().unwrap_or_default();
-            // The population shrinks around the optimum, and so do the mutations.
+            // The population shrinks around the optimum, and so do the moves.
             let size = 0.3 * (1.0 - generation as f64 / (self.generations + 1) as f64);
             let mut children = all[..ELITE.min(all.len())].to_vec();
             while children.len() < all.len() {
-                // Sorted: the first member is the best.
+                // Sorted: the first place is the best.
                 let mut parent = || {
                     let places = (0..DRAWN).map(|_| (next() * all.len() as f64) as usize);
                     all[places.min().unwrap_or(0).min(all.len() - 1)]
@@ -134,7 +134,7 @@ impl GeneticSigmoid {
         all[0]
     }
 
-    /// The parameters of the genes: K_e and T_L at both ends, t_M, G, omega_nm, zeta_nm, tau_e.
+    /// The parameters of genes: K_e and T_L at both ends, t_M, G, omega_nm, zeta_nm, tau_e.
     fn parameters(genes: &[f64; N], span_s: (f64, f64)) -> [f64; N] {
         let length = span_s.1 - span_s.0;
         std::array::from_fn(|i| {
@@ -171,7 +171,7 @@ impl GeneticSigmoid {
         (loss, d1.clamp(-0.999, 0.999))
     }
 
-    /// The start found by the genetic search, in the order of [`SigmoidChange::names`].
+    /// The start that the genetic search finds, in the order of [`SigmoidChange::names`].
     fn start(&self, task: &Task<'_>, e: &[f64], u: &[f64]) -> Vec<f64> {
         let span_s = (task.record.time_s(0), task.record.time_s(e.len() - 1));
         let cost = |genes: &[f64; N]| Self::criterion(task, e, u, &Self::parameters(genes, span_s)).0;
@@ -256,7 +256,7 @@ mod tests {
         assert!(best.genes[0] >= 0.9);
     }
 
-    /// At the true parameters the criterion is the variance of the innovations: AR(1) with d1 = -e^(-Ts/Tn).
+    /// The criterion at the truth is the variance of the innovations: AR(1) with d1 = -e^(-Ts/Tn).
     #[test]
     fn the_criterion_at_the_truth_is_the_remnant() {
         let run = Run::of(Condition::C4, 1, 0.1);
@@ -264,7 +264,7 @@ mod tests {
         let truth = [0.09, 0.07, 0.4, 1.2, 40.96, 100.0, 11.25, 0.35, 0.28];
         let (loss, d1) = GeneticSigmoid::criterion(&task, run.record.input(), run.record.output(), &truth);
         // Standard error of d1 0.006; of a mean of squares 1.6 %, around the 1.37e-4 and 4.6e-4 of
-        // the two states; the transient at the start is that of the run.
+        // the two states; the transient at the start is the run's own.
         assert!((d1 + 0.8465).abs() < 0.03, "{d1}");
         assert!((1.3e-4..4.6e-4).contains(&loss), "{loss}");
         let mut other = truth;
@@ -272,7 +272,7 @@ mod tests {
         assert!(GeneticSigmoid::criterion(&task, run.record.input(), run.record.output(), &other).0 > loss);
     }
 
-    /// From the genetic start the search ends in the same minimum as from the starts of the estimator.
+    /// From the genetic start the search ends where it ends from the own starts of the estimator.
     #[test]
     fn it_ends_in_the_minimum_that_other_starts_find() {
         let run = Run::of(Condition::C4, 1, 0.1);

@@ -1,27 +1,26 @@
-//! Predictor-based subspace identification of a model whose parameters vary linearly with a known
-//! signal (J.-W. van Wingerden and M. Verhaegen, *Subspace identification of bilinear and LPV
+//! Predictor-based subspace identification of a model whose parameters vary linearly with a signal
+//! that is known (J.-W. van Wingerden and M. Verhaegen, *Subspace identification of bilinear and LPV
 //! systems for open- and closed-loop data*, Automatica 45 (2009) 372-381; of operators: R. F. M.
 //! Duarte, D. M. Pool, M. M. van Paassen and M. Mulder, *Experimental scheduling functions for
 //! global LPV human controller modeling*, IFAC 2017).
 //!
 //! `x(k+1) = A x(k) + (B_0 + mu(k) B_1) v(k) + K eps(k)`, `u(k) = C x(k) + eps(k)`.
 //!
-//! At 100 Hz successive states differ by hundredths only, in which B is lost; so every d-th sample
-//! of u is used, and v(k) is the mean of the d values of e, nk - 1 samples before, that act until
-//! the next. The scheduling mu is the sigmoid of the controlled element, which the experimenter
-//! knows (the analytical scheduling of the source). Only the gains of an operator change, so that
-//! A, C and K do not depend on mu and the number of coefficients grows with the window p and not
-//! with 2^p. Steps:
+//! At 100 Hz a state reports the next one except for hundredths, and B is lost in them; so every
+//! d-th sample of u is taken, and v(k) is the mean of the d values of e, nk - 1 samples before, that
+//! act until the next. The scheduling mu is the sigmoid of the controlled element, which the
+//! experimenter knows (the analytical scheduling of the source). Only the gains of an operator
+//! change, so that A, C and K do not depend on mu and the number of coefficients grows with the
+//! window p and not with 2^p. Steps:
 //!
 //! 1. The predictor `u(k) = sum_{i=1..p} C Ã^(i-1) [B_0, B_1, K] z(k-i) + eps`, with
-//!    `z = [v, mu v, u]` and `Ã = A - K C`, by least squares; p is large enough that Ã^p is
-//!    negligible.
-//! 2. The same coefficients, shifted, times z are `Gamma x(k)`, the prediction of the next f
-//!    outputs from the past; its n principal directions over the record are a state.
+//!    `z = [v, mu v, u]` and `Ã = A - K C`, by least squares; p so long that Ã^p is nothing.
+//! 2. The same coefficients, shifted, times z are `Gamma x(k)`, what the past shows about the next f
+//!    outputs; its n main directions over the record are a state.
 //! 3. With that state, C by least squares, its residuals are eps, and A, B_0, B_1, K again by least
 //!    squares.
 //!
-//! The response at t is that of the model with mu(t) held. If nothing changes mu is omitted.
+//! The response at t is that of the model with mu(t) held. Where nothing changes mu is left out.
 
 use hoid_ident::{settings, settings::Bounds};
 use nalgebra::{DMatrix, DVector};
@@ -34,7 +33,7 @@ use super::{
 use crate::ThesisError;
 
 const NAME: &str = "lpv-subspace";
-/// Keeps the equations of the predictor positive definite if the input has few lines: share of their mean.
+/// Keeps the predictor's equations positive where the input is a few lines: share of their mean.
 const RIDGE: f64 = 1e-9;
 
 settings! {
@@ -59,7 +58,7 @@ settings! {
 #[derive(Debug, Clone)]
 struct Model {
     a: DMatrix<f64>,
-    /// B_0, and B_1 if there is one.
+    /// B_0, and B_1 where there is one.
     b: Vec<DVector<f64>>,
     c: DVector<f64>,
 }
@@ -115,7 +114,7 @@ impl LpvSubspace {
         self.of_states(z, &states)
     }
 
-    /// The principal directions of the prediction of the future from the past, scaled to unit power.
+    /// The main directions of the prediction of the future from the past, of unit power.
     fn states(&self, ahead: &DMatrix<f64>) -> Result<DMatrix<f64>, ThesisError> {
         let gram = (ahead * ahead.transpose()) / ahead.ncols() as f64;
         let eigen = gram.symmetric_eigen();
@@ -142,7 +141,7 @@ impl LpvSubspace {
         Ok(DMatrix::from_rows(&rows))
     }
 
-    /// A, B, C for a known state.
+    /// A, B, C of a known state.
     fn of_states(&self, z: &[Vec<f64>], states: &DMatrix<f64>) -> Result<Model, ThesisError> {
         let (n, width, p) = (self.order, z[0].len(), self.past);
         let mut output = NormalEquations::new(n, 1);
@@ -150,7 +149,7 @@ impl LpvSubspace {
             output.add(1.0, x.as_slice(), &[z[p + i][width - 1]]);
         }
         let c = output.solve(NAME, &output.ridge(0.0))?.column(0).into_owned();
-        // The state, the inputs, and the innovation instead of the output.
+        // The state, the inputs, and the innovation in the place of the output.
         let mut next = NormalEquations::new(n + width, n);
         for i in 0..states.ncols() - 1 {
             let x = states.column(i);
@@ -215,8 +214,8 @@ mod tests {
 
     use super::{super::tests::*, *};
 
-    /// A system of the model class, of order 2, white input, innovations of a tenth of the output:
-    /// the response before and after the change.
+    /// A system of its own kind, of order 2, white input, innovations of a tenth of the output: the
+    /// response before and after the change.
     #[test]
     fn a_system_of_its_kind_is_found() {
         let white = |cell| {

@@ -1,4 +1,4 @@
-//! A finite impulse response by recursive least squares, given as a frequency response over time
+//! A finite impulse response by recursive least squares, shown as a frequency response over time
 //! (M. Olivari, J. Venrooij, F. M. Nieuwenhuizen, L. Pollini and H. H. Bülthoff, *Identifying
 //! time-varying pilot responses: a regularized recursive least-squares algorithm*, AIAA SciTech
 //! 2016).
@@ -7,17 +7,17 @@
 //!
 //! `sum_k lambda^(t-k) (u(k) - g' phi(k))^2 + p var(u) g' K^-1 g`.
 //!
-//! The forcing function has ten lines, which excite twenty of nb directions: without the second term the others are
-//! determined by noise and rounding, and the covariance of the common form of the recursion grows as lambda^-t along
-//! them until it is no longer positive. K is the *tuned-correlated* kernel `K_ij = decay^max(i, j)` (T. Chen, H.
-//! Ohlsson and L. Ljung, *Automatica* 48 (2012) 1525-1535), the covariance of a decaying, smooth response; its inverse
-//! is that of independent increments,
+//! The forcing function has ten lines, which excite twenty directions of nb: without the second term the others are
+//! whatever noise and rounding make of them, and the covariance of the common form of the recursion grows as lambda^-t
+//! along them until it is not a covariance. K is the *tuned-correlated* kernel `K_ij = decay^max(i, j)` (T. Chen, H.
+//! Ohlsson and L. Ljung, *Automatica* 48 (2012) 1525-1535), the covariance of a response that decays and is smooth; its
+//! inverse is that of independent increments,
 //!
 //! `g' K^-1 g = sum_i (g_i - g_{i+1})^2/(decay^i - decay^(i+1)) + g_{nb-1}^2/decay^(nb-1)`.
 //!
-//! The recursion is in the information form, `R(t) = lambda R(t-1) + phi phi'` and the same for `phi u`: sums of
-//! squares that stay positive for any excitation. They are solved when an estimate is requested. The Fourier transform
-//! of g is the response, `H = sum g_i e^(-j omega i Ts)`. It has no poles, and so no operator parameters.
+//! The recursion is in the information form, `R(t) = lambda R(t-1) + phi phi'` and the same of `phi u`: sums of squares
+//! that stay positive whatever the excitation. They are solved where an estimate is requested. The Fourier transform of
+//! g is the response, `H = sum g_i e^(-j omega i Ts)`. It has no poles, and so no operator parameters.
 
 use hoid_ident::{settings, settings::Bounds};
 use nalgebra::DMatrix;
@@ -50,7 +50,7 @@ settings! {
 }
 
 impl RlsFir {
-    /// K^-1, which is tridiagonal.
+    /// K^-1: tridiagonal.
     fn inverse_kernel(&self) -> DMatrix<f64> {
         let mut inverse = DMatrix::zeros(self.nb, self.nb);
         let mut size = 1.0;
@@ -69,7 +69,7 @@ impl RlsFir {
         inverse
     }
 
-    /// The impulse responses after the requested samples.
+    /// The impulse responses after the samples that are requested.
     fn impulse_responses(&self, task: &Task<'_>) -> Result<Vec<Vec<f64>>, ThesisError> {
         let (e, u) = task.signals(NAME, self.nb)?;
         let lambda = 1.0 - 1.0 / self.memory;
@@ -81,7 +81,7 @@ impl RlsFir {
         for k in 0..e.len() {
             regressors.rotate_right(1);
             regressors[0] = e[k];
-            // The samples before the record are unknown: the regressors are complete from here on.
+            // What was before the record is not known: the regressors are whole from here on.
             if k + 1 >= self.nb {
                 equations.add(lambda, &regressors, &[u[k]]);
             }
@@ -128,7 +128,7 @@ mod tests {
     use super::{super::tests::*, *};
 
     /// Another way to the same minimum: the regularised sum of squares as a tall least-squares
-    /// problem, rows of the prior appended to those of the data, by Householder reflections.
+    /// problem, rows of the prior next to those of the data, by Householder reflections.
     #[test]
     fn the_recursion_gives_the_minimum_of_its_criterion() {
         let method = RlsFir {
@@ -198,7 +198,7 @@ mod tests {
         let found = method.follow(&task).unwrap();
         for (row, gain) in found.response.iter().zip([0.5, 1.0]) {
             let expected = Complex64::from_polar(gain, -3.0 * 0.01 * 20.0);
-            // A weight of exp(-4000/600) of the old gain remains.
+            // exp(-4000/600) of the old gain is left.
             assert!((row[0] - expected).norm() < 3e-3, "{row:?} {expected}");
         }
     }
@@ -215,7 +215,7 @@ mod tests {
             ..RlsFir::default()
         };
         let found = method.follow(&task_of(&record, &[2999], &[2.0])).unwrap();
-        // u = e: the response at the line is near 1, however uncertain it is elsewhere.
+        // u = e: the response at the line is near 1, however unsure the others are.
         assert!((found.response[0][0] - 1.0).norm() < 0.05, "{:?}", found.response);
         let silent = record_of(&[0.0; 500], &[1.0; 500]);
         let refused = method

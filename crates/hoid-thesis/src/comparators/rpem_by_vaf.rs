@@ -2,7 +2,7 @@
 //! validation set, as the discussion of the thesis proposes (VII: *the covariance matrix could be updated based on VAF
 //! from a validation data set, in order to reduce the strong oscillations that are given in state s2*).
 //!
-//! It is `rpem` of `hoid_track` with the settings of the text, and [`track_validated`], which contains the rule. The
+//! It is `rpem` of `hoid_track` by the settings of the text, with [`track_validated`], which contains the rule. The
 //! validation set is a second run of the same person in the same task, with its own remnant.
 
 use hoid_ident::{settings, settings::Bounds};

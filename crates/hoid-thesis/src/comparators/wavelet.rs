@@ -2,15 +2,15 @@
 //! T. J. Rosenthal, *Development of wavelet-based techniques for detecting loss of control*, AIAA
 //! 2004-5064).
 //!
-//! With the Morlet wavelet of c radians, whose envelope at the frequency omega has the width
+//! With Morlet's wavelet of c radians, whose envelope at the frequency omega has the width
 //! `s = c/omega`,
 //!
 //! `X(omega, t) = sum_k x(k) exp(-(t_k - t)^2/(2 s^2)) e^(-j omega t_k)`,
 //!
-//! and `H(j omega, t) = U/E`: the local content at each frequency. The width decreases with
-//! frequency, so that a slow line is averaged over tens of seconds and a fast one over seconds; in
-//! frequency the envelope has the width omega/c, and two lines closer than some of it disturb each
-//! other. The response at t uses the samples after t as much as those before.
+//! and `H(j omega, t) = U/E`: what share of each frequency there is, where it is. The width falls
+//! with frequency, so that a slow line is seen over tens of seconds and a fast one over seconds; in
+//! frequency the envelope has the width omega/c, and of two lines that are closer than some of it
+//! each disturbs the other. The response at t takes as much from after t as from before.
 
 use hoid_ident::{settings, settings::Bounds};
 use num_complex::Complex64;
@@ -19,7 +19,7 @@ use super::comparator::{About, Comparator, Followed, Task};
 use crate::ThesisError;
 
 const NAME: &str = "wavelet";
-/// Widths of the envelope after which it is negligible: 3e-4.
+/// Widths of the envelope after which it is nothing: 3e-4.
 const REACH: f64 = 4.0;
 
 settings! {
@@ -99,7 +99,7 @@ mod tests {
         }
     }
 
-    /// The transform compared with the continuous one of a wave, whose value is known:
+    /// The transform against the continuous one of a wave, whose value is known:
     /// `sqrt(2 pi) s e^(j phase)/2` in samples.
     #[test]
     fn the_transform_of_a_wave_is_half_its_envelope() {
@@ -111,7 +111,7 @@ mod tests {
         let [found, _] = method.transforms([&cosine, &cosine], omega, 2000, 0.01);
         let width = 8.0 / (omega * 0.01);
         let expected = Complex64::from_polar(0.5 * (std::f64::consts::TAU).sqrt() * width, 0.7);
-        // The envelope is truncated at 4 widths, which omits 6e-5 of it.
+        // The envelope is cut at 4 widths: 6e-5 of it is left out.
         assert!((found / expected - 1.0).norm() < 2e-4, "{found} {expected}");
     }
 

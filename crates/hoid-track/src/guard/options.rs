@@ -5,12 +5,12 @@ use hoid_ident::{
     settings::{Kind, Value},
 };
 
-/// Whether a recursion has a guard.
+/// Whether a guard is in front of a recursion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GuardChoice {
-    /// With a guard.
+    /// It does.
     Yes,
-    /// Without a guard: the samples reach the recursion as recorded.
+    /// The samples reach the recursion as they come.
     No,
 }
 

@@ -1,14 +1,14 @@
-//! The recursion in the basis that people share ([`hoid_core::adaptive`]) as a method: the defaults for people, in
-//! seconds.
+//! The recursion in the basis that people share ([`hoid_core::adaptive`]) after the face of a recursion: the defaults
+//! for people, in seconds.
 //!
 //! It needs no start fit: it starts with the defaults for people ([`hoid_core::adaptive::default`]). The delay starts
-//! at that of nk, or .2 s if none is specified, plus half a sample, since the error is held.
+//! at that of nk, .2 s where nothing is specified, and at half a sample more, for an error that is held.
 //!
-//! **Prior knowledge of the person** before the first sample is `prior`: the default, almost none, some parameters, or
-//! an earlier fit, from whose estimate and covariance it starts (`starting_point`).
+//! **What is known of the person** before the first sample is `prior`: the default, next to nothing, some parameters,
+//! or an earlier fit, whose estimate and covariance it starts with (`starting_point`).
 //!
-//! **Reported estimate.** The gain and lead that are nearest to the gains of the basis
-//! ([`AdaptiveFilter::operator`]). The polynomials are its hold, with the delay of nk.
+//! **What it reports.** The gain and lead that are nearest to the gains of the basis
+//! ([`AdaptiveFilter::operator`]). The polynomials are the hold of that, with the delay of nk.
 
 mod starting_point;
 
@@ -84,7 +84,7 @@ impl RecursiveMethod for AdaptiveOptions {
         Some(defaults::ORDER)
     }
 
-    /// The memory follows from the weights of the drifts.
+    /// It follows from the weights of the drifts.
     fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Infinite
     }
@@ -150,7 +150,7 @@ impl RecursiveMethod for AdaptiveOptions {
     }
 
     fn spread_before(&self) -> Option<[f64; DYNAMICS]> {
-        // Parameters that a fit determined are known, whatever the data show.
+        // What a fit determined is known, whatever the data show.
         let known = self.prior.fit().is_some();
         let StartingPoint { point, spread } = StartingPoint::of(&self.prior, 0.0, false, SampleTime::HUNDREDTH).ok()?;
         (!known).then_some([spread[0] * point.omega, spread[1] * point.zeta, spread[2]])
@@ -171,7 +171,7 @@ impl RecursiveMethod for AdaptiveOptions {
     }
 }
 
-/// The filter with its reported estimate.
+/// The filter with its report.
 struct AdaptiveRecursion {
     model: Box<AdaptiveFilter<Vec<f64>>>,
     reported: Reported,
@@ -186,7 +186,7 @@ impl AdaptiveRecursion {
     ) -> Result<Self, IdentError> {
         let ts = sample_time.s();
         let nk = setup.orders.nk;
-        // A delay other than the default was given.
+        // A delay that is not the default one has been given.
         let is_given = nk != sample_time.nk(DEFAULT_DELAY_S);
         let beginning = StartingPoint::of(&options.prior, (nk as f64 - 0.5) * ts, is_given, sample_time)?;
         let point = beginning.point;
@@ -196,7 +196,8 @@ impl AdaptiveRecursion {
         let supposed = DefaultOperator {
             point,
             spread: beginning.spread,
-            // A structure without a noise model, or with a single pole, does not describe the colour of the noise.
+            // A structure without a noise model, or with one pole, does not report how it is
+            // coloured.
             order: match setup.orders.nd {
                 0 | 1 => defaults::ORDER,
                 nd => nd,
@@ -221,7 +222,7 @@ impl AdaptiveRecursion {
         Ok(made)
     }
 
-    /// True if the estimate has a response: without any gain there is no size in dB and no phase.
+    /// True for a response of an estimate: that of no gains at all has no size in dB and no phase.
     fn answers(&self, [re, im]: [f64; 2]) -> bool {
         self.model.has_started() && (re != 0.0 || im != 0.0)
     }
@@ -232,7 +233,8 @@ impl AdaptiveRecursion {
         self.reported.set_noise(self.model.d());
     }
 
-    /// Returns K_e, K_e_dot, omega, zeta and tau before the last change, and their changes: zero for unchanged ones.
+    /// K_e, K_e_dot, omega, zeta and tau before the last change, and by how much they changed: by nothing
+    /// for what did not.
     fn of_change(&self) -> [[Estimate; PARAMETERS]; 2] {
         let detector = self.model.detector();
         let map = self.model.gain_and_lead();
@@ -345,7 +347,7 @@ impl Recursion for AdaptiveRecursion {
             Some(error) if error > 0.0 => by[i].value / error,
             _ => 0.0,
         };
-        // Unchanged parameters keep their values.
+        // What did not change is what it was.
         let new = |i: usize| match by[i].value == 0.0 {
             true => old[i],
             false => Estimate {

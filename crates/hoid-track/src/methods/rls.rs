@@ -26,7 +26,7 @@ settings! {
     }
 }
 
-/// Text of the default of the guard against windup.
+/// The default of the guard against windup, as text.
 const WINDUP_GUARD: &str =
     "off for arx with a covariance and exponential forgetting (the text's recursion), else as for physical";
 
@@ -46,7 +46,7 @@ impl RecursiveMethod for RlsOptions {
         }
     }
 
-    /// The 256 samples of the thesis, at 100 Hz.
+    /// The text's 256 samples at 100 Hz.
     fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Seconds(2.56)
     }
@@ -76,7 +76,7 @@ impl RecursiveMethod for RlsOptions {
         Some(&self.gain)
     }
 
-    /// Off with the settings of the thesis, which uses ARX models.
+    /// Off under the settings of the text, which has ARX models.
     fn windup_guard(&self, structure: Structure) -> Option<WindupGuard> {
         match structure {
             Structure::Arx => self.gain.windup_guard(self.limit()),
@@ -88,7 +88,7 @@ impl RecursiveMethod for RlsOptions {
         self.guard.guard
     }
 
-    /// No limit, as in the thesis.
+    /// None, as in the text.
     fn limit(&self) -> f64 {
         self.gain.limit_or(f64::INFINITY)
     }

@@ -90,7 +90,7 @@ impl RecursiveMethod for RpemOptions {
         Some(&self.gain)
     }
 
-    /// Off with the settings of the thesis, which uses Box-Jenkins models.
+    /// Off under the settings of the text, which has Box-Jenkins models.
     fn windup_guard(&self, structure: Structure) -> Option<WindupGuard> {
         match structure {
             Structure::BoxJenkins => self.gain.windup_guard(self.limit()),
@@ -119,7 +119,7 @@ impl RecursiveMethod for RpemOptions {
     }
 }
 
-/// Short memory for B, which follows the gains; long memories for the others.
+/// B follows the gains and is short, the others long.
 pub fn short_for_b(parameter: &str) -> Memory {
     if parameter.starts_with('b') {
         Memory::Seconds(2.56)
