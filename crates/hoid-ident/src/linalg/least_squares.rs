@@ -44,7 +44,7 @@ impl LeastSquares {
         let mut rank = 0;
         let steps = p.min(rows);
         for k in 0..steps {
-            // Residual norm of each column computed anew: downdating the norms loses digits exactly where the rank is
+            // Residual norm of each column computed again: downdating the norms loses digits exactly where the rank is
             // decided.
             let rest = |j: usize, columns: &[f64]| {
                 let tail = &columns[j * rows + k..(j + 1) * rows];
