@@ -6,16 +6,16 @@
 //! based on the scatter between runs). Parameters that the data do not determine are reported as such.
 //!
 //! 1. The describing function at the lines of a periodic excitation, if one was recorded ([`crate::frequency`]); each
-//!   form is fitted to it ([`LineFit`]). Without one, the response of an ARX model of high order gives the starts.
+//!    form is fitted to it ([`LineFit`]). Without one, the response of an ARX model of high order gives the starts.
 //! 2. Each form by prediction error, with an autoregressive (or ARMA) noise model whose order Akaike's criterion
-//!   chooses, and a weak prior on parameters that seconds of tracking do not determine ([`OperatorPrior`]).
+//!    chooses, and a weak prior on parameters that seconds of tracking do not determine ([`OperatorPrior`]).
 //! 3. Forms have weights by Akaike's criterion ([`FormFigures`]), and estimates are averaged over those that the data
-//!   do not reject ([`WeighedForm`]).
+//!    do not reject ([`WeighedForm`]).
 //! 4. Errors from the scatter of runs or blocks; intervals in coordinates that are nearly normal, and by profile
-//!   likelihood if they are not ([`Parameter`]).
+//!    likelihood if they are not ([`Parameter`]).
 //! 5. The operator by refined instrumental variables, if an excitation was recorded ([`InstrumentalFit`]); the
-//!   comparison of all methods ([`Agreement`]), a free model of the same orders ([`FreeModel`]), and the
-//!   [`Verdict`](hoid_model::Verdict) on all of it.
+//!    comparison of all methods ([`Agreement`]), a free model of the same orders ([`FreeModel`]), and the
+//!    [`Verdict`](hoid_model::Verdict) on all of it.
 //!
 //! | file | contents |
 //! |---|---|

@@ -15,8 +15,8 @@
 //!
 //! 1. reduces the sum by more than [`LARGE`]^2: for normal innovations once in 1e15 samples;
 //! 2. leaves less than m pushes do, by [`BETTER`]^2 and by [`PART`] of the reduction, or leaves less than a part in
-//!   [`DECISIVE`] of what they leave (several faulty samples of a smooth channel give a few more large innovations than
-//!   there are pushes, whose squares are nearly all of S);
+//!    [`DECISIVE`] of what they leave (several faulty samples of a smooth channel give a few more large innovations than
+//!    there are pushes, whose squares are nearly all of S);
 //! 3. leaves nothing beyond [`CLEAN`] sigma (or a twentieth of S);
 //! 4. moves a sample by more than [`SMALLEST`] of the deviation of the channel, and by two of its steps.
 //!

@@ -6,13 +6,13 @@
 //! 1. `low-pass continuation`: the minimum on the averaged record
 //!    ([`crate::initial_guess::continuation`]), searched from the pole grid.
 //! 2. `pole grid`, if the record is too short for that: for two poles and more, neuromuscular frequencies from 3 to 24
-//!   rad/s with damping 0.25 and 0.7, the range of human operators, through the exact zero-order hold.
+//!    rad/s with damping 0.25 and 0.7, the range of human operators, through the exact zero-order hold.
 //! 3. `steiglitz-mcbride`: ARX, and again on input and output filtered by 1/F of the step before, a
 //!    few times (K. Steiglitz and L. E. McBride, *IEEE Trans. Automatic Control* 10 (1965)
 //!    461-464). The `arx` poles themselves, badly biased where the noise poles are not those of the
 //!    system (m0 = 1: a2 near 0), only where that fails.
 //! 4. `high-order arx`: an ARX model with additional poles for the noise, and the poles of its noise-free response by
-//!   Steiglitz and McBride (B. Wahlberg, *Automatica* 25 (1989) 829-841, in its simplest form).
+//!    Steiglitz and McBride (B. Wahlberg, *Automatica* 25 (1989) 829-841, in its simplest form).
 //! 5. `instruments`: ARX, instrumental variables twice, the residual, C and D from it
 //!    ([`crate::iv`]).
 //!
