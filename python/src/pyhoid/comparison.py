@@ -88,6 +88,10 @@ class Comparison:
         ------
         DataError
             For a text that is not a result, was changed, or is of another version.
+
+        Examples
+        --------
+        >>> again = pyhoid.Comparison.from_json(found.to_json())
         """
         _pyhoid.comparison_figure_of(text)
         return cls(text)
