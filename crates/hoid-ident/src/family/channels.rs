@@ -101,7 +101,7 @@ impl<'s> Seen<'s> {
     /// Returns the channels, and the records truncated to the samples that all of them have.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a channel that a record lacks, that is constant, or that is a sum of other inputs.
+    /// [`IdentError::BadOption`] for a channel that a record lacks.
     pub fn of(
         records: Vec<Record>,
         all: &'s [SeenChannel],
@@ -168,7 +168,6 @@ impl<'s> Seen<'s> {
             leads,
             whole,
         };
-        found.check(&cut)?;
         Ok((cut, found))
     }
 
@@ -179,7 +178,10 @@ impl<'s> Seen<'s> {
 
     /// Checks for inputs that are constant, or combinations of previous ones: `r = e + y` of the three signals of one
     /// loop.
-    fn check(&self, records: &[Record]) -> Result<(), IdentError> {
+    ///
+    /// # Errors
+    /// [`IdentError::BadOption`] with the input.
+    pub fn check(&self, records: &[Record]) -> Result<(), IdentError> {
         let refuse = |found: String, expected: String| {
             Err(IdentError::BadOption {
                 option: "the inputs".to_owned(),
@@ -958,5 +960,27 @@ mod tests {
         };
         let error = estimator.fit(&[still]).unwrap_err().to_string();
         assert!(error.contains("s is constant"), "{error}");
+    }
+
+    #[test]
+    fn an_input_may_rest_in_one_of_the_records() {
+        let (operator, target) = operators();
+        let moving = run(&operator, Some(&target), 0, 3);
+        let still = run(&operator, None, 0, 4);
+        let n = still.len();
+        let still = Record::new(
+            still.sample_time(),
+            Signal::new("e", "", still.input().to_vec()),
+            Signal::new("u", "", still.output().to_vec()),
+        )
+        .unwrap()
+        .with_channel(Signal::new("r", "", vec![0.0; n]))
+        .unwrap();
+        let fit = estimator().fit(&[moving.clone(), still.clone()]).unwrap();
+        assert!(fit.channels[0].response.is_some(), "{:?}", fit.channels[0]);
+        let left = fit.without_channels(&still, Detrend::Mean).unwrap();
+        assert_eq!(left.output(), still.output());
+        let left = fit.without_channels(&moving, Detrend::Mean).unwrap();
+        assert!(left.output() != moving.output());
     }
 }

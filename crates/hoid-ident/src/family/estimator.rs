@@ -185,7 +185,9 @@ impl FamilyEstimator {
     fn prepared(&self, records: &[Record]) -> Result<(Vec<Record>, Seen<'_>), IdentError> {
         informative_data::common_sample_time(records)?;
         let records: Vec<Record> = records.iter().map(|r| r.clone().detrended(self.detrend)).collect();
-        Seen::of(records, &self.channels, self.detrend)
+        let (records, seen) = Seen::of(records, &self.channels, self.detrend)?;
+        seen.check(&records)?;
+        Ok((records, seen))
     }
 
     /// Returns the common data of fits at the lines of several inputs.
