@@ -78,7 +78,7 @@ pub(crate) fn check_record(
 /// # Errors
 /// [`IdentError::TooFewSamples`].
 pub(crate) fn check_degrees_of_freedom(criterion: &Criterion<'_>, records: &[Record]) -> Result<(), IdentError> {
-    let unknowns = criterion.orders.parameters() + criterion.states();
+    let unknowns = criterion.parameters() + criterion.states();
     if criterion.residuals() > unknowns {
         return Ok(());
     }

@@ -312,11 +312,12 @@ impl SeveralInputs {
         };
         match records.iter().find(|record| record.len() <= criterion.first) {
             None => Ok(criterion),
-            Some(short) => Self::refuse(
-                &format!("the samples of record {}", short.label()),
-                short.len(),
-                format!("more than {}, which orders and delays need", criterion.first),
-            ),
+            Some(short) => Err(IdentError::TooFewSamples {
+                label: short.label().to_owned(),
+                samples: short.len(),
+                orders: orders.to_string(),
+                needed: criterion.first,
+            }),
         }
     }
 
@@ -748,7 +749,12 @@ mod tests {
         );
         let mut late = box_jenkins();
         late.inputs[1].1.nk = 400;
-        assert!(!said(late).is_empty());
+        let needs = said(late);
+        assert!(needs.contains("needs more than 401"), "{needs}");
+        // Enough for the coefficients of one input, and too few for those of both.
+        let few = [record(14, 0.1, 1)];
+        let too_few = box_jenkins().fit(&few);
+        assert!(matches!(too_few, Err(IdentError::TooFewSamples { .. })), "{too_few:?}");
         let same = data[0]
             .clone()
             .with_channel(Channel::new("copy", "", data[0].input().to_vec()))

@@ -67,6 +67,12 @@ impl<'a> Criterion<'a> {
         self.data.iter().map(|d| d.u.len().saturating_sub(self.first)).sum()
     }
 
+    /// Number of coefficients, those of the further inputs included.
+    pub fn parameters(&self) -> usize {
+        let of_further: usize = self.further.iter().map(|f| f.orders.nb + f.orders.nf).sum();
+        self.orders.parameters() + of_further
+    }
+
     /// Number of initial states and levels over all records.
     pub fn states(&self) -> usize {
         let of_inputs = self.orders.nf + self.further.iter().map(|input| input.orders.nf).sum::<usize>();
