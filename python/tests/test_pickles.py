@@ -75,9 +75,9 @@ def test_damaged_pickles_are_refused(fit: pyhoid.Fit, c1: pyhoid.Record) -> None
     with pytest.raises(pyhoid.DataError, match="cut or changed"):
         empty.__setstate__({**state, "text": changed})
     less = {key: value for key, value in state.items() if key != "records"}
-    with pytest.raises(pyhoid.DataError, match="no pickle of a Fit"):
+    with pytest.raises(pyhoid.DataError, match="not a pickle of a Fit"):
         empty.__setstate__(less)
-    with pytest.raises(pyhoid.DataError, match="no pickle of a Fit"):
+    with pytest.raises(pyhoid.DataError, match="not a pickle of a Fit"):
         empty.__setstate__({"parameters": 1})
     # Of a trace: sealed as it should be, but of other data.
     trace = pyhoid.track(c1.span(0, 20), "rls", nk=29, every=100)

@@ -85,5 +85,5 @@ pub use reading::Reading;
 pub use recordings::{Account, Recordings};
 pub use request::{Request, ResolvedRequest};
 pub use settings::Setting;
-pub use several_inputs::{SeveralInputsResult, several_inputs};
+pub use several_inputs::{SeveralInputsResult, roles, several_inputs};
 pub use tracking::{Tracked, Tracking, plan_of, relative_errors, settings_of_recursion};

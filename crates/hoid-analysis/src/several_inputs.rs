@@ -3,7 +3,7 @@
 //! Orders are one number for all inputs (`nb=2`), or one for each (`nb=2,3`), as is nk.
 
 use hoid_ident::{
-    IdentError,
+    family::{ChannelRole, SeenChannel},
     several_inputs::{InputOrders, SeveralInputs, SeveralInputsFit},
 };
 use hoid_model::{Decimation, FaultHandling, Finding, Structure, Verdict};
@@ -27,6 +27,8 @@ const LEAST_ERRORS: f64 = 2.0;
 pub struct SeveralInputsResult {
     /// The fit.
     pub fit: SeveralInputsFit,
+    /// Role of each further input for the person.
+    pub roles: Vec<ChannelRole>,
     /// Its verdict.
     pub verdict: Verdict,
     /// The recordings that were fitted.
@@ -130,6 +132,36 @@ pub fn several_inputs(
     Ok(model)
 }
 
+/// Returns the role of each further input, from a text `r=motion,y=output`; those that it does not name are targets.
+///
+/// # Errors
+/// [`AnalysisError::Options`] for a text that is not a role, of something that is not a further input, or with a preview
+/// or form, which polynomials do not have.
+pub fn roles(further: &[String], text: &str) -> Result<Vec<ChannelRole>, AnalysisError> {
+    let options = |reason: String| AnalysisError::Options { reason };
+    let mut all = vec![ChannelRole::default(); further.len()];
+    for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
+        let named: SeenChannel = part
+            .parse()
+            .map_err(|why| options(format!("role: found {part:?}: {why}")))?;
+        let Some(place) = further.iter().position(|name| *name == named.name) else {
+            return Err(options(format!(
+                "role: {} is not one of the further inputs {}; name it as an input first",
+                named.name,
+                further.join(", ")
+            )));
+        };
+        if named != SeenChannel::new(named.name.clone(), named.role) {
+            return Err(options(format!(
+                "role: found {part:?}; polynomials have neither a preview nor a form: expected {}={}",
+                named.name, named.role
+            )));
+        }
+        all[place] = named.role;
+    }
+    Ok(all)
+}
+
 impl SeveralInputsResult {
     /// Repairs the recordings, fits, and forms the verdict.
     ///
@@ -137,6 +169,7 @@ impl SeveralInputsResult {
     /// [`AnalysisError`] if there is no result.
     pub fn of(
         model: &SeveralInputs,
+        roles: Vec<ChannelRole>,
         recordings: Recordings,
         faults: FaultHandling,
         rate: Decimation,
@@ -145,20 +178,7 @@ impl SeveralInputsResult {
             return Err(AnalysisError::NoRecordings);
         }
         let data = recordings.repaired(faults, Of::System)?.at_rate(rate, true)?;
-        // A piece of a recording shortened by a fault determines nothing, and does not stop the fit.
-        let fit = match model.fit(&data.records) {
-            Err(IdentError::TooFewSamples { .. }) if data.len() > 1 => {
-                let longest = data.records.iter().map(hoid_model::Record::len).max().unwrap_or(0);
-                let records: Vec<_> = data
-                    .records
-                    .iter()
-                    .filter(|r| 2 * r.len() >= longest)
-                    .cloned()
-                    .collect();
-                model.fit(&records)?
-            }
-            other => other?,
-        };
+        let fit = model.fit(&data.records)?;
         let mut findings = Vec::new();
         if !fit.termination.converged() {
             findings.push(Finding::doubt(
@@ -187,7 +207,12 @@ impl SeveralInputsResult {
             }
         }
         let verdict = data.judged(Verdict::of(findings));
-        Ok(Self { fit, verdict, data })
+        Ok(Self {
+            fit,
+            roles,
+            verdict,
+            data,
+        })
     }
 
     /// Returns the result as a JSON object.
@@ -231,7 +256,7 @@ impl SeveralInputsResult {
             let own = parameters.iter().filter(|(p, _)| p.ends_with(&own));
             json!({
                 "input": name,
-                "role": if k == 0 { "feedback" } else { "feedforward" },
+                "role": k.checked_sub(1).map_or("feedback", |k| self.roles[k].name()),
                 "form": Value::Null,
                 "parameters": own.map(coefficient).collect::<Vec<_>>(),
                 "response": crate::json::response(&fit.frequency_response(k, &omega)),

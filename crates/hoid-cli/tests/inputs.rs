@@ -189,6 +189,15 @@ fn polynomials_with_two_inputs() {
     assert_eq!((channels.len(), channels[1]["input"].as_str()), (2, Some("f_t")));
     assert_eq!(channels[1]["parameters"].as_array().unwrap().len(), 3);
     assert!(found["fit"]["vaf_prediction"].as_f64().unwrap() > 90.0);
+    assert_eq!(channels[1]["role"], "feedforward");
+    let moved = json(
+        at.path(),
+        &[&arx[..], &["--role", "e=feedback,f_t=motion", "--json"]].concat(),
+    );
+    assert_eq!(
+        (&moved["channels"][0]["role"], &moved["channels"][1]["role"]),
+        (&"feedback".into(), &"motion".into())
+    );
     let text = good(at.path(), &arx);
     assert!(
         text.contains("ARX with the inputs e, f_t") && text.contains("b2[f_t]"),
@@ -214,6 +223,9 @@ fn polynomials_with_two_inputs() {
         (&["--orders", "nq=1"], "no order nq"),
         (&["--orders", "nb=two"], "expected a number for each input"),
         (&["--stable"], "--stable does not belong"),
+        (&["--role", "y=output"], "y is not one of the further inputs f_t"),
+        (&["--role", "f_t=feedforward:0.25"], "neither a preview nor a form"),
+        (&["--role", "f_t=feedback"], "the feedback is the first --input"),
         (&["--figure", "x.svg"], "one input"),
     ] {
         let call = [

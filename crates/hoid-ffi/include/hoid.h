@@ -44,7 +44,8 @@
 typedef struct hoid_tracker hoid_tracker;
 
 /*
- What a function answers: zero for done, positive where there is no value, negative for an error.
+ Return code of a function: zero for done, positive where there is no value, negative for an
+ error.
  */
 typedef int32_t hoid_status;
 
@@ -65,7 +66,7 @@ typedef struct {
    */
   double value;
   /*
-   Its standard error; NaN where there is none.
+   Its standard error; NaN if there is none.
    */
   double standard_error;
   /*
@@ -87,7 +88,7 @@ typedef struct {
    */
   double before;
   /*
-   Its standard error; NaN where there is none.
+   Its standard error; NaN if there is none.
    */
   double before_standard_error;
   /*
@@ -95,7 +96,7 @@ typedef struct {
    */
   double after;
   /*
-   Its standard error; NaN where there is none.
+   Its standard error; NaN if there is none.
    */
   double after_standard_error;
   /*
@@ -143,7 +144,7 @@ typedef struct {
    */
   uint64_t held;
   /*
-   How often the guard began the estimate again.
+   How often the guard started the estimate again.
    */
   uint64_t restarts;
   /*
@@ -153,7 +154,7 @@ typedef struct {
 } hoid_counts;
 
 /*
- What a sample led to.
+ Result of a sample.
  */
 typedef struct {
   /*
@@ -188,7 +189,7 @@ typedef struct {
 #define HOID_OK 0
 
 /*
- There is no such value now; hoid_last_error says why.
+ There is no such value now; hoid_last_error gives the reason.
  */
 #define HOID_NOTHING 1
 
@@ -255,7 +256,7 @@ hoid_status hoid_tracker_new(const char *method,
                              hoid_tracker **tracker);
 
 /*
- Makes a tracker that begins with an earlier fit of the person: the text that hoid identify --json
+ Makes a tracker that starts with an earlier fit of the person: the text that hoid identify --json
  prints. Sample time in s and options as in hoid_tracker_new.
 
  # Safety
@@ -275,13 +276,16 @@ hoid_status hoid_tracker_from_fit(const char *fit,
 void hoid_tracker_free(hoid_tracker *tracker);
 
 /*
- Saves a tracker as bytes, to go on in another process with the same digits. With `buffer` NULL and
- `room` 0 only the length is told.
+ Saves a tracker as bytes, to continue in another process with the same digits. With `buffer` NULL and `room` 0 only
+ the length is reported.
 
  # Safety
  `tracker` was made here; `buffer` has room for `room` bytes, `length` for a number.
  */
-hoid_status hoid_tracker_save(hoid_tracker *tracker, uint8_t *buffer, size_t room, size_t *length);
+hoid_status hoid_tracker_save(hoid_tracker *tracker,
+                              uint8_t *buffer,
+                              size_t room,
+                              size_t *length);
 
 /*
  Makes the tracker that was saved.
@@ -292,7 +296,7 @@ hoid_status hoid_tracker_save(hoid_tracker *tracker, uint8_t *buffer, size_t roo
 hoid_status hoid_tracker_restore(const uint8_t *buffer, size_t length, hoid_tracker **tracker);
 
 /*
- HOID_OK once there is an estimate, HOID_NOTHING before; hoid_last_error then says how far the
+ HOID_OK once there is an estimate, HOID_NOTHING before; hoid_last_error then reports how far the
  warm-up is.
 
  # Safety
@@ -367,7 +371,7 @@ hoid_status hoid_tracker_change(const hoid_tracker *tracker, hoid_change *change
 
 /*
  Logarithm of the odds that the person changed within the last four seconds; -inf before the first
- estimate. HOID_NOTHING for a method that tells no changes.
+ estimate. HOID_NOTHING for a method that does not report changes.
 
  # Safety
  `tracker` was made here; `log_odds` has room for a number.
@@ -375,7 +379,7 @@ hoid_status hoid_tracker_change(const hoid_tracker *tracker, hoid_change *change
 hoid_status hoid_tracker_change_log_odds(const hoid_tracker *tracker, double *log_odds);
 
 /*
- What the estimate is worth now: HOID_TRUSTWORTHY, HOID_DOUBTFUL or HOID_NOT_DETERMINED.
+ Verdict on the estimate now: HOID_TRUSTWORTHY, HOID_DOUBTFUL or HOID_NOT_DETERMINED.
 
  # Safety
  `tracker` was made here; `level` has room for a number.
@@ -383,7 +387,7 @@ hoid_status hoid_tracker_change_log_odds(const hoid_tracker *tracker, double *lo
 hoid_status hoid_tracker_level(const hoid_tracker *tracker, int32_t *level);
 
 /*
- A level in words, as "trustworthy"; empty for what is none.
+ A level as text, as "trustworthy"; empty for what is none.
  */
 const char *hoid_level_name(int32_t level);
 
@@ -404,13 +408,13 @@ hoid_status hoid_tracker_counts(const hoid_tracker *tracker, hoid_counts *counts
 hoid_status hoid_tracker_sample_time(const hoid_tracker *tracker, double *sample_time);
 
 /*
- The text behind the last status of this thread that was not HOID_OK, empty before the first. It
+ The text after the last status of this thread that was not HOID_OK, empty before the first. It
  stays until the next one.
  */
 const char *hoid_last_error(void);
 
 /*
- Takes a sample: error e and control u. NaN stands for what is missing. `outcome` may be NULL.
+ Takes a sample: error e and control u. NaN represents missing values. `outcome` may be NULL.
 
  # Safety
  `tracker` was made here; `outcome` is NULL or has room for one.

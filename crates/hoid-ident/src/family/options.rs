@@ -215,7 +215,7 @@ fn intersample() -> Setting {
 }
 
 fn role() -> Setting {
-    let help = "Inputs except the error, and what they are to the person: r=feedforward (a target that is seen; r=feedforward:0.5 with                 0.5 s of its future), motion, output; one form alone as r=feedforward/derivative";
+    let help = "Inputs except the error, and what they are to the person: r=feedforward (a target that is seen; r=feedforward:0.5 with 0.5 s of its future), motion, output; one form alone as r=feedforward/derivative";
     Setting::new("role", Kind::Names, help)
 }
 

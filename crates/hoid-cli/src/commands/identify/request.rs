@@ -7,7 +7,7 @@ use hoid::analysis::{Request, ResolvedRequest};
 use crate::{args::IdentifyArgs, error::CliError, output};
 
 /// The option of inputs other than the error, and the role of the error.
-const ROLE: &str = "role";
+pub const ROLE: &str = "role";
 const FEEDBACK: &str = "feedback";
 
 /// Returns the request, with the options checked for consistency.
@@ -33,7 +33,10 @@ pub fn asked(args: &IdentifyArgs) -> Result<ResolvedRequest, CliError> {
 }
 
 /// The options by their names; every input other than the first has a role.
-fn options(args: &IdentifyArgs) -> Result<BTreeMap<String, String>, CliError> {
+///
+/// # Errors
+/// [`CliError::Usage`] for a second feedback.
+pub fn options(args: &IdentifyArgs) -> Result<BTreeMap<String, String>, CliError> {
     let given = args.options.given();
     let mut all: BTreeMap<String, String> = given.map(|(name, text)| (name.to_owned(), text.to_owned())).collect();
     let [first, further @ ..] = args.read.inputs.as_slice() else {

@@ -1,9 +1,10 @@
 //! `hoid identify` of polynomials with several inputs.
 
-use hoid::analysis::{Recordings, SeveralInputsResult, several_inputs};
+use hoid::analysis::{Recordings, SeveralInputsResult, roles, several_inputs};
 use hoid::model::Structure;
 use serde_json::Value;
 
+use super::request;
 use crate::{
     args::IdentifyArgs,
     commands::{paper_table, reading},
@@ -23,7 +24,7 @@ pub fn structure(args: &IdentifyArgs) -> Option<Structure> {
 pub fn run(args: &IdentifyArgs, structure: Structure) -> Result<(), CliError> {
     if let Some((name, _)) = args.options.given().find(|(name, _)| !OPTIONS.contains(name)) {
         return Err(CliError::Usage(format!(
-            "--{} does not belong to polynomials with several inputs: they take --orders and --nk",
+            "--{} does not belong to polynomials with several inputs: they take --orders, --nk and --role",
             name.replace('_', "-")
         )));
     }
@@ -45,12 +46,15 @@ pub fn run(args: &IdentifyArgs, structure: Structure) -> Result<(), CliError> {
         &args.read.inputs,
     )
     .map_err(CliError::of_options)?;
+    let typed = request::options(args)?;
+    let of_further = typed.get(request::ROLE).map_or("", String::as_str);
+    let roles = roles(&args.read.inputs[1..], of_further).map_err(CliError::of_options)?;
     paper_table::check(&args.show)?;
     let first = args.read.with_one_input();
     let read: Recordings = reading::of(&first, Some(&args.mask), true)?.files(&args.records, reading::told)?;
     let rate = args.read.prepare.rate.decimate;
     let found = output::watched("fitting", || {
-        SeveralInputsResult::of(&model, read, args.faults.faults, rate)
+        SeveralInputsResult::of(&model, roles, read, args.faults.faults, rate)
     })?;
     paper_table::write(&args.show, || Ok(found.json()))?;
     if args.show.json {
