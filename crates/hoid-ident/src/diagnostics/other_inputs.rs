@@ -4,10 +4,19 @@
 //! to the error nor the loop that the person closes ([`crate::family::SeenChannel`]). Each channel with the name of a
 //! target is tried as a second input, in the forms of a gain and of its derivatives, in addition to the form of the
 //! fit; a doubt is raised if the best of them explains far more than chance.
+//!
+//! **Sticks with a dead zone.** If only the target excites the loop, the part of e that follows it is larger than the
+//! rest of e. A dead zone passes large and small signals by different gains (the describing function of A. Gelb and
+//! W. E. Vander Velde, *Multiple-Input Describing Functions*, 1968), so that u follows the target by another gain than
+//! e as a whole: this looks like a response to the target. Where u [rests](Rest) as such a stick does, the finding is
+//! a note that names both explanations.
 
 use hoid_model::{Finding, Form, Record};
 
-use crate::family::{ChannelRole, FamilyEstimator, FamilyFit, SeenChannel};
+use crate::{
+    family::{ChannelRole, FamilyEstimator, FamilyFit, SeenChannel},
+    faults::Rest,
+};
 
 /// Names of channels that may hold a displayed target.
 const TARGETS: [&str; 4] = ["r", "f_t", "target", "reference"];
@@ -41,16 +50,32 @@ pub fn of_family(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[Record
         };
         // A channel that cannot be an input, such as a constant one, is no evidence against the fit.
         let (found, apart) = again.responds_to(records, channel).ok()?;
-        (found.p_value < BY_CHANCE[usize::from(!apart)]).then(|| {
-            Finding::doubt(
-                "other-input",
-                format!(
-                    "u responds to {name} besides the error (p = {:.0e}): with one input the response to the error, crossover and \
-                     margins are not those of the person; add --input {name}",
-                    found.p_value
-                ),
-            )
-        })
+        let chance = found.p_value;
+        (chance < BY_CHANCE[usize::from(!apart)]).then(|| finding(name, chance, !apart && rests(records)))
     };
     TARGETS.into_iter().filter(is_recorded).filter_map(found).collect()
+}
+
+/// True if u rests in one of the records as a stick with a dead zone does.
+fn rests(records: &[Record]) -> bool {
+    records.iter().any(|record| Rest::of(record.output()).is_some())
+}
+
+fn finding(name: &str, chance: f64, nonlinear: bool) -> Finding {
+    if nonlinear {
+        return Finding::note(
+            "other-input",
+            format!(
+                "u follows {name} by more than its response to the error (p = {chance:.0e}): a stick with a dead zone \
+                 does that; if the person saw {name}, add --input {name}"
+            ),
+        );
+    }
+    Finding::doubt(
+        "other-input",
+        format!(
+            "u responds to {name} besides the error (p = {chance:.0e}): with one input the response to the error, \
+             crossover and margins are not those of the person; add --input {name}"
+        ),
+    )
 }
