@@ -21,6 +21,7 @@
 //! | what the recordings show | `identified`, `recordings` |
 //! | what each answer is worth, and the verdict on those that were requested | `answers` |
 //! | polynomials with several inputs | `several_inputs` |
+//! | the operators of several axes, and their coupling | `axes` |
 //! | a describing function, from recordings to its verdict | `describing` |
 //! | a recursion over a recording, from it to the verdict | `tracking` |
 //! | the level of u, the settings that all share | `level`, `settings` |
@@ -41,6 +42,7 @@
 //! ```
 
 mod answers;
+mod axes;
 mod copies;
 mod describing;
 mod description;
@@ -69,6 +71,7 @@ mod several_inputs;
 mod tracking;
 
 pub use answers::{Answered, Answers};
+pub use axes::{Axis, AxisPair, Coupling, axes, axes_json, check_axes};
 pub use describing::{Described, Describing};
 pub use description::Excitation;
 pub use error::AnalysisError;

@@ -6,7 +6,10 @@ use clap::{
     Args,
     builder::{PossibleValue, PossibleValuesParser},
 };
-use hoid::analysis::registry::{OPERATOR, PEM};
+use hoid::analysis::{
+    AxisPair,
+    registry::{OPERATOR, PEM},
+};
 use hoid::ident::IvMethod;
 use hoid::io::{readable_endings, writable_endings};
 use hoid::model::{Structure, remnant::RemnantDiscretisation};
@@ -29,6 +32,10 @@ pub struct IdentifyArgs {
     pub records: Vec<PathBuf>,
     #[command(flatten)]
     pub read: ReadArgs,
+    /// Error and control of an axis, as ex,ux, or with its recorded excitation, as ex,ux,rx. Repeat it for
+    /// each axis: each has an operator of its own, and the coupling between them is tested
+    #[arg(long, value_name = "INPUT,OUTPUT[,EXCITATION]", conflicts_with_all = ["input", "output"], allow_hyphen_values = true)]
+    pub pair: Vec<AxisPair>,
     #[command(flatten)]
     pub mask: MaskArgs,
     #[command(flatten)]

@@ -14,7 +14,7 @@
 use hoid_model::{Finding, Form, Record};
 
 use crate::{
-    family::{ChannelRole, FamilyEstimator, FamilyFit, SeenChannel},
+    family::{ChannelFit, ChannelRole, FamilyEstimator, FamilyFit, SeenChannel},
     faults::Rest,
 };
 
@@ -26,8 +26,36 @@ const BY_CHANCE: [f64; 2] = [1e-2, 1e-7];
 
 /// Returns a doubt for each target that the person responds to.
 pub fn of_family(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[Record]) -> Vec<Finding> {
+    let is_recorded = |name: &&str| {
+        records.iter().all(|record| {
+            let is_signal = record.channels().take(2).any(|signal| signal.name == *name);
+            !is_signal && record.channel(name).is_some()
+        })
+    };
+    let found = |name: &str| {
+        let (found, apart) = response_to(
+            estimator,
+            fit,
+            records,
+            SeenChannel::new(name, ChannelRole::Feedforward),
+        )?;
+        let chance = found.p_value;
+        (chance < BY_CHANCE[usize::from(!apart)]).then(|| finding(name, chance, !apart && rests(records)))
+    };
+    TARGETS.into_iter().filter(is_recorded).filter_map(found).collect()
+}
+
+/// Returns the response to a channel in addition to the inputs of a fit, in the form of the fit and with its noise
+/// orders, and whether the lines of excitations tell the two apart. `None` with little noise, and for a fit with several inputs.
+/// A channel that cannot be an input, such as a constant one, is no evidence against the fit: `None` too.
+pub fn response_to(
+    estimator: &FamilyEstimator,
+    fit: &FamilyFit,
+    records: &[Record],
+    channel: SeenChannel,
+) -> Option<(ChannelFit, bool)> {
     if fit.little_noise || !estimator.channels.is_empty() {
-        return Vec::new();
+        return None;
     }
     let (nc, nd) = fit.noise_orders;
     let again = FamilyEstimator {
@@ -37,23 +65,11 @@ pub fn of_family(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[Record
         intersample: fit.intersample,
         ..estimator.clone()
     };
-    let is_recorded = |name: &&str| {
-        records.iter().all(|record| {
-            let is_signal = record.channels().take(2).any(|signal| signal.name == *name);
-            !is_signal && record.channel(name).is_some()
-        })
+    let channel = SeenChannel {
+        forms: vec![Form::Gain, Form::Derivative, Form::DerivativeLead],
+        ..channel
     };
-    let found = |name: &str| {
-        let channel = SeenChannel {
-            forms: vec![Form::Gain, Form::Derivative, Form::DerivativeLead],
-            ..SeenChannel::new(name, ChannelRole::Feedforward)
-        };
-        // A channel that cannot be an input, such as a constant one, is no evidence against the fit.
-        let (found, apart) = again.responds_to(records, channel).ok()?;
-        let chance = found.p_value;
-        (chance < BY_CHANCE[usize::from(!apart)]).then(|| finding(name, chance, !apart && rests(records)))
-    };
-    TARGETS.into_iter().filter(is_recorded).filter_map(found).collect()
+    again.responds_to(records, channel).ok()
 }
 
 /// True if u rests in one of the records as a stick with a dead zone does.

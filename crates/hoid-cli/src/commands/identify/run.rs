@@ -15,7 +15,7 @@ use hoid::model::{GainUnit, Record};
 use hoid::report::{FitSummary, ModelSection, Report, known_operator, model_figure, model_picture, write_report};
 use serde_json::Value;
 
-use super::{family, request, several, sigmoid};
+use super::{axes, family, request, several, sigmoid};
 use crate::{
     args::IdentifyArgs,
     commands::{figure, output_paths, paper_table, reading},
@@ -27,6 +27,9 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     if let Some(structure) = several::structure(args) {
         check_places(args)?;
         return several::run(args, structure);
+    }
+    if !args.pair.is_empty() {
+        return axes::run(args);
     }
     let asked = request::asked(args)?;
     check_places(args)?;

@@ -1,0 +1,262 @@
+//! Several axes of one recording: the operator of each, and the coupling between them.
+//!
+//! A person who controls roll and pitch closes two loops, `u_x = Y_x e_x + C_xy e_y + n_x`. Each operator is identified
+//! from its own error and control as if it were alone. The coupling C_xy is then tested as the response of u_x to the
+//! error of the other axis, in addition to that to its own (D. T. McRuer and D. K. Schmidt, *J. Guidance, Control, and
+//! Dynamics* 13 (1990) 348-355).
+//!
+//! **Lines.** Targets that excite both axes at the same frequencies move e_x and e_y together, so that an operator
+//! whose form lacks something looks like a coupling. The excitations of the axes must therefore be recorded, and have
+//! lines of their own; otherwise the coupling is reported as not tested.
+//!
+//! **Level.** Both directions of all pairs of axes are tests: a coupling is reported if its probability by chance is
+//! below .01 divided by their number (Bonferroni).
+
+use std::str::FromStr;
+
+use hoid_ident::{
+    diagnostics::other_inputs::response_to,
+    family::{ChannelRole, SeenChannel},
+    frequency::{Excitation as Lines, LineSearch},
+};
+use hoid_model::{Channel, Finding, Record, Verdict};
+use serde_json::{Map, Value, json};
+
+use crate::{AnalysisError, Excitation, Identification, Identified, Recordings, json};
+
+/// Probability by chance below which any coupling is reported.
+const BY_CHANCE: f64 = 0.01;
+/// Relative difference below which two lines are the same.
+const SAME_LINE: f64 = 1e-3;
+/// Value of `kind` in JSON.
+pub const AXES: &str = "axes";
+
+/// Error and control of an axis, and its recorded excitation.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AxisPair {
+    /// Column of the error.
+    pub input: String,
+    /// Column of the control.
+    pub output: String,
+    /// Column of the target or disturbance of this axis.
+    pub excitation: Option<String>,
+}
+
+impl FromStr for AxisPair {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+        match parts.as_slice() {
+            [input, output, rest @ ..] if rest.len() < 2 && parts.iter().all(|part| !part.is_empty()) => Ok(Self {
+                input: (*input).to_owned(),
+                output: (*output).to_owned(),
+                excitation: rest.first().map(|&name| name.to_owned()),
+            }),
+            _ => Err(format!(
+                "found {text:?}, expected error and control of an axis, as ex,ux, or with its excitation, as ex,ux,rx"
+            )),
+        }
+    }
+}
+
+/// The operator of an axis.
+#[derive(Debug, Clone)]
+pub struct Axis {
+    /// Its signals.
+    pub pair: AxisPair,
+    /// The operator.
+    pub identified: Identified,
+    /// The responses of its control to the errors of the other axes.
+    pub couplings: Vec<Coupling>,
+}
+
+/// A response of the control of an axis to the error of another.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coupling {
+    /// Column of the error of the other axis.
+    pub input: String,
+    /// Probability of such a response by chance, or the reason why it was not tested.
+    pub p_value: Result<f64, String>,
+    /// Whether there is a response.
+    pub responds: bool,
+}
+
+/// Identifies the operator of each axis from its recordings, and tests the couplings.
+///
+/// # Errors
+/// As [`check_axes`], and [`AnalysisError`] if an axis has no result.
+pub fn axes(identification: &Identification, mut all: Vec<(AxisPair, Recordings)>) -> Result<Vec<Axis>, AnalysisError> {
+    let pairs: Vec<AxisPair> = all.iter().map(|(pair, _)| pair.clone()).collect();
+    check_axes(identification, &pairs)?;
+    for x in 0..all.len() {
+        for y in (0..all.len()).filter(|y| *y != x) {
+            let other = all[y].1.records.clone();
+            with_error(&mut all[x].1.records, &pairs[y].input, &other)?;
+        }
+    }
+    let tests = pairs.len() * (pairs.len() - 1);
+    let mut found = Vec::with_capacity(all.len());
+    for (pair, recordings) in all {
+        let asked = Identification {
+            excitation: match &pair.excitation {
+                Some(name) => Excitation::Named(name.clone()),
+                None => identification.excitation.clone(),
+            },
+            ..identification.clone()
+        };
+        let identified = asked.run(recordings)?;
+        let others = pairs.iter().filter(|other| **other != pair);
+        let couplings = others
+            .map(|other| coupling(&asked, &identified, (&pair, other), tests))
+            .collect();
+        found.push(Axis {
+            pair,
+            identified,
+            couplings,
+        });
+    }
+    Ok(found)
+}
+
+/// Checks the axes, before anything is read.
+///
+/// # Errors
+/// [`AnalysisError::Options`] for fewer than two axes, a column that two of them share, and further inputs.
+pub fn check_axes(identification: &Identification, pairs: &[AxisPair]) -> Result<(), AnalysisError> {
+    let refuse = |reason: String| Err(AnalysisError::Options { reason });
+    if pairs.len() < 2 {
+        return refuse("pair: found one axis, expected two or more; for one give input and output".to_owned());
+    }
+    for (k, pair) in pairs.iter().enumerate() {
+        let shares = |other: &&AxisPair| other.input == pair.input || other.output == pair.output;
+        if let Some(twice) = pairs[..k].iter().find(shares) {
+            return refuse(format!(
+                "pair: {},{} and {},{} share a column; each axis has its own error and control",
+                twice.input, twice.output, pair.input, pair.output
+            ));
+        }
+    }
+    if !identification.estimator.channels.is_empty() {
+        return refuse("pair: an axis has one input; drop the roles of further inputs".to_owned());
+    }
+    Ok(())
+}
+
+/// Adds the error of another axis to the records where it is not a column of its own, as r-y.
+fn with_error(records: &mut [Record], name: &str, other: &[Record]) -> Result<(), AnalysisError> {
+    for (record, of) in records.iter_mut().zip(other) {
+        if record.channel(name).is_none() && record.len() == of.len() {
+            let channel = Channel::new(name, "", of.input().to_vec());
+            *record = record.clone().with_channel(channel)?;
+        }
+    }
+    Ok(())
+}
+
+/// Tests whether the control of an axis responds to the error of another.
+fn coupling(
+    asked: &Identification,
+    identified: &Identified,
+    (pair, other): (&AxisPair, &AxisPair),
+    tests: usize,
+) -> Coupling {
+    let records = &identified.data.records;
+    let tested = separate(records, pair, other).and_then(|()| {
+        let channel = SeenChannel::new(other.input.clone(), ChannelRole::Output);
+        response_to(&asked.estimator, &identified.fit, records, channel)
+            .map(|(found, _)| found.p_value)
+            .ok_or_else(|| {
+                format!(
+                    "{} is not an input that can be fitted next to {}",
+                    other.input, pair.input
+                )
+            })
+    });
+    Coupling {
+        input: other.input.clone(),
+        responds: tested.as_ref().is_ok_and(|p| *p < BY_CHANCE / tests as f64),
+        p_value: tested,
+    }
+}
+
+/// Returns the reason why the excitations of two axes do not tell their errors apart.
+fn separate(records: &[Record], pair: &AxisPair, other: &AxisPair) -> Result<(), String> {
+    let (Some(own), Some(of_other)) = (&pair.excitation, &other.excitation) else {
+        return Err("the excitations of both axes are not given, as ex,ux,rx".to_owned());
+    };
+    for record in records {
+        let lines = |name: &String| {
+            let found = Lines::found_in(record, name, &LineSearch::default()).map_err(|error| error.to_string())?;
+            Ok::<_, String>(found.omega_rad_s())
+        };
+        let (here, there) = (lines(own)?, lines(of_other)?);
+        let shared = here
+            .iter()
+            .find(|a| there.iter().any(|b| (*a / b - 1.0).abs() < SAME_LINE));
+        if let Some(omega) = shared {
+            return Err(format!(
+                "{own} and {of_other} share the line at {omega:.3} rad/s: give each axis lines of its own"
+            ));
+        }
+    }
+    Ok(())
+}
+
+impl Axis {
+    /// Returns the verdict on the operator of the axis, with a note for each coupling.
+    pub fn verdict(&self) -> Verdict {
+        let notes = self
+            .couplings
+            .iter()
+            .filter(|coupling| coupling.responds)
+            .map(|coupling| {
+                let chance = coupling.p_value.as_ref().map_or(1.0, |p| *p);
+                Finding::note(
+                    "axis-coupling",
+                    format!(
+                        "{} responds to {} as well (p = {chance:.0e}): the axes are coupled",
+                        self.pair.output, coupling.input
+                    ),
+                )
+            });
+        self.identified.verdict.clone().append(notes)
+    }
+}
+
+/// Returns the axes as a JSON object: the result of each with its couplings.
+///
+/// # Errors
+/// As the JSON of an operator.
+pub fn axes_json(all: &[Axis]) -> Result<Map<String, Value>, AnalysisError> {
+    let coupling = |coupling: &Coupling| {
+        json!({
+            "input": coupling.input,
+            "tested": coupling.p_value.is_ok(),
+            "reason": coupling.p_value.as_ref().err(),
+            "p_value": coupling.p_value.as_ref().ok().map(|p| json::number(*p)),
+            "responds": coupling.responds,
+        })
+    };
+    let axis = |axis: &Axis| {
+        let mut result = axis.identified.json()?;
+        result.insert("verdict".to_owned(), {
+            let mut verdict = json::verdict(&axis.verdict());
+            verdict["of"] = Value::Object(json::answers(&axis.identified.answers()));
+            verdict
+        });
+        Ok::<_, AnalysisError>(json!({
+            "input": axis.pair.input,
+            "output": axis.pair.output,
+            "excitation": axis.pair.excitation,
+            "coupling": axis.couplings.iter().map(coupling).collect::<Vec<_>>(),
+            "result": result,
+        }))
+    };
+    let each = all.iter().map(axis).collect::<Result<Vec<_>, _>>()?;
+    let mut map = Map::new();
+    map.insert("hoid".to_owned(), json!(env!("CARGO_PKG_VERSION")));
+    map.insert("kind".to_owned(), json!(AXES));
+    map.insert("axes".to_owned(), Value::Array(each));
+    Ok(map)
+}
