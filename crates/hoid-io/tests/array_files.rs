@@ -207,6 +207,21 @@ fn hdf5_of_another_program() {
 }
 
 #[test]
+fn tables_of_records_in_hdf5() {
+    let name = "mat/h5py_table.h5";
+    for (input, output) in [("run.e", "run.u"), ("e", "u")] {
+        let found = read(name, input, output);
+        close(found.record.input(), &e());
+        close(found.record.output(), &u());
+        assert_eq!(found.record.sample_time().s(), 0.0125);
+    }
+    let counted = channel(&read(name, "run.e", "run.u"), "n").to_vec();
+    assert!(counted.iter().enumerate().all(|(k, n)| *n == k as f64), "{counted:?}");
+    let message = refused(name, "run.mark", "run.u");
+    assert!(message.contains("something else than numbers"), "{message}");
+}
+
+#[test]
 fn objects_of_matlab_come_with_the_line_that_saves_their_numbers() {
     let message = refused("mat/h5py_objects_v73.mat", "runs", "stick");
     assert!(

@@ -184,11 +184,15 @@ fn decimal_commas_give_the_same_record() {
     for text in [
         "\u{feff}t;e;u\r\n0,00;-1,5;2e-3\r\n0,01;1,25;0\r\n0,02;1;5\r\n",
         "t\te\tu\n0,00\t-1,5\t2e-3\n0,01\t1,25\t0\n0,02\t1\t5\n",
+        "\"t\",\"e\",\"u\"\n\"0,00\",\"-1,500\",\"2e-3\"\n\"0,01\",\"1,25\",\"0\"\n\"0,02\",\"1\",\"5\"\n",
     ] {
         let comma = of(text);
         assert_eq!(comma.record, point.record);
         assert_eq!(comma.notes, ["the commas in its numbers are taken as decimal commas"]);
     }
+    // Before three digits a comma may separate thousands.
+    let message = desk.error("t,e,u\n0,\"1,500\",\"2,000\"\n1,\"1,250\",\"3,000\"\n", &defaults());
+    assert!(message.contains("decimal point instead of a comma"), "{message}");
 }
 
 #[test]
@@ -210,7 +214,7 @@ fn errors_name_line_column_and_remedy() {
         &["line 2, column e", "decimal point instead of a comma"],
     );
     says(
-        "t,e,u\n0,\"1,5\",2\n1,\"1,6\",2\n",
+        "t,e,u\n0,\"1,500\",2\n1,\"1,600\",2\n",
         &["line 2, column e", "decimal point instead of a comma"],
     );
     says(

@@ -98,21 +98,41 @@ pub(crate) fn refuse_blanks(header: &str, first: Option<&str>, file: &str) -> Re
 }
 
 /// True if the numbers of a table have decimal commas: some cell is a number with a comma, and none
-/// has a point, with which a comma may separate thousands. The comma must not be the cell
-/// separator.
+/// has a point, with which a comma may separate thousands.
+///
+/// Where commas separate cells, numbers with commas are quoted, `"0,02"`. A comma before three digits may then separate thousands,
+/// as spreadsheets write them, so that one of the commas must be before another number of digits.
 pub(crate) fn has_decimal_commas(text: &str, separator: u8) -> bool {
+    let quoted = separator == b',';
+    if quoted
+        && !text
+            .lines()
+            .filter(|line| !is_aside(line))
+            .nth(1)
+            .is_some_and(|row| row.contains('"'))
+    {
+        return false;
+    }
     let mut reader = reader(text.as_bytes(), separator);
     let mut record = csv::ByteRecord::new();
     let mut found = false;
-    while separator != b',' && matches!(reader.read_byte_record(&mut record), Ok(true)) {
+    while matches!(reader.read_byte_record(&mut record), Ok(true)) {
         for cell in record.iter().filter_map(|cell| std::str::from_utf8(cell).ok()) {
             if cell.contains('.') && matches!(Cell::parse(cell), Cell::Number(_)) {
                 return false;
             }
-            found |= has_decimal_comma(cell);
+            found |= has_decimal_comma(cell) && !(quoted && may_be_thousands(cell));
         }
     }
     found
+}
+
+/// True if three digits follow the last comma.
+fn may_be_thousands(cell: &str) -> bool {
+    cell.trim()
+        .rsplit(',')
+        .next()
+        .is_some_and(|digits| digits.len() == 3 && digits.bytes().all(|b| b.is_ascii_digit()))
 }
 
 /// The comment lines above the header, without their marks.

@@ -7,6 +7,7 @@
 //! | `version5` | versions 5 to 7: arrays, structures, cells, texts |
 //! | `version4` | version 4: matrices |
 //! | `version73` | version 7.3, which is HDF5; any HDF5 |
+//! | `records` | tables of records in HDF5 |
 //! | `objects` | what to do with a timetable, a table, a timeseries |
 //! | `names` | names of columns and names of variables |
 //! | `write` | version 7, one variable a column |
@@ -18,6 +19,7 @@ mod elements;
 mod names;
 mod objects;
 mod read;
+mod records;
 mod version4;
 mod version5;
 mod version73;

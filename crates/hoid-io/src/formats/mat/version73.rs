@@ -4,9 +4,11 @@
 //! attributes, as other programs write them, are numbers; in files that are not from MATLAB, dimensions remain in the
 //! order of C.
 
-use hdf5_pure::{AttrValue, DType, Dataset, Error, File, Group, H5Element, Object};
+use std::rc::Rc;
 
-use super::objects::object;
+use hdf5_pure::{AttrValue, DType, Dataset, Datatype, Error, File, Group, H5Element, Object};
+
+use super::{objects::object, records};
 use crate::IoError;
 use crate::formats::arrays::{Array, Entry, Indexing, Kind, Numbers, Value};
 use crate::formats::budget::{Budget, MOST_NESTED};
@@ -158,9 +160,28 @@ impl Reader<'_> {
             DType::Compound(fields) if fields.len() == 2 && fields[0].0 == "real" => {
                 Value::Unread(String::from("complex numbers"))
             }
+            DType::Compound(_) => return self.table(dataset, (parent, path)),
             _ => Value::Unread(String::from("something else than numbers")),
         };
         self.push(parent, path, value)
+    }
+
+    /// Reads a table of records, each field `path.field`.
+    fn table(&mut self, dataset: &Dataset, (parent, path): (&str, &str)) -> Result<(), IoError> {
+        let kind = dataset.datatype().map_err(|error| self.damaged(path, &error))?;
+        let Datatype::Compound { size, members } = kind else {
+            return self.push(parent, path, Value::Unread(String::from("records of no known type")));
+        };
+        let bytes = dataset.read_raw().map_err(|error| self.damaged(path, &error))?;
+        let (bytes, size) = (Rc::new(bytes), size as usize);
+        for member in &members {
+            let value = match records::field(&bytes, size, member) {
+                Some(numbers) => Value::Array(Array::vector(numbers)),
+                None => Value::Unread(String::from("something else than numbers")),
+            };
+            self.push(path, &format!("{path}.{}", member.name), value)?;
+        }
+        Ok(())
     }
 
     /// Reads cells, each `path{k}`, or one field of an array of structures, each `parent(k).field`.
