@@ -6,6 +6,7 @@
 //! | `resting-stick` | u comes back to one value, exactly, in 10 % of the samples or more ([`Rest`]) | a dead zone, or control in pulses: a note, as the operator is the linear part of the response |
 //! | `coarse` | e in steps of more than .05, u of more than .15 of its deviation | rounding is not a remnant: intervals and bands are too narrow |
 //! | `bridged` | a gap of more than .25 s on a straight line | the line counts as tracking |
+//! | `held` | a value of a sparse column held for more than .25 s | what happened in between is unknown |
 //!
 //! Standard errors do not account for them.
 
@@ -82,6 +83,11 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
     let seconds = |step: &Step| match step {
         Step::Fill { longest, .. } => *longest as f64 * record.sample_time().s(),
         Step::Interpolate { longest_step_s, .. } => *longest_step_s,
+        Step::Sparse {
+            how: "linear",
+            longest_s,
+            ..
+        } => *longest_s,
         _ => 0.0,
     };
     let longest = account.steps.iter().map(seconds).fold(0.0, f64::max);
@@ -93,6 +99,26 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
                  --mask gap in a fit, by hoid stream in a tracker"
             ),
         ));
+    }
+    for step in &account.steps {
+        let Step::Sparse {
+            channel,
+            how: "hold",
+            longest_s,
+            ..
+        } = step
+        else {
+            continue;
+        };
+        if *longest_s > BRIDGED_S {
+            all.push(Finding::doubt(
+                "held",
+                format!(
+                    "{channel} is held for up to {longest_s:.2} s: what happened in between is not in the recording; shorten the \
+                     span by --from and --to"
+                ),
+            ));
+        }
     }
     all
 }

@@ -81,6 +81,14 @@ impl Reading {
             Setting::new("detrend", self.preparation.detrend.to_string()),
             Setting::new("decimate", decimation.to_string()),
         ]);
+        if !options.sparse.is_empty() {
+            let each: Vec<String> = options
+                .sparse
+                .iter()
+                .map(|(name, how)| format!("{name} {how}"))
+                .collect();
+            list.push(Setting::new("sparse", each.join(", ")));
+        }
         let repair = options.repair;
         if repair.resample || repair.fill {
             list.push(Setting::new(

@@ -3,7 +3,7 @@
 use hoid_model::ModelError;
 use thiserror::Error;
 
-use crate::wording::list;
+use crate::wording::{list, sparse_option};
 
 /// Reason why a file could not be read or written. Each message names the file, the place in it,
 /// the content found, the expected content and the remedy. A `place` is "line 12" if the format has
@@ -266,6 +266,23 @@ pub enum IoError {
         column: String,
         /// The cell.
         found: String,
+        /// Number of missing values.
+        count: usize,
+        /// Number of rows examined.
+        rows: usize,
+    },
+    /// Values missing at many places, as in a topic of another rate.
+    #[error(
+        "{file}, {place}, column {column}: the value is missing, as are {count} of {rows} in this column; where it was logged at instants of its own, read it with {} (or linear, drop); else bridge them linearly with --fill, or leave them out with --from and --to",
+        sparse_option(column)
+    )]
+    Sparse {
+        /// The file.
+        file: String,
+        /// The first.
+        place: String,
+        /// The column.
+        column: String,
         /// Number of missing values.
         count: usize,
         /// Number of rows examined.

@@ -64,8 +64,8 @@ pub use output::{
 };
 pub use preparation::{NewRate, Offset, Preparation, Scaling, Step};
 pub use record::{
-    ReadOptions, ReadRecord, Repair, TrialChoice, read, read_aligned, read_prepared, read_record, read_segments,
-    write_record, write_record_csv,
+    ReadOptions, ReadRecord, Repair, Sparse, TrialChoice, read, read_aligned, read_prepared, read_record,
+    read_segments, write_record, write_record_csv,
 };
 pub use results::{
     ColumnKind, ColumnSchema, ColumnValues, FitFile, FitParameter, OutputColumn, OutputTable, TableSchema, TableWriter,

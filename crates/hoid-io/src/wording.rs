@@ -37,6 +37,16 @@ pub(crate) fn named(name: &str) -> String {
     text
 }
 
+/// The option that reads a sparse column.
+pub(crate) fn sparse_option(name: &str) -> String {
+    let name = named(name);
+    if name.contains(char::is_whitespace) {
+        format!("--sparse \"{name}=hold\"")
+    } else {
+        format!("--sparse {name}=hold")
+    }
+}
+
 /// A message that may repeat parts of a file, without terminal control characters: those other than
 /// line ends are written as `\u{1b}`.
 #[must_use]

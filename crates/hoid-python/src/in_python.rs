@@ -18,7 +18,7 @@ const NAMES: [(&str, &str); 6] = [
 /// Options without a value.
 const SWITCHES: [&str; 6] = ["drop-repeated", "fill", "resample", "resume", "robust", "stable"];
 /// Options whose assignments are a dictionary.
-const DICTIONARIES: [&str; 5] = ["unit", "scale", "offset", "fix", "bound"];
+const DICTIONARIES: [&str; 6] = ["unit", "scale", "offset", "sparse", "fix", "bound"];
 /// Words that are values of options.
 const VALUES: [&str; 17] = [
     "t",

@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
 use hoid_ident::{NamedOrders, order_selection::Criterion};
-use hoid_io::QualityIssueKind;
+use hoid_io::{QualityIssueKind, Sparse};
 use hoid_model::{
     Detrend, NamedChoice, Structure, discretise, remnant::RemnantDiscretisation, remnant_gain::NoiseDefinition,
     scenario::Realisation,
@@ -56,6 +56,12 @@ pub fn criterion(found: &str) -> Outcome<Criterion> {
 
 pub fn detrend(found: &str) -> Outcome<Detrend> {
     choice("detrend", found)
+}
+
+/// The handling of each sparse column.
+pub fn sparse(found: BTreeMap<String, String>) -> Outcome<BTreeMap<String, Sparse>> {
+    let of = |(name, how): (String, String)| Ok((name, choice("sparse", &how)?));
+    found.into_iter().map(of).collect()
 }
 
 pub fn noise_definition(found: &str) -> Outcome<NoiseDefinition> {

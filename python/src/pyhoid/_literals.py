@@ -15,6 +15,7 @@ __all__ = [
     "Detrending",
     "Faults",
     "ModelStructure",
+    "Sparse",
 ]
 
 #: What `identify` fits, except for time-varying.
@@ -31,3 +32,6 @@ Faults = Literal["bridge", "cut", "report", "keep"]
 
 #: What is taken out of input and output.
 Detrending = Literal["none", "mean", "linear"]
+
+#: What is done with a column that lacks a value in some rows.
+Sparse = Literal["hold", "linear", "drop"]

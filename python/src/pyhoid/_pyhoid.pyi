@@ -536,6 +536,7 @@ def read(
     stop: float | None,
     resample: bool,
     fill: bool,
+    sparse: dict[str, str],
     detrend: str,
     drop_repeated: bool,
     unit: dict[str, str],

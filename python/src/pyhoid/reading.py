@@ -16,7 +16,7 @@ __all__ = ["info", "read", "read_segments", "read_trials", "write"]
 if TYPE_CHECKING:
     from typing_extensions import TypedDict, Unpack
 
-    from ._literals import Detrending
+    from ._literals import Detrending, Sparse
 
     class ReadOptions(TypedDict, total=False):
         """The keywords of `read`."""
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
         stop: float | None
         resample: bool
         fill: bool
+        sparse: Mapping[str, Sparse] | None
         drop_repeated: bool
         unit: Mapping[str, str] | None
         scale: Mapping[str, float | str] | None
@@ -52,6 +53,7 @@ def read(
     stop: float | None = None,
     resample: bool = False,
     fill: bool = False,
+    sparse: Mapping[str, Sparse] | None = None,
     drop_repeated: bool = False,
     unit: Mapping[str, str] | None = None,
     scale: Mapping[str, float | str] | None = None,
@@ -84,6 +86,9 @@ def read(
         Resample unevenly sampled data on an even grid by linear interpolation.
     fill : bool
         Bridge missing values by linear interpolation.
+    sparse : mapping, optional
+        Columns logged at instants of their own, so that some rows lack them, by name: ``{"u":
+        "hold"}`` holds the last value, ``"linear"`` draws straight lines, ``"drop"`` drops the rows.
     drop_repeated : bool
         Drop rows that occur twice, with the same time.
     unit : mapping, optional
@@ -138,6 +143,7 @@ def read(
         stop=stop,
         resample=resample,
         fill=fill,
+        sparse=sparse,
         drop_repeated=drop_repeated,
         unit=unit,
         scale=scale,
@@ -230,6 +236,7 @@ def _read(
     stop: float | None = None,
     resample: bool = False,
     fill: bool = False,
+    sparse: Mapping[str, Sparse] | None = None,
     drop_repeated: bool = False,
     unit: Mapping[str, str] | None = None,
     scale: Mapping[str, float | str] | None = None,
@@ -252,6 +259,7 @@ def _read(
             stop=stop,
             resample=resample,
             fill=fill,
+            sparse=dict(sparse or {}),
             detrend=detrend,
             drop_repeated=drop_repeated,
             unit=dict(unit or {}),

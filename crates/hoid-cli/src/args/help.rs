@@ -286,6 +286,7 @@ const HEADINGS: [(&str, &[&str]); 2] = [
             "unit",
             "resample",
             "fill",
+            "sparse",
             "drop_repeated",
             "scale",
             "offset",

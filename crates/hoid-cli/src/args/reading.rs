@@ -1,7 +1,7 @@
 //! The options by which `hoid identify` and `hoid track` read records and prepare them.
 
 use clap::Args;
-use hoid::io::{Offset, QualityIssueKind, Scaling, TimeChoice, TrialChoice};
+use hoid::io::{Offset, QualityIssueKind, Scaling, Sparse, TimeChoice, TrialChoice};
 use hoid::model::{Decimation, Detrend, FaultHandling};
 
 use super::choices::choice_of;
@@ -44,6 +44,10 @@ pub struct ReadArgs {
     /// Bridge missing values (empty, NaN) by linear interpolation
     #[arg(long)]
     pub fill: bool,
+    /// A column logged at instants of its own, so that some rows lack it: hold the last value, draw straight lines
+    /// (linear), or drop those rows. May be repeated
+    #[arg(long, value_name = "COLUMN=hold|linear|drop", value_parser = parse_sparse, value_delimiter = ',', allow_hyphen_values = true)]
+    pub sparse: Vec<(String, Sparse)>,
     #[command(flatten)]
     pub prepare: PrepareArgs,
     /// Take out the mean or the straight line of input and output, last
@@ -151,6 +155,15 @@ pub(super) fn parse_trial(text: &str) -> Result<TrialChoice, String> {
     text.parse::<TrialChoice>().map_err(|error| error.to_string())
 }
 
+fn parse_sparse(text: &str) -> Result<(String, Sparse), String> {
+    let (name, value) = pair(text)?;
+    let how = value
+        .trim()
+        .parse()
+        .map_err(|e: hoid::model::UnknownName| e.to_string())?;
+    Ok((name, how))
+}
+
 fn parse_unit(text: &str) -> Result<(String, String), String> {
     let (name, unit) = pair(text)?;
     match unit.trim() {
@@ -182,6 +195,9 @@ mod tests {
         }
         assert!(parse_offset("u=1 sample").is_err());
         assert_eq!(parse_unit("e = deg").unwrap(), ("e".to_owned(), "deg".to_owned()));
+        assert_eq!(parse_sparse("r-y=hold").unwrap(), ("r-y".to_owned(), Sparse::Hold));
+        assert!(parse_sparse("e=held").unwrap_err().contains("hold, linear or drop"));
+        assert!(parse_sparse("hold").is_err());
         assert!(parse_unit("e=").is_err() && parse_unit("deg").is_err());
     }
 }

@@ -57,6 +57,7 @@ fn options(args: &ReadArgs, with_input: bool) -> Result<ReadOptions, CliError> {
         trial: args.trial.clone(),
         sampling_hz: args.fs,
         span_s: (args.from, args.to),
+        sparse: by_channel("--sparse", &args.sparse)?,
         repair: Repair {
             resample: args.resample,
             fill: args.fill,

@@ -1,5 +1,6 @@
 //! Problems with the table columns from which a record is made.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use super::issue::{QualityIssue, QualityIssueKind};
@@ -89,17 +90,35 @@ fn of_columns(
     nominal_hz: Option<f64>,
     rows: Range<usize>,
 ) -> Vec<QualityIssue> {
+    // What --sparse has made is no fault of the recording, and neither is what was missing there.
+    let own: Vec<(usize, Cow<'_, [f64]>)> = (used.iter())
+        .map(|column| (*column, table.columns[*column].own_values(rows.clone())))
+        .collect();
     let signal = |column: usize| Signal {
         name: &table.columns[column].name,
         values: &table.columns[column].values[rows.clone()],
     };
     let is_clock = |column: &usize| Some(*column) != time && names_a_clock(&table.columns[*column].name);
-    issues_of(&Signals {
-        columns: used.iter().copied().map(signal).collect(),
+    let mut found = issues_of(&Signals {
+        columns: own
+            .iter()
+            .map(|(column, values)| Signal {
+                values,
+                ..signal(*column)
+            })
+            .collect(),
         time: time.map(signal),
         precision: time.map(|time| table.columns[time].precision).unwrap_or_default(),
         nominal_hz: nominal_hz.or(table.sample_time_s.map(|ts| 1.0 / ts)),
         clocks: (0..table.columns.len()).filter(is_clock).map(signal).collect(),
         before: rows.start,
-    })
+    });
+    let is_sparse = |name: &str| {
+        table
+            .columns
+            .iter()
+            .any(|column| column.name == name && !column.made.is_empty())
+    };
+    found.retain(|one| one.kind != QualityIssueKind::Missing || !is_sparse(&one.channel));
+    found
 }

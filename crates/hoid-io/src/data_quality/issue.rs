@@ -45,7 +45,9 @@ impl QualityIssueKind {
     /// Returns the remedy.
     pub fn remedy(self) -> &'static str {
         match self {
-            Self::Missing => "bridge empty cells with --fill, or leave out with --from and --to or --mask missing",
+            Self::Missing => {
+                "bridge empty cells with --fill, read what was logged at its own instants with --sparse COLUMN=hold, or leave out with --from and --to or --mask missing"
+            }
             Self::Unordered => "read trials whose time starts again with --trial t, or count the samples with --fs",
             Self::Repeated => "drop them with --drop-repeated",
             Self::Gap => "interpolate with --resample, or leave out with --mask gap",

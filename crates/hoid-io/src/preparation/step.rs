@@ -5,7 +5,7 @@ use std::fmt;
 use hoid_model::{Decimated, Detrend};
 use serde::Serialize;
 
-use crate::wording::decimal;
+use crate::wording::{decimal, short};
 
 /// A step; steps are listed in the order of application.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -27,6 +27,21 @@ pub enum Step {
         from_s: f64,
         /// Time after its last sample, s.
         to_s: f64,
+    },
+    /// A column that was logged at instants of its own has values in all rows.
+    Sparse {
+        /// The column.
+        channel: String,
+        /// "hold", "linear" or "drop".
+        how: &'static str,
+        /// Number of its own values.
+        own: usize,
+        /// Rows between them that had none; with "drop" they are left out.
+        rows: usize,
+        /// Longest time from one own value to the next, where rows lie between them, s.
+        longest_s: f64,
+        /// Age of a value on average over all rows, if values are held, s.
+        mean_age_s: Option<f64>,
     },
     /// Missing values were interpolated linearly.
     Fill {
@@ -124,6 +139,7 @@ impl Step {
         match self {
             Self::DropRepeated { .. } => "drop-repeated",
             Self::Mask { .. } => "mask",
+            Self::Sparse { .. } => "sparse",
             Self::Fill { .. } => "fill",
             Self::Interpolate { .. } => "interpolate",
             Self::Scale { .. } => "scale",
@@ -166,6 +182,32 @@ impl fmt::Display for Step {
                 decimal(*to_s),
                 what.join(" or ")
             ),
+            Self::Sparse {
+                channel,
+                how,
+                own,
+                rows,
+                longest_s,
+                mean_age_s,
+            } => {
+                write!(
+                    f,
+                    "column {channel}: {own} values of its own, {rows} rows between them "
+                )?;
+                match *how {
+                    "drop" => write!(f, "dropped"),
+                    "hold" => write!(f, "hold the last one"),
+                    _ => write!(f, "on straight lines"),
+                }?;
+                write!(f, "; at most {} s from one to the next", decimal(*longest_s))?;
+                mean_age_s.iter().try_for_each(|age| {
+                    write!(
+                        f,
+                        "; a value is {} s old on average, by which the signal is late",
+                        short(*age)
+                    )
+                })
+            }
             Self::Fill {
                 channel,
                 values,

@@ -13,6 +13,7 @@ use hoid_model::Record;
 
 use super::from_table::{ReadRecord, record_of};
 use super::read_options::ReadOptions;
+use super::sparse::without_gaps;
 use crate::IoError;
 use crate::formats::bytes_of;
 use crate::preparation::{NewRate, Offset, Preparation, Step};
@@ -66,11 +67,12 @@ pub fn read_aligned(
 pub(super) fn read_as_recorded(path: &Path, options: &ReadOptions, drop_repeated: bool) -> Result<ReadRecord, IoError> {
     let file = path.display().to_string();
     let (format, mut bytes) = bytes_of(path)?;
-    let table = format.table(&mut bytes, &file, options)?;
+    let (table, steps) = without_gaps(format.table(&mut bytes, &file, options)?, options)?;
     let label = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     let read = record_of(table, options, drop_repeated)?;
     Ok(ReadRecord {
         record: read.record.labelled(label.unwrap_or_default()),
+        steps: [steps, read.steps].concat(),
         ..read
     })
 }

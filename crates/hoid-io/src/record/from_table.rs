@@ -108,7 +108,10 @@ impl TableReader<'_> {
                 Ok(values) => {
                     let values = match grid.t.as_ref().zip(grid.resampled) {
                         None => values,
-                        Some((t, n)) => repair::resample(t, &values, grid.start_s, grid.sample_time.s(), n),
+                        Some((t, n)) => {
+                            let is_held = self.table.columns[column].is_held;
+                            repair::resample(t, &values, (grid.start_s, grid.sample_time.s()), n, is_held)
+                        }
                     };
                     columns.push(Some(Channel::new(name, unit, values)));
                 }

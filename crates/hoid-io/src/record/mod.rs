@@ -11,6 +11,7 @@
 //! | `from_table` | [`ReadRecord`]: from the columns of a file to a record |
 //! | `table_reader` | the columns on this way, one by one |
 //! | `time_grid` | the rows of a record, and its even grid |
+//! | `sparse` | columns that were logged at instants of their own: `--sparse` |
 //! | `repair` | rows that are duplicated, missing values, an uneven time: `--fill` and `--resample` |
 //! | `alignment` | [`read_aligned`]: channels that were recorded late, within a span that keeps its length |
 //! | `segments` | [`read_segments`]: the records between faults of the recording |
@@ -23,6 +24,7 @@ mod from_table;
 mod read_options;
 mod repair;
 mod segments;
+mod sparse;
 mod table_reader;
 mod time_grid;
 pub(crate) mod trials;
@@ -31,5 +33,5 @@ pub use alignment::read_aligned;
 pub(crate) use channels::{channels, comments};
 pub use file::{read, read_prepared, read_record, write_record, write_record_csv};
 pub use from_table::ReadRecord;
-pub use read_options::{ReadOptions, Repair, TrialChoice};
+pub use read_options::{ReadOptions, Repair, Sparse, TrialChoice};
 pub use segments::read_segments;

@@ -1,6 +1,7 @@
 //! Options of reading a record: columns of input and output, trials, sampling, and permitted
 //! repairs.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
 
@@ -18,6 +19,23 @@ pub struct Repair {
     /// Interpolate missing values (empty, NaN, NA) linearly between the values before and after.
     pub fill: bool,
 }
+
+/// What is done with a column that lacks a value in some rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sparse {
+    /// The last value is held until the next.
+    Hold,
+    /// A straight line from one value to the next.
+    Linear,
+    /// Rows without a value are dropped.
+    Drop,
+}
+
+hoid_model::named_choice!(Sparse, "handling of a sparse column", 3, {
+    Hold => "hold",
+    Linear => "linear",
+    Drop => "drop",
+});
 
 /// Options of reading a record.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,6 +56,9 @@ pub struct ReadOptions {
     pub sampling_hz: Option<f64>,
     /// Uses the samples with `from <= t < to`, s. By default all.
     pub span_s: (Option<f64>, Option<f64>),
+    /// Columns that were logged at instants of their own, so that some rows lack their value; `e` and `u` are input and
+    /// output where no column has that name. By default none.
+    pub sparse: BTreeMap<String, Sparse>,
     /// Permitted repairs.
     pub repair: Repair,
 }
@@ -51,6 +72,7 @@ impl Default for ReadOptions {
             trial: None,
             sampling_hz: None,
             span_s: (None, None),
+            sparse: BTreeMap::new(),
             repair: Repair::default(),
         }
     }

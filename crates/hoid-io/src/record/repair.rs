@@ -9,6 +9,9 @@ use std::ops::Range;
 use crate::preparation::Step;
 use crate::table::{Table, kept};
 
+/// Part of a step within which a time on the grid is that of a row: the rounding of times.
+const ROUNDING: f64 = 1e-6;
+
 /// Reason why missing values could not be interpolated: there is no value on one side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum OpenEnd {
@@ -84,17 +87,20 @@ fn next_run(values: &[f64], from: usize) -> Option<Range<usize>> {
     Some(start..end)
 }
 
-/// Interpolates linearly between the points `(t, value)` at `start + k step`, k = 0 .. n; t increases.
-pub(super) fn resample(t: &[f64], values: &[f64], start: f64, step: f64, n: usize) -> Vec<f64> {
+/// Values between the points `(t, value)` at `start + k step`, k = 0 .. n; t increases. They are on straight lines, or
+/// those of the last point if the signal is held, which counts as reached [`ROUNDING`] of a step before it.
+pub(super) fn resample(t: &[f64], values: &[f64], (start, step): (f64, f64), n: usize, is_held: bool) -> Vec<f64> {
+    let early = if is_held { ROUNDING * step } else { 0.0 };
     let mut left = 0;
     (0..n)
         .map(|k| {
-            let time = start + k as f64 * step;
+            let time = start + k as f64 * step + early;
             while left + 2 < t.len() && t[left + 1] <= time {
                 left += 1;
             }
-            let share = (time - t[left]) / (t[left + 1] - t[left]);
-            line(values[left], values[left + 1], share.clamp(0.0, 1.0))
+            let share = ((time - t[left]) / (t[left + 1] - t[left])).clamp(0.0, 1.0);
+            let share = if is_held { share.floor() } else { share };
+            line(values[left], values[left + 1], share)
         })
         .collect()
 }
@@ -133,13 +139,17 @@ mod tests {
     fn a_straight_line_is_resampled_exactly() {
         let t = [0.0, 0.11, 0.19, 0.3, 0.9, 1.0];
         let values = t.map(|t| 2.0 - 3.0 * t);
-        let even = resample(&t, &values, 0.0, 0.1, 11);
+        let even = resample(&t, &values, (0.0, 0.1), 11, false);
         for (k, value) in even.iter().enumerate() {
             // Two products of numbers of order 1: a few units in the last place.
             assert!((value - (2.0 - 0.3 * k as f64)).abs() < 1e-14, "{k}");
         }
         assert_eq!(even[0], 2.0);
         // A last sample beyond the data due to rounding takes the last value.
-        assert_eq!(resample(&t, &values, 0.0, 1.0 + 1e-12, 2)[1], values[5]);
+        assert_eq!(resample(&t, &values, (0.0, 1.0 + 1e-12), 2, false)[1], values[5]);
+        // A held signal changes at the rows alone, whatever the rounding of the grid.
+        let held = resample(&t, &values, (0.0, 0.1), 11, true);
+        let rows = [0, 0, 2, 3, 3, 3, 3, 3, 3, 4, 5];
+        assert_eq!(held, rows.map(|row| values[row]));
     }
 }

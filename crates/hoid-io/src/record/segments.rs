@@ -13,6 +13,7 @@ use super::alignment::read_as_recorded;
 use super::file::read_prepared;
 use super::from_table::ReadRecord;
 use super::read_options::{ReadOptions, TrialChoice};
+use super::sparse::without_gaps;
 use crate::IoError;
 use crate::data_quality::{QualityIssue, QualityIssueKind, issues_of_record};
 use crate::formats::bytes_of;
@@ -103,7 +104,7 @@ fn read_trial(
         ));
     }
     let (format, mut bytes) = bytes_of(path)?;
-    let table = format.table(&mut bytes, &file, options)?;
+    let (table, _) = without_gaps(format.table(&mut bytes, &file, options)?, options)?;
     let (quality_issues, rows) = issues_of_record(&table, options)?;
     let time = table.names().iter().position(|name| *name == "t");
     let at = |row: usize| match (time, options.sampling_hz) {

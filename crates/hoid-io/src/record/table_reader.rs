@@ -9,7 +9,7 @@ use super::repair::{self, OpenEnd};
 use crate::IoError;
 use crate::preparation::Step;
 use crate::table::Table;
-use crate::wording::named;
+use crate::wording::{named, sparse_option};
 
 /// The table, and the steps applied to it.
 pub(super) struct TableReader<'a> {
@@ -84,7 +84,7 @@ impl TableReader<'_> {
     /// its own clock.
     pub(super) fn own_times(&self, rows: &Range<usize>, t: &[f64]) -> Option<Vec<f64>> {
         let of = |column: &usize| -> Vec<f64> {
-            let values = &self.table.columns[*column].values[rows.clone()];
+            let values = self.table.columns[*column].own_values(rows.clone());
             // The first and the last row may be filled.
             let inside = values.iter().zip(t).skip(1).take(values.len().saturating_sub(2));
             let own = inside.filter(|(value, _)| value.is_finite());
@@ -96,6 +96,7 @@ impl TableReader<'_> {
 
     /// The values of a column in use: all finite, the missing ones interpolated if requested.
     pub(super) fn values(&mut self, column: usize, rows: Range<usize>, t: Option<&[f64]>) -> Result<Vec<f64>, IoError> {
+        let lacks = self.table.columns[column].is_sparse(rows.clone());
         let source = &mut self.table.columns[column];
         let may_fill = self.options.repair.fill;
         let bridgeable =
@@ -120,6 +121,13 @@ impl TableReader<'_> {
                 end,
             }
         })?;
+        if bridged.values > 0 && lacks && self.signals.contains(&column) {
+            self.table.notes.push(format!(
+                "column {} lacks values at many places, as if logged at instants of its own: --fill draws straight lines, {} holds the last value",
+                named(&source.name),
+                sparse_option(&source.name)
+            ));
+        }
         if bridged.values > 0 {
             self.steps.push(Step::Fill {
                 channel: source.name.clone(),

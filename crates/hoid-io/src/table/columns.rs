@@ -4,6 +4,7 @@
 //! the same for all formats. A value that is missing or not a number is NaN here; the file is
 //! consulted again only when an error message quotes the cell, so that a million rows are cheap.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -11,6 +12,10 @@ use super::cell::{DECIMAL_COMMA, has_decimal_comma, is_moment};
 use super::precision::Precision;
 use crate::IoError;
 use crate::wording::{named, shown};
+
+/// Number of separate places and share of the rows from which missing values are those of a sparse column. A dropout
+/// is one place.
+const SPARSE: (usize, f64) = (5, 0.05);
 
 /// One column.
 #[derive(Debug, Default)]
@@ -25,8 +30,42 @@ pub(crate) struct Column {
     pub(crate) texts: Vec<usize>,
     /// True if the values are clock times, in s from the first.
     pub(crate) moments: bool,
+    /// Rows whose value is not the column's own but follows from its others (`--sparse`), in increasing order.
+    pub(crate) made: Vec<usize>,
+    /// True if these values are held, so that the signal is constant between the rows as well.
+    pub(crate) is_held: bool,
     /// Precision of the printed values; kept only for the time.
     pub(crate) precision: Precision,
+}
+
+impl Column {
+    /// True if a row holds nothing: neither a number nor a text.
+    pub(crate) fn is_missing(&self, row: usize) -> bool {
+        self.values[row].is_nan() && self.texts.binary_search(&row).is_err()
+    }
+
+    /// True if missing values are at many places: what a topic of another rate leaves, and no dropout.
+    pub(crate) fn is_sparse(&self, rows: Range<usize>) -> bool {
+        let missing = |row: &usize| self.is_missing(*row);
+        let first = rows.start;
+        let places = rows
+            .clone()
+            .filter(|row| missing(row) && (*row == first || !missing(&(row - 1))));
+        let count = rows.clone().filter(missing).count();
+        places.count() >= SPARSE.0 && count as f64 >= SPARSE.1 * rows.len() as f64
+    }
+
+    /// The values of some rows, NaN where they are not the column's own.
+    pub(crate) fn own_values(&self, rows: Range<usize>) -> Cow<'_, [f64]> {
+        if self.made.is_empty() {
+            return Cow::Borrowed(&self.values[rows]);
+        }
+        let mut own = self.values[rows.clone()].to_vec();
+        for row in self.made.iter().filter(|row| rows.contains(row)) {
+            own[row - rows.start] = f64::NAN;
+        }
+        Cow::Owned(own)
+    }
 }
 
 /// Origin of the rows, for messages.
@@ -67,14 +106,14 @@ impl Table<'_> {
 
     /// Returns the reason why the value at `row` of a column, which is not finite, cannot be used.
     /// `rows` are the rows in use.
-    pub(crate) fn bad_value(&self, column: usize, row: usize, rows: Range<usize>) -> IoError {
+    pub(crate) fn bad_value(&self, at: usize, row: usize, rows: Range<usize>) -> IoError {
         let Column {
             name, values, texts, ..
-        } = &self.columns[column];
+        } = &self.columns[at];
         let file = self.source.file().to_owned();
         let place = self.source.place(row);
-        let found = self.source.cell(row, column);
-        let is_last_cell = column + 1 == self.columns.len();
+        let found = self.source.cell(row, at);
+        let is_last_cell = at + 1 == self.columns.len();
         let column = named(name);
         // At the end of a truncated file a sign or a point is the start of a number.
         let begun = is_last_cell && self.source.is_open(row) && matches!(found.as_str(), "-" | ".");
@@ -106,17 +145,25 @@ impl Table<'_> {
                 found,
             };
         }
-        let count = rows
-            .clone()
-            .filter(|row| values[*row].is_nan() && texts.binary_search(row).is_err())
-            .count();
+        let source = &self.columns[at];
+        let count = rows.clone().filter(|row| source.is_missing(*row)).count();
+        let examined = rows.len();
+        if source.is_sparse(rows) {
+            return IoError::Sparse {
+                file,
+                place,
+                column,
+                count,
+                rows: examined,
+            };
+        }
         IoError::Missing {
             file,
             place,
             column,
             found: if found.is_empty() { String::from("empty") } else { found },
             count,
-            rows: rows.len(),
+            rows: examined,
         }
     }
 }
@@ -215,8 +262,12 @@ pub(crate) fn kept(table: Table<'_>, rows: Vec<usize>) -> Table<'_> {
     } = table;
     for column in &mut columns {
         column.values = rows.iter().map(|row| column.values[*row]).collect();
-        let texts = (0..rows.len()).filter(|row| column.texts.binary_search(&rows[*row]).is_ok());
-        column.texts = texts.collect();
+        let still = |of: &[usize]| {
+            (0..rows.len())
+                .filter(|row| of.binary_search(&rows[*row]).is_ok())
+                .collect()
+        };
+        (column.texts, column.made) = (still(&column.texts), still(&column.made));
     }
     Table {
         columns,
@@ -224,5 +275,36 @@ pub(crate) fn kept(table: Table<'_>, rows: Vec<usize>) -> Table<'_> {
         source: Box::new(Kept { source, rows }),
         sample_time_s: table.sample_time_s,
         notes: table.notes,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn column(values: &[f64]) -> Column {
+        Column {
+            values: values.to_vec(),
+            ..Column::default()
+        }
+    }
+
+    #[test]
+    fn a_topic_of_another_rate_is_sparse_and_a_dropout_is_not() {
+        let every = |m: usize| {
+            column(
+                &(0..100)
+                    .map(|k| if k % m == 0 { f64::NAN } else { 1.0 })
+                    .collect::<Vec<_>>(),
+            )
+        };
+        assert!(every(2).is_sparse(0..100) && every(20).is_sparse(0..100));
+        assert!(!every(50).is_sparse(0..100));
+        let dropout = column(
+            &(0..100)
+                .map(|k| if k > 40 { f64::NAN } else { 1.0 })
+                .collect::<Vec<_>>(),
+        );
+        assert!(!dropout.is_sparse(0..100) && !dropout.is_sparse(3..3));
     }
 }

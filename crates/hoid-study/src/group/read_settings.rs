@@ -1,6 +1,9 @@
 //! How the files of a group are read: the keys of `[read]`.
 
-use hoid_model::FaultHandling;
+use std::collections::BTreeMap;
+
+use hoid_io::Sparse;
+use hoid_model::{FaultHandling, UnknownName};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -31,12 +34,26 @@ pub struct ReadSettings {
     pub resample: bool,
     /// Bridge missing values.
     pub fill: bool,
+    /// Columns logged at instants of their own, as `{ u = "hold" }`: hold, linear or drop.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub sparse: BTreeMap<String, String>,
     /// Trend removed from e and u: none, mean or linear.
     pub detrend: Detrending,
     /// Faults of the recordings: bridge, report or keep. Where a fault is too long to be bridged the operator
     /// of a person is that of all parts without it, and of what is done with single runs the longest part
     /// counts.
     pub faults: FaultTreatment,
+}
+
+impl ReadSettings {
+    /// The columns that are sparse.
+    pub(super) fn sparse(&self) -> Result<BTreeMap<String, Sparse>, String> {
+        let of = |(name, how): (&String, &String)| match how.parse() {
+            Ok(how) => Ok((name.clone(), how)),
+            Err(error @ UnknownName { .. }) => Err(format!("sparse of {name}: {error}")),
+        };
+        self.sparse.iter().map(of).collect()
+    }
 }
 
 /// Treatment of faults of a recording.
@@ -88,6 +105,7 @@ impl Default for ReadSettings {
             to_s: None,
             resample: false,
             fill: false,
+            sparse: BTreeMap::new(),
             detrend: Detrending::None,
             faults: FaultTreatment::Bridge,
         }

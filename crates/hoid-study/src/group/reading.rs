@@ -35,6 +35,7 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
         time: reading.time.as_deref().map(str::parse).transpose().map_err(text)?,
         sampling_hz: reading.sampling_hz,
         span_s: (reading.from_s, reading.to_s),
+        sparse: reading.sparse()?,
         repair: Repair {
             resample: reading.resample,
             fill: reading.fill,

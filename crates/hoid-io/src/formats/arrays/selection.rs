@@ -175,6 +175,8 @@ fn column(name: &str, column_path: &ColumnPath, numbers: &Numbers) -> Column {
         values,
         texts: Vec::new(),
         moments: column_path.unit == MOMENTS,
+        made: Vec::new(),
+        is_held: false,
     }
 }
 

@@ -5,8 +5,8 @@
 use std::path::Path;
 
 use hoid_io::{
-    IoError, Preparation, QualityIssueKind, ReadOptions, ReadRecord, Repair, read_prepared, read_segments, read_table,
-    survey,
+    IoError, Preparation, QualityIssueKind, ReadOptions, ReadRecord, Repair, Sparse, read_prepared, read_segments,
+    read_table, survey,
 };
 
 use super::draw::Draw;
@@ -69,6 +69,14 @@ fn options(draw: &mut Draw) -> ReadOptions {
         time: None,
         trial: None,
         sampling_hz: [None, None, Some(100.0), Some(1e-6), Some(1e6)][draw.below(5)],
+        sparse: (0..draw.below(3))
+            .map(|_| {
+                (
+                    draw.one_of(&["e", "u", "r", "t", "x"]).to_string(),
+                    *draw.one_of(&Sparse::ALL),
+                )
+            })
+            .collect(),
         span_s: [(None, None), (Some(0.005), Some(0.025)), (Some(-1e300), Some(1e300))][draw.below(3)],
         repair: Repair {
             resample: draw.below(2) == 0,

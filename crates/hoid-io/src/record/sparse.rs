@@ -1,0 +1,248 @@
+//! Columns that were logged at instants of their own: topics at several rates in one table, as an outer join makes it.
+//!
+//! Let the own values of a column be `x_i` at the times `t_i`, and t a row between `t_i` and `t_{i+1}`:
+//!
+//! | handling | value in that row |
+//! |---|---|
+//! | [`Sparse::Hold`] | `x_i`, what a display or an actuator does that is renewed at `t_i` |
+//! | [`Sparse::Linear`] | `x_i + (x_{i+1} - x_i) (t - t_i)/(t_{i+1} - t_i)`, for a signal that is smooth between the samples |
+//! | [`Sparse::Drop`] | none: the row is left out |
+//!
+//! A value that is held is late by half the time from one to the next on average. Rows before the first and after the
+//! last own value are cut. All values are made before rows are cut and before the span is, so that a row at the start
+//! of a span takes what was logged before it. Text and infinite numbers are no missing values: they stay, and reading
+//! refuses them.
+
+use std::ops::Range;
+
+use super::read_options::{ReadOptions, Sparse};
+use crate::IoError;
+use crate::preparation::Step;
+use crate::table::{Column, ColumnExpression, Signal, Table, kept};
+use crate::wording::{list, named};
+
+const STEP: &str = "sparse";
+
+/// The table without gaps in the columns named as sparse, and the steps on this way.
+///
+/// # Errors
+/// [`IoError::Preparation`] for a column that is not there, is the time, is named twice or is empty throughout, and if
+/// no row is left; [`IoError::NoSuchColumn`].
+pub(super) fn without_gaps<'a>(mut table: Table<'a>, options: &ReadOptions) -> Result<(Table<'a>, Vec<Step>), IoError> {
+    if options.sparse.is_empty() {
+        return Ok((table, Vec::new()));
+    }
+    let x = abscissa(&table, options);
+    let mut steps = Vec::new();
+    let mut bounds = 0..table.rows;
+    let mut dropped: Vec<usize> = Vec::new();
+    let columns = columns(&table, options)?;
+    for &(column, how) in &columns {
+        let gaps = Gaps::of(&table.columns[column]);
+        let name = named(&table.columns[column].name);
+        let Some(own) = gaps.own.clone() else {
+            let found = format!("column {name} has no value in {} rows", table.rows);
+            return Err(refused(&table, found, "a column with some values; check the recording"));
+        };
+        if gaps.missing.is_empty() {
+            let note = format!("column {name} has a value in every row: --sparse changes nothing in it");
+            table.notes.push(note);
+            continue;
+        }
+        bounds = bounds.start.max(own.start)..bounds.end.min(own.end);
+        steps.push(gaps.step(&table.columns[column].name, how, &x));
+        match how {
+            Sparse::Drop => dropped.extend(gaps.missing),
+            Sparse::Hold | Sparse::Linear => gaps.close(&mut table.columns[column], how, &x),
+        }
+    }
+    dropped.sort_unstable();
+    let rows: Vec<usize> = bounds
+        .clone()
+        .filter(|row| dropped.binary_search(row).is_err())
+        .collect();
+    if rows.is_empty() {
+        let names: Vec<&str> = columns.iter().map(|(at, _)| table.columns[*at].name.as_str()).collect();
+        let found = format!(
+            "no row between the first and the last value of each of {}",
+            list(&names)
+        );
+        return Err(refused(&table, found, "columns that were logged at the same time"));
+    }
+    if rows.len() < table.rows {
+        note_cut(&mut table, &bounds);
+        table = kept(table, rows);
+    }
+    Ok((table, steps))
+}
+
+fn note_cut(table: &mut Table<'_>, bounds: &Range<usize>) {
+    let (before, behind) = (bounds.start, table.rows - bounds.end);
+    if before + behind > 0 {
+        table.notes.push(format!(
+            "{before} rows at the start and {behind} at the end are cut: a sparse column has no value before its first or after its last"
+        ));
+    }
+}
+
+fn refused(table: &Table<'_>, found: String, expected: &str) -> IoError {
+    IoError::Preparation {
+        record: table.source.file().to_owned(),
+        step: STEP,
+        found,
+        expected: expected.to_owned(),
+    }
+}
+
+/// The columns named, each with its handling. `e` and `u` are those of input and output where no column has that name.
+fn columns(table: &Table<'_>, options: &ReadOptions) -> Result<Vec<(usize, Sparse)>, IoError> {
+    let names = table.names();
+    let file = table.source.file();
+    let of = |expression: Option<&ColumnExpression>| -> Result<Vec<usize>, IoError> {
+        let signal = expression.map(|one| one.resolve(&names, file)).transpose()?;
+        Ok(signal.into_iter().flat_map(Signal::columns).collect())
+    };
+    let mut all: Vec<(usize, Sparse)> = Vec::new();
+    for (name, how) in &options.sparse {
+        let found = match (names.iter().position(|known| known == name), name.as_str()) {
+            (Some(_), "t") => {
+                let expected = "a column of values: rows without a time cannot be placed";
+                return Err(refused(table, "t is the time".to_owned(), expected));
+            }
+            (Some(at), _) => vec![at],
+            (None, "e") => of(options.input.as_ref())?,
+            (None, "u") => of(Some(&options.output))?,
+            (None, _) => Vec::new(),
+        };
+        if found.is_empty() {
+            let found = format!("there is no column \"{}\"", named(name));
+            let expected = format!("one of {}, or e and u for input and output", list(&names));
+            return Err(refused(table, found, &expected));
+        }
+        for column in found {
+            if all.iter().any(|(known, _)| *known == column) {
+                let found = format!("column {} is named twice", named(names[column]));
+                return Err(refused(table, found, "each column once"));
+            }
+            all.push((column, *how));
+        }
+    }
+    Ok(all)
+}
+
+/// The time of each row in s, as the record will have it: that of t, unless samples are counted.
+fn abscissa(table: &Table<'_>, options: &ReadOptions) -> Vec<f64> {
+    let time = table.columns.iter().find(|column| column.name == "t");
+    match (time, options.sampling_hz) {
+        (Some(time), None) => time.values.clone(),
+        (Some(time), Some(_)) if options.repair.resample => time.values.clone(),
+        (_, hz) => (0..table.rows).map(|row| row as f64 / hz.unwrap_or(1.0)).collect(),
+    }
+}
+
+/// Where a column has values.
+struct Gaps {
+    /// From the first to after the last row with a value; none if there is none.
+    own: Option<Range<usize>>,
+    /// Rows without one.
+    missing: Vec<usize>,
+}
+
+impl Gaps {
+    fn of(column: &Column) -> Self {
+        let is_missing = |row: &usize| column.is_missing(*row);
+        let rows = 0..column.values.len();
+        let first = rows.clone().find(|row| !is_missing(row));
+        let last = rows.clone().rev().find(|row| !is_missing(row));
+        Self {
+            own: first.zip(last).map(|(first, last)| first..last + 1),
+            missing: rows.filter(is_missing).collect(),
+        }
+    }
+
+    /// Runs of missing rows with a value on both sides.
+    fn runs(&self) -> Vec<Range<usize>> {
+        let own = self.own.clone().unwrap_or_default();
+        let mut runs: Vec<Range<usize>> = Vec::new();
+        for row in self.missing.iter().copied().filter(|row| own.contains(row)) {
+            match runs.last_mut() {
+                Some(run) if run.end == row => run.end = row + 1,
+                _ => runs.push(row..row + 1),
+            }
+        }
+        runs
+    }
+
+    fn step(&self, name: &str, how: Sparse, x: &[f64]) -> Step {
+        let runs = self.runs();
+        let inside: usize = runs.iter().map(Range::len).sum();
+        let own = self.own.as_ref().map_or(0, Range::len);
+        let span = |run: &Range<usize>| x[run.end] - x[run.start - 1];
+        let ages = runs
+            .iter()
+            .flat_map(|run| run.clone().map(|row| x[row] - x[run.start - 1]));
+        let mean_age_s = ages.sum::<f64>() / own.max(1) as f64;
+        Step::Sparse {
+            channel: name.to_owned(),
+            how: how.name(),
+            own: own - inside,
+            rows: inside,
+            longest_s: runs.iter().map(span).fold(0.0, f64::max),
+            mean_age_s: (how == Sparse::Hold && mean_age_s.is_finite()).then_some(mean_age_s),
+        }
+    }
+
+    /// Gives each missing row inside a value.
+    fn close(&self, column: &mut Column, how: Sparse, x: &[f64]) {
+        let values = &mut column.values;
+        for run in self.runs() {
+            let (before, behind) = (run.start - 1, run.end);
+            let (a, b) = (values[before], values[behind]);
+            for row in run {
+                let share = (x[row] - x[before]) / (x[behind] - x[before]);
+                values[row] = match how {
+                    // Times that stand have no line between them.
+                    Sparse::Linear if share.is_finite() => a * (1.0 - share) + b * share,
+                    _ => a,
+                };
+            }
+        }
+        column.made.clone_from(&self.missing);
+        column.is_held = how == Sparse::Hold;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn column(values: &[f64]) -> Column {
+        Column {
+            name: "e".to_owned(),
+            values: values.to_vec(),
+            ..Column::default()
+        }
+    }
+
+    const GONE: f64 = f64::NAN;
+
+    #[test]
+    fn values_are_held_or_lie_on_lines_along_time() {
+        let x = [0.0, 0.1, 0.4, 0.5, 1.0, 1.1];
+        for (how, expected) in [
+            (Sparse::Hold, [1.0, 1.0, 1.0, 6.0, 6.0]),
+            (Sparse::Linear, [1.0, 2.0, 5.0, 6.0, 11.0]),
+        ] {
+            let mut e = column(&[1.0, GONE, GONE, 6.0, GONE, 12.0]);
+            Gaps::of(&e).close(&mut e, how, &x);
+            for (found, expected) in e.values.iter().zip(expected) {
+                assert!((found - expected).abs() < 1e-14, "{how}: {:?}", e.values);
+            }
+            assert_eq!((e.made, e.is_held), (vec![1, 2, 4], how == Sparse::Hold));
+        }
+        // Times that stand.
+        let mut e = column(&[1.0, GONE, 2.0]);
+        Gaps::of(&e).close(&mut e, Sparse::Linear, &[0.0; 3]);
+        assert_eq!(e.values, [1.0, 1.0, 2.0]);
+    }
+}

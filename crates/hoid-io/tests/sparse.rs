@@ -1,0 +1,261 @@
+//! Topics logged at instants of their own in one table: `--sparse`.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::collections::BTreeMap;
+
+use common::{Desk, defaults};
+use hoid_io::{QualityIssueKind, ReadOptions, Repair, Sparse, Step, read_segments};
+
+fn with(sparse: &[(&str, Sparse)]) -> ReadOptions {
+    ReadOptions {
+        sparse: sparse.iter().map(|(name, how)| ((*name).to_owned(), *how)).collect(),
+        ..defaults()
+    }
+}
+
+/// 100 Hz; u in every row, e in each third from the second, e = 10 t and u = 1 - t.
+fn thirds(rows: i32) -> String {
+    let row = |k: i32| {
+        let t = 0.01 * f64::from(k);
+        let e = if k % 3 == 1 {
+            format!("{:.1}", 10.0 * t)
+        } else {
+            String::new()
+        };
+        format!("{t:.4},{e},{:.2}\n", 1.0 - t)
+    };
+    "t,e,u\n".to_owned() + &(0..rows).map(row).collect::<String>()
+}
+
+#[test]
+fn values_are_held_between_their_own() {
+    let desk = Desk::new();
+    let read = desk.read(thirds(30), &with(&[("e", Sparse::Hold)])).unwrap();
+    // From the first value, in row 1, to the last, in row 28.
+    assert_eq!((read.record.len(), read.record.time_s(0)), (28, 0.01));
+    for (k, e) in read.record.input().iter().enumerate() {
+        let own = 1 + 3 * (k / 3);
+        assert!((e - 0.1 * own as f64).abs() < 1e-12, "{k}: {e}");
+    }
+    assert_eq!(
+        read.notes,
+        [
+            "1 rows at the start and 1 at the end are cut: a sparse column has no value before its first or after its last"
+        ]
+    );
+    let [
+        Step::Sparse {
+            how: "hold",
+            own: 10,
+            rows: 18,
+            longest_s,
+            mean_age_s: Some(age),
+            ..
+        },
+    ] = read.steps.as_slice()
+    else {
+        panic!("{:?}", read.steps);
+    };
+    // Ages of 0, 1 and 2 rows, the last row with one of 0.
+    assert!(
+        (longest_s - 0.03).abs() < 1e-12 && (age - 0.01 * 27.0 / 28.0).abs() < 1e-12,
+        "{age}"
+    );
+    // What is declared is no fault.
+    assert!(
+        read.quality_issues
+            .iter()
+            .all(|one| one.kind != QualityIssueKind::Missing)
+    );
+    let text = read.steps[0].to_string();
+    assert!(
+        text.starts_with("column e: 10 values of its own, 18 rows between them hold the last one"),
+        "{text}"
+    );
+}
+
+#[test]
+fn values_lie_on_lines_or_their_rows_are_dropped() {
+    let desk = Desk::new();
+    let read = desk.read(thirds(30), &with(&[("e", Sparse::Linear)])).unwrap();
+    assert_eq!(read.record.len(), 28);
+    for (k, e) in read.record.input().iter().enumerate() {
+        assert!((e - 0.1 * (k + 1) as f64).abs() < 1e-12, "{k}: {e}");
+    }
+    let read = desk.read(thirds(30), &with(&[("e", Sparse::Drop)])).unwrap();
+    assert_eq!(read.record.len(), 10);
+    assert!((read.record.sample_time().s() - 0.03).abs() < 1e-12);
+    for (k, (e, u)) in read.record.input().iter().zip(read.record.output()).enumerate() {
+        let t = 0.01 + 0.03 * k as f64;
+        assert!((e - 10.0 * t).abs() < 1e-12 && (u - (1.0 - t)).abs() < 1e-12, "{k}");
+    }
+    // Rows that are left must be even.
+    let uneven = thirds(30).replace("0.1000,1.0,", "0.1000,,");
+    let refused = desk.error(&uneven, &with(&[("e", Sparse::Drop)]));
+    assert!(refused.contains("--resample"), "{refused}");
+    let resampled = ReadOptions {
+        repair: Repair {
+            resample: true,
+            fill: false,
+        },
+        ..with(&[("e", Sparse::Drop)])
+    };
+    assert_eq!(desk.read(&uneven, &resampled).unwrap().record.len(), 10);
+}
+
+#[test]
+fn a_span_starts_with_what_was_logged_before_it() {
+    let desk = Desk::new();
+    let options = ReadOptions {
+        span_s: (Some(0.12), Some(0.2)),
+        ..with(&[("e", Sparse::Hold)])
+    };
+    let read = desk.read(thirds(30), &options).unwrap();
+    assert_eq!((read.record.len(), read.record.time_s(0)), (8, 0.12));
+    assert!(
+        (read.record.input()[0] - 1.0).abs() < 1e-12,
+        "{:?}",
+        read.record.input()
+    );
+}
+
+/// Two clocks of their own, 50 and 40 Hz: the grid is that of the faster one, as with `--fill`.
+#[test]
+fn topics_of_two_clocks_are_resampled_after_the_step() {
+    let desk = Desk::new();
+    let mut rows: Vec<(f64, bool)> = (0..50).map(|k| (0.02 * f64::from(k), true)).collect();
+    rows.extend((0..40).map(|k| (0.013 + 0.025 * f64::from(k), false)));
+    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let row = |(t, is_e): (f64, bool)| match is_e {
+        true => format!("{t:.3},{},\n", 10.0 * t),
+        false => format!("{t:.3},,{}\n", 1.0 - t),
+    };
+    let text = "t,e,u\n".to_owned() + &rows.into_iter().map(row).collect::<String>();
+    let resample = Repair {
+        resample: true,
+        fill: false,
+    };
+    let options = ReadOptions {
+        repair: resample,
+        ..with(&[("e", Sparse::Linear), ("u", Sparse::Hold)])
+    };
+    let read = desk.read(&text, &options).unwrap();
+    assert!((read.record.sample_time().s() - 0.02).abs() < 1e-12);
+    for k in 0..read.record.len() {
+        let t = read.record.time_s(k);
+        // The last of u: held on the grid too, and not on a line to the next.
+        let last = 0.013 + 0.025 * ((t - 0.013 + 1e-9) / 0.025).floor();
+        let (e, u) = (read.record.input()[k], read.record.output()[k]);
+        assert!(
+            (e - 10.0 * t).abs() < 1e-12 && (u - (1.0 - last)).abs() < 1e-12,
+            "{t}: {e} {u}"
+        );
+    }
+    let names: Vec<&str> = read.steps.iter().map(Step::name).collect();
+    assert_eq!(names, ["sparse", "sparse", "interpolate"]);
+}
+
+#[test]
+fn without_the_option_all_is_as_before_and_the_remedy_is_named() {
+    let desk = Desk::new();
+    let refused = desk.error(thirds(60), &defaults());
+    assert!(
+        refused.contains("--sparse e=hold") && refused.contains("--fill"),
+        "{refused}"
+    );
+    let filled = ReadOptions {
+        repair: Repair {
+            resample: false,
+            fill: true,
+        },
+        ..defaults()
+    };
+    let read = desk.read(thirds(60), &filled).unwrap();
+    assert!(
+        read.notes.iter().any(|note| note.contains("--sparse e=hold holds")),
+        "{:?}",
+        read.notes
+    );
+    // A dropout is no sparse column.
+    let dropout = "t,e,u\n".to_owned()
+        + &(0..60)
+            .map(|k| format!("{k},{},1\n", if k == 9 { String::new() } else { k.to_string() }))
+            .collect::<String>();
+    assert!(!desk.error(dropout, &defaults()).contains("--sparse"));
+}
+
+#[test]
+fn what_cannot_be_done_is_refused() {
+    let desk = Desk::new();
+    let refused = |text: &str, sparse: &[(&str, Sparse)]| desk.error(text, &with(sparse));
+    let text = thirds(30);
+    for (text, name, words) in [
+        (
+            text.as_str(),
+            "stick",
+            "there is no column \"stick\", expected one of t, e, u",
+        ),
+        (text.as_str(), "t", "t is the time"),
+        ("t,e,u\n0,,1\n1,,2\n2,,1\n", "e", "column e has no value in 3 rows"),
+    ] {
+        for how in Sparse::ALL {
+            let message = refused(text, &[(name, how)]);
+            assert!(message.contains(words) && message.contains("sparse"), "{message}");
+        }
+    }
+    let apart = refused(
+        "t,e,u\n0,1,\n1,2,\n2,,1\n3,,2\n",
+        &[("e", Sparse::Hold), ("u", Sparse::Hold)],
+    );
+    assert!(
+        apart.contains("no row between the first and the last value of each of e, u"),
+        "{apart}"
+    );
+    assert!(
+        "held"
+            .parse::<Sparse>()
+            .unwrap_err()
+            .to_string()
+            .contains("hold, linear or drop")
+    );
+    // Text and infinite numbers are no missing values.
+    for bad in ["lost", "inf"] {
+        let spoilt = text.replace("0.1000,1.0,", &format!("0.1000,{bad},"));
+        assert!(refused(&spoilt, &[("e", Sparse::Hold)]).contains(bad));
+    }
+    // Nothing to do is reported.
+    let read = desk
+        .read(&text, &with(&[("e", Sparse::Hold), ("u", Sparse::Drop)]))
+        .unwrap();
+    assert!(
+        read.notes
+            .iter()
+            .any(|note| note.contains("column u has a value in every row")),
+        "{:?}",
+        read.notes
+    );
+}
+
+#[test]
+fn e_and_u_are_input_and_output_and_masks_see_the_column_whole() {
+    let desk = Desk::new();
+    let text = thirds(300).replace("t,e,u", "t,error,stick");
+    let options = ReadOptions {
+        input: Some("error".parse().unwrap()),
+        output: "stick".parse().unwrap(),
+        ..with(&[("e", Sparse::Linear)])
+    };
+    let read = desk.read(&text, &options).unwrap();
+    assert_eq!(read.record.len(), 298);
+    let twice = ReadOptions {
+        sparse: BTreeMap::from([("e".to_owned(), Sparse::Hold), ("error".to_owned(), Sparse::Hold)]),
+        ..options.clone()
+    };
+    assert!(desk.error(&text, &twice).contains("named twice"));
+    desk.read(&text, &options).unwrap();
+    let mask = [QualityIssueKind::Missing];
+    let all = read_segments(&desk.path("run.csv"), &options, &Default::default(), &mask, 1.0).unwrap();
+    assert_eq!(all.iter().map(|read| read.record.len()).collect::<Vec<_>>(), [298]);
+}
