@@ -724,3 +724,36 @@ fn a_delay_is_followed_by_rpem_and_the_windup_guard_is_told() {
     assert!((tau - 0.28).abs() < 0.03, "{tau}");
     assert!(column(&trace(d), "tau_e").iter().all(|tau| (0.2..=0.4).contains(tau)));
 }
+
+#[test]
+fn the_methods_are_listed_without_a_record() {
+    let directory = TempDir::new().unwrap();
+    let text = good(directory.path(), &["track", "--methods"]);
+    let lines: Vec<&str> = text.lines().collect();
+    assert!(lines[0].starts_with("adaptive        default"), "{text}");
+    assert!(
+        lines.iter().any(|line| line.starts_with("dual-ekf        survey")),
+        "{text}"
+    );
+    let all = json(directory.path(), &["track", "--methods", "--json"]);
+    let all = all.as_array().unwrap();
+    assert_eq!(all.len(), lines.len());
+    assert_eq!(all[0]["name"], "adaptive");
+    assert_eq!(all[0]["default"], true);
+    assert!(all.iter().all(|one| !one["structures"].as_array().unwrap().is_empty()));
+    // A record belongs to the command without it.
+    let (code, message) = bad(directory.path(), &["track"]);
+    assert!(code == 2 && message.contains("RECORD"), "{message}");
+    assert_eq!(bad(directory.path(), &["track", "c.csv", "--methods"]).0, 2);
+}
+
+#[test]
+fn a_method_that_is_no_recursion_says_so() {
+    let directory = TempDir::new().unwrap();
+    for (typed, name) in [("wavelet", "wavelet"), ("lpv", "lpv-subspace")] {
+        let (code, message) = bad(directory.path(), &["track", "c.csv", "--method", typed]);
+        assert_eq!(code, 2);
+        assert!(message.contains(&format!("{name} is no recursion")), "{message}");
+        assert!(message.contains("survey_methods"), "{message}");
+    }
+}

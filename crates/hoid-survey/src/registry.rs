@@ -73,6 +73,30 @@ pub fn registry() -> Vec<MethodSpec> {
     methods().iter().map(Method::spec).collect()
 }
 
+/// A recursive method as it is listed for users.
+#[derive(Debug, Clone)]
+pub struct ListedMethod {
+    /// Its description.
+    pub spec: MethodSpec,
+    /// True for the method that is taken if none is named.
+    pub is_default: bool,
+    /// True for a method of the survey.
+    pub is_for_comparison: bool,
+}
+
+/// Returns all methods as a list for users: the default first, those of the survey last.
+pub fn listed() -> Vec<ListedMethod> {
+    let default = Method::default();
+    let of = |method: &Method| ListedMethod {
+        spec: method.spec(),
+        is_default: method.name() == default.name(),
+        is_for_comparison: is_for_comparison(method),
+    };
+    let mut all: Vec<ListedMethod> = methods().iter().map(of).collect();
+    all.sort_by_key(|one| (!one.is_default, one.is_for_comparison));
+    all
+}
+
 /// Converts a typed name to the form of the list.
 fn plain(text: &str) -> String {
     text.trim().to_ascii_lowercase()
@@ -143,6 +167,17 @@ mod tests {
             assert!(spec.settings.iter().all(|s| !s.help.is_empty()), "{method}");
         }
         assert!(method("kalman").unwrap_err().to_string().contains("rpem, physical"));
+    }
+
+    #[test]
+    fn the_list_starts_with_the_default_and_ends_with_the_survey() {
+        let all = listed();
+        let names: Vec<&str> = all.iter().map(|one| one.spec.name).collect();
+        assert_eq!(names[..4], ["adaptive", "rls", "rpem", "physical"]);
+        assert_eq!(all.len(), methods().len());
+        assert_eq!(all.iter().filter(|one| one.is_default).count(), 1);
+        assert_eq!(all.iter().position(|one| one.is_for_comparison), Some(3));
+        assert!(all[3..].iter().all(|one| one.is_for_comparison));
     }
 
     #[test]

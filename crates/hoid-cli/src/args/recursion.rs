@@ -13,6 +13,7 @@ use hoid::ident::{
 use hoid::io::{Scaling, readable_endings, writable_endings};
 use hoid::model::{ContinuousTransferFunction, Structure};
 use hoid::survey::is_for_comparison;
+use hoid::thesis::comparators;
 use hoid::track::Method;
 
 use super::{
@@ -66,10 +67,13 @@ pub struct RecursionArgs {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct TrackArgs {
-    #[arg(value_name = "RECORD", help = format!("Record file: {}", readable_endings()))]
-    pub record: PathBuf,
+    #[arg(value_name = "RECORD", required_unless_present = "methods", help = format!("Record file: {}", readable_endings()))]
+    pub record: Option<PathBuf>,
     #[command(flatten)]
     pub read: ReadArgs,
+    /// List all methods, those for comparison too: what each is, its structures and its source. No RECORD is read
+    #[arg(long, conflicts_with = "record")]
+    pub methods: bool,
     #[command(flatten)]
     pub recursion: RecursionArgs,
     /// Span of the start fit, s, for methods that have one [default: the first third of the record]
@@ -158,7 +162,10 @@ fn method_help() -> String {
         .filter(|of| is_for_comparison(of))
         .map(Method::name)
         .collect();
-    format!("The recursion. For comparison there are also {}", others.join(", "))
+    format!(
+        "The recursion. For comparison there are also {}; hoid track --methods lists all",
+        others.join(", ")
+    )
 }
 
 /// The recursive methods, each with its line of help.
@@ -168,7 +175,12 @@ pub(super) fn method_names() -> impl TypedValueParser<Value = String> {
         let value = PossibleValue::new(name).help(help).aliases(method.earlier_name());
         value.hide(is_for_comparison(&method))
     };
-    PossibleValuesParser::new(hoid::survey::methods().into_iter().map(value)).map(|name| name.to_lowercase())
+    let batch = comparators::names().map(|(name, _)| PossibleValue::new(name).hide(true));
+    let all = hoid::survey::methods().into_iter().map(value).chain(batch);
+    PossibleValuesParser::new(all).try_map(|name| match comparators::not_a_recursion(&name) {
+        Some(reason) => Err(reason),
+        None => Ok(name.to_lowercase()),
+    })
 }
 
 fn parse_count(text: &str) -> Result<usize, String> {

@@ -50,5 +50,33 @@ pub fn comparators() -> Vec<Box<dyn Comparator>> {
     ]
 }
 
+/// Why a comparator, by its name or the first word of it, cannot follow a recording as a recursion does, and the command
+/// that runs it; `None` for a name that no comparator has.
+pub fn not_a_recursion(name: &str) -> Option<String> {
+    let typed = name.trim().to_ascii_lowercase();
+    let about = names().find(|(word, _)| *word == typed)?.1;
+    let About {
+        name,
+        help,
+        source,
+        told,
+    } = about;
+    Some(format!(
+        "{name} is no recursion over a recording: {help} ({source}), which has to know {told}. It follows simulated runs \
+         only: cargo run --release -p hoid-evidence --example survey_methods. For recordings there are the methods of \
+         hoid track --methods, and hoid describe for the response at the lines of an excitation"
+    ))
+}
+
+/// The names under which [`not_a_recursion`] knows the comparators: each with its first word, as `lpv`.
+pub fn names() -> impl Iterator<Item = (&'static str, About)> {
+    let batch = comparators().into_iter().map(|one| one.about());
+    batch.filter(|about| !about.told.is_empty()).flat_map(|about| {
+        let first = about.name.split('-').next().unwrap_or(about.name);
+        let short = (first != about.name && first != "rpem").then_some((first, about));
+        [Some((about.name, about)), short].into_iter().flatten()
+    })
+}
+
 #[cfg(test)]
 mod tests;

@@ -12,7 +12,7 @@ use num_complex::Complex64;
 
 use super::{
     comparator::{Task, response_of},
-    comparators,
+    comparators, names, not_a_recursion,
 };
 
 /// A record at 100 Hz.
@@ -171,4 +171,24 @@ fn silence_and_samples_beyond_the_record_are_refused_by_all() {
         let refused = comparator.follow(&beyond).unwrap_err().to_string();
         assert!(refused.contains("8192"), "{refused}");
     }
+}
+
+#[test]
+fn what_is_no_recursion_says_what_it_is_and_where_it_runs() {
+    for (typed, words) in [
+        ("wavelet", "what was before"),
+        ("lpv", "lpv-subspace is no recursion"),
+        ("LPV-subspace", "the whole record"),
+    ] {
+        let message = not_a_recursion(typed).unwrap();
+        assert!(
+            message.contains(words) && message.contains("survey_methods"),
+            "{message}"
+        );
+    }
+    for typed in ["rpem", "rls-fir", "kalman", ""] {
+        assert_eq!(not_a_recursion(typed), None, "{typed}");
+    }
+    let all: BTreeSet<&str> = names().map(|(name, _)| name).collect();
+    assert_eq!(all.len(), names().count());
 }

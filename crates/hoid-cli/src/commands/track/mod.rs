@@ -1,5 +1,6 @@
 //! `hoid track`: a recursive estimate over a record, with its trace in a file.
 
+mod methods;
 mod page;
 mod report;
 mod run;

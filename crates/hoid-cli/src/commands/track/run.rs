@@ -5,7 +5,7 @@ use std::path::Path;
 use hoid::io::{check_table_path, write_table};
 use serde_json::Value;
 
-use super::{page, report};
+use super::{methods, page, report};
 use crate::{
     args::TrackArgs,
     commands::{figure, output_paths, paper_table, reading},
@@ -14,6 +14,10 @@ use crate::{
 };
 
 pub fn run(args: &TrackArgs) -> Result<(), CliError> {
+    let record = match &args.record {
+        Some(record) if !args.methods => record.as_path(),
+        _ => return methods::list(args.show.json),
+    };
     if let Some(path) = &args.out {
         check_table_path(path)?;
     }
@@ -31,7 +35,7 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
         figure::check(path)?;
     }
     let inputs: Vec<&Path> = [
-        Some(args.record.as_path()),
+        Some(record),
         args.validate.as_deref(),
         recursion::prior_file(&args.recursion),
     ]
@@ -50,7 +54,7 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     )?;
     let tracking = recursion::tracking(args)?;
     let reading = reading::of(&args.read, None, tracking.recursion.structure().has_input())?;
-    let read = reading.file(&args.record, reading::told)?;
+    let read = reading.file(record, reading::told)?;
     reading::say_kept(read.kept_rate(tracking.rate, tracking.recursion.counts_samples()));
     let other = args.validate.as_deref();
     let other = other.map(|path| reading.file(path, reading::told)).transpose()?;

@@ -1,0 +1,48 @@
+//! `hoid track --methods`: the list of the recursive methods.
+
+use hoid::survey::{ListedMethod, listed};
+use serde_json::{Value, json};
+
+use crate::{error::CliError, json, output};
+
+/// Prints the methods, one on a line, or as a list in JSON.
+pub fn list(as_json: bool) -> Result<(), CliError> {
+    let all = listed();
+    if as_json {
+        return json::print(&Value::Array(all.iter().map(object).collect()));
+    }
+    let lines: String = all.iter().map(line).collect();
+    output::print(&lines)
+}
+
+fn structures(one: &ListedMethod) -> Vec<&'static str> {
+    one.spec.structures.iter().map(|structure| structure.name()).collect()
+}
+
+fn line(one: &ListedMethod) -> String {
+    let mark = match (one.is_default, one.is_for_comparison) {
+        (true, _) => "default",
+        (_, true) => "survey",
+        _ => "",
+    };
+    let spec = &one.spec;
+    format!(
+        "{:15} {mark:8} {} ({}; {})\n",
+        spec.name,
+        spec.help,
+        structures(one).join(", "),
+        spec.source
+    )
+}
+
+fn object(one: &ListedMethod) -> Value {
+    let spec = &one.spec;
+    json!({
+        "name": spec.name,
+        "help": spec.help,
+        "source": spec.source,
+        "structures": structures(one),
+        "default": one.is_default,
+        "survey": one.is_for_comparison,
+    })
+}
