@@ -146,7 +146,12 @@ impl CliError {
             | Self::Design(DesignError::OutOfRange { .. } | DesignError::NotThere { .. })
             | Self::Io(IoError::OutputIsInput { .. } | IoError::OutputAmongInputs { .. })
             | Self::Study(StudyError::Io(IoError::OutputIsInput { .. } | IoError::OutputAmongInputs { .. }))
-            | Self::Study(StudyError::Plan { .. } | StudyError::BadShard { .. } | StudyError::Pattern { .. }) => 2,
+            | Self::Study(
+                StudyError::Plan { .. }
+                | StudyError::BadShard { .. }
+                | StudyError::Pattern { .. }
+                | StudyError::NoManifest { .. },
+            ) => 2,
             Self::Stopped(_) => u8::try_from(interrupt::exit_code()).unwrap_or(1),
             _ => 1,
         }

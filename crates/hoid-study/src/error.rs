@@ -131,6 +131,18 @@ pub enum StudyError {
         /// The problem.
         reason: String,
     },
+    /// A missing manifest of a group.
+    #[error("there is no {path}; `hoid group init DIR` writes one")]
+    NoManifest {
+        /// The manifest.
+        path: String,
+    },
+    /// A recorded run that cannot be read.
+    #[error("{reason}")]
+    Recording {
+        /// File, reason and remedy.
+        reason: String,
+    },
     /// A directory without runs.
     #[error(
         "no file in {directory} is called {pattern}; it has {found}: state by --pattern what their names mean, as {{subject}}_{{run}}.csv"

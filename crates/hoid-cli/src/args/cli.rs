@@ -80,7 +80,7 @@ pub enum Command {
     ///
     /// `hoid group init DIR` inspects the files and writes a manifest; `hoid group DIR --out OUT` fits
     /// each run, and each person in each condition, and writes tables and pages.
-    Group(GroupArgs),
+    Group(Box<GroupArgs>),
     /// Test differences between conditions or people
     ///
     /// Estimates the differences between the conditions or people of a group, with intervals, tests, effect sizes and a

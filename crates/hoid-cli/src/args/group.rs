@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use hoid::model::{Form, scenario::Condition};
 use hoid::sim::people::{Plant, RemnantKind};
-use hoid::study::group::SamplingDefect;
+use hoid::study::group::{ConditionElement, SamplingDefect};
 
 use super::{choices::choice_of, figure::FigureArgs, look::LookArgs, parse::parse_span, show::ShowArgs};
 
@@ -56,12 +56,21 @@ pub struct GroupInitArgs {
     /// Directory with one file a run
     #[arg(value_name = "DIR")]
     pub directory: PathBuf,
-    /// Names of the files: {subject}, {condition} and {run} represent what is taken from them, *
-    /// for anything
+    /// Names of the files: {subject}, {condition}, {axis} and {run} represent what is taken from them, *
+    /// for anything; the condition of an axis is CONDITION-AXIS
     #[arg(long, value_name = "PATTERN", default_value = "{subject}_{condition}_{run}.csv")]
     pub pattern: String,
     #[command(flatten)]
     pub look: LookArgs,
+    /// Controlled element of the named conditions, and where it changes the element after it, the time in
+    /// s, and the rate G in 1/s (left out: sudden); * matches anything. May be repeated
+    #[arg(
+        long,
+        value_name = "NAMES=ELEMENT[>ELEMENT@S[:G]]",
+        allow_hyphen_values = true,
+        conflicts_with = "controlled_element"
+    )]
+    pub element: Vec<ConditionElement>,
     /// Samples by which the control is recorded later than the error that it answers
     /// [default: by the controlled element, else 0]
     #[arg(long, value_name = "N", allow_hyphen_values = true)]

@@ -1,5 +1,6 @@
 //! Known properties of a condition: the keys of `[conditions.NAME]`.
 
+use hoid_model::ContinuousTransferFunction;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +10,8 @@ use super::preparation_settings::PreparationSettings;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ConditionSettings {
-    /// Controlled element, as `90/(s(s+6))` or `90/1,6,0` (by descending powers of s).
+    /// Controlled element, as `90/(s(s+6))` or `90/1,6,0` (by descending powers of s); before the change where there
+    /// is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub controlled_element: Option<String>,
     /// Channel whose lines excite the loop: f_t or a disturbance.
@@ -25,7 +27,56 @@ pub struct ConditionSettings {
     /// Time at which the task changes, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub change_s: Option<f64>,
+    /// Controlled element after the change.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub changes_to: Option<String>,
+    /// Rate G of the change, 1/s: a share `1/(1 + exp(-G (t - change_s)))` of the new element at t; sudden where it
+    /// is left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub change_per_s: Option<f64>,
     /// Treatment of its runs before they are analysed; what it names wins over that of the group.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prepare: Option<PreparationSettings>,
+}
+
+impl ConditionSettings {
+    /// The controlled element of the whole run; none where it changes.
+    pub fn lasting_element(&self) -> Option<&str> {
+        match self.changes_to {
+            None => self.controlled_element.as_deref(),
+            Some(_) => None,
+        }
+    }
+
+    /// Checks the controlled elements and the change of one to the other.
+    ///
+    /// # Errors
+    /// The key, what is wrong with it, and the remedy.
+    pub(super) fn check_elements(&self) -> Result<(), String> {
+        let elements = [
+            ("controlled_element", &self.controlled_element),
+            ("changes_to", &self.changes_to),
+        ];
+        for (key, element) in elements {
+            if let Some(element) = element {
+                element
+                    .parse::<ContinuousTransferFunction>()
+                    .map_err(|reason| format!("{key}: {reason}"))?;
+            }
+        }
+        if self.changes_to.is_some() && (self.controlled_element.is_none() || self.change_s.is_none()) {
+            return Err(
+                "changes_to: name controlled_element, from which it changes, and change_s, the time".to_owned(),
+            );
+        }
+        match self.change_per_s {
+            Some(_) if self.changes_to.is_none() => {
+                Err("change_per_s: name changes_to, the element after it".to_owned())
+            }
+            Some(rate) if !(rate.is_finite() && rate > 0.0) => Err(format!(
+                "change_per_s is {rate}, expected a rate above 0; without it the change is sudden"
+            )),
+            _ => Ok(()),
+        }
+    }
 }

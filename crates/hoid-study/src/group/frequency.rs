@@ -167,7 +167,7 @@ fn of_records(
     if records.is_empty() {
         return Err("no run could be read".to_owned());
     }
-    let element = facts.controlled_element.as_deref();
+    let element = facts.lasting_element();
     let element: Option<ContinuousTransferFunction> = element
         .map(str::parse)
         .transpose()

@@ -33,11 +33,9 @@
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
-    str::FromStr,
 };
 
 use hoid_io::Preparation;
-use hoid_model::ContinuousTransferFunction;
 use hoid_model::Decimation;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -106,6 +104,24 @@ fn is_yes(counts: &bool) -> bool {
 }
 
 impl Manifest {
+    /// The manifest of a directory, or the named one.
+    ///
+    /// # Errors
+    /// [`StudyError::NoManifest`] if there is none.
+    pub fn place(named: &Path) -> Result<PathBuf, StudyError> {
+        let path = if named.is_dir() {
+            named.join(MANIFEST)
+        } else {
+            named.to_owned()
+        };
+        if path.exists() {
+            return Ok(path);
+        }
+        Err(StudyError::NoManifest {
+            path: path.display().to_string(),
+        })
+    }
+
     /// Reads and checks a manifest.
     ///
     /// # Errors
@@ -168,10 +184,9 @@ impl Manifest {
             }
         }
         for (name, facts) in &self.conditions {
-            if let Some(element) = &facts.controlled_element {
-                ContinuousTransferFunction::from_str(element)
-                    .map_err(|reason| format!("[conditions.{name}]: controlled_element: {reason}"))?;
-            }
+            facts
+                .check_elements()
+                .map_err(|reason| format!("[conditions.{name}]: {reason}"))?;
         }
         self.prepare
             .preparation(None)
@@ -198,12 +213,12 @@ impl Manifest {
                 Some(found) => runs.push(RunEntry {
                     file: PathBuf::from(&name),
                     then: None,
+                    condition: found.condition_of_axis(),
                     subject: if found.subject.is_empty() {
                         "1".to_owned()
                     } else {
                         found.subject
                     },
-                    condition: found.condition,
                     run: found.run,
                     counts: true,
                 }),

@@ -4,10 +4,11 @@
 //! |---|---|
 //! | [`Manifest`] | which file is which run of which subject, and what is done with it |
 //! | [`ReadSettings`], [`PreparationSettings`], [`AnalysisSettings`], [`ConditionSettings`] | its tables: how runs are read, prepared and analysed, and the prior knowledge of a condition |
+//! | [`ConditionElement`] | controlled elements of conditions as one text |
 //! | [`inspect`], [`commented`] | a manifest completed by what the files state, with the evidence |
 //! | [`Pattern`] | subject, condition and run from names of files |
 //! | [`run_group`] | the analysis in a directory, part by part |
-//! | `reading` | runs from files, and the processing of them |
+//! | `reading` | runs from files, and the processing of them; one of them: [`RecordedRun`] |
 //! | `analysis` | what is done with the runs of a person in a condition (`block`) and with one run, in which `windows`, with which orders (`run_orders`), and the rows of it (`run_rows`) |
 //! | `family_fits`, [`Person`] | the operator of a person in a condition, and its row in the table of people |
 //! | [`RunEstimates`] | what was found in each run, read back from the tables |
@@ -30,6 +31,7 @@ mod analysis;
 mod analysis_settings;
 mod averages;
 mod block;
+mod condition_element;
 mod condition_settings;
 mod family_fits;
 mod frequency;
@@ -57,6 +59,7 @@ mod virtual_subjects;
 mod windows;
 
 pub use analysis_settings::AnalysisSettings;
+pub use condition_element::ConditionElement;
 pub use condition_settings::ConditionSettings;
 pub use inspection::{Evidence, commented, inspect};
 pub use manifest::{MANIFEST, Manifest, RunEntry};
@@ -64,6 +67,7 @@ pub use pattern::{FileNameParts, Pattern};
 pub use person::{Person, PersonStatus};
 pub use preparation_settings::{NumberOrText, PreparationSettings};
 pub use read_settings::{Detrending, FaultTreatment, ReadSettings};
+pub use reading::RecordedRun;
 pub use run::run_group;
 pub use run_estimates::RunEstimates;
 pub use sampling_defects::SamplingDefect;

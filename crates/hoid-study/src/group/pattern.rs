@@ -26,11 +26,24 @@ pub struct FileNameParts {
     pub subject: String,
     /// `{condition}`; empty if the pattern has none.
     pub condition: String,
+    /// `{axis}`; empty if the pattern has none.
+    pub axis: String,
     /// `{run}`.
     pub run: String,
 }
 
-const NAMES: [&str; 3] = ["subject", "condition", "run"];
+impl FileNameParts {
+    /// The condition of the axis, such as `C3-roll`: each axis has its own controlled element and operator.
+    pub fn condition_of_axis(&self) -> String {
+        match (self.condition.as_str(), self.axis.as_str()) {
+            (condition, "") => condition.to_owned(),
+            ("", axis) => axis.to_owned(),
+            (condition, axis) => format!("{condition}-{axis}"),
+        }
+    }
+}
+
+const NAMES: [&str; 4] = ["subject", "condition", "axis", "run"];
 
 impl fmt::Display for Pattern {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -65,7 +78,7 @@ impl Pattern {
                     .ok_or_else(|| bad("a brace is not closed".to_owned()))?;
                 if !NAMES.contains(&name) {
                     return Err(bad(format!(
-                        "{{{name}}} is not a name, expected {{subject}}, {{condition}} or {{run}}"
+                        "{{{name}}} is not a name, expected {{subject}}, {{condition}}, {{axis}} or {{run}}"
                     )));
                 }
                 if parts.contains(&Part::Name(name.to_owned())) {
@@ -95,6 +108,18 @@ impl Pattern {
     }
 }
 
+/// Whether a text is that of a pattern in which only `*` has a meaning.
+pub(super) fn matches_any(pattern: &str, text: &str) -> bool {
+    let mut parts = Vec::new();
+    for (i, fixed) in pattern.split('*').enumerate() {
+        if i > 0 {
+            parts.push(Part::Any);
+        }
+        parts.push(Part::Text(fixed.to_owned()));
+    }
+    found_in(&parts, text, &mut FileNameParts::default())
+}
+
 fn found_in(parts: &[Part], text: &str, found: &mut FileNameParts) -> bool {
     let Some((first, rest)) = parts.split_first() else {
         return text.is_empty();
@@ -113,6 +138,7 @@ fn found_in(parts: &[Part], text: &str, found: &mut FileNameParts) -> bool {
                 match name.as_str() {
                     "subject" => found.subject = value,
                     "condition" => found.condition = value,
+                    "axis" => found.axis = value,
                     _ => found.run = value,
                 }
             }
@@ -140,6 +166,18 @@ mod tests {
         let found = loose.matches("s7-C4-run12.mat").unwrap();
         assert_eq!((found.subject.as_str(), found.run.as_str()), ("7", "12"));
         assert_eq!(loose.matches("s-run1.csv"), None);
+    }
+
+    #[test]
+    fn an_axis_is_a_part_of_the_condition() {
+        let of = |pattern: &str, name: &str| {
+            let found = Pattern::new(pattern).unwrap().matches(name).unwrap();
+            (found.condition_of_axis(), found.run)
+        };
+        let both = of("{subject}_{condition}_{axis}_{run}.csv", "A1_C3_roll_6.csv");
+        assert_eq!(both, ("C3-roll".to_owned(), "6".to_owned()));
+        assert_eq!(of("{subject}_{axis}_{run}.csv", "A1_roll_6.csv").0, "roll");
+        assert_eq!(of("{subject}_{condition}_{run}.csv", "A1_C3_6.csv").0, "C3");
     }
 
     #[test]

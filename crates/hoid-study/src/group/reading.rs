@@ -13,7 +13,7 @@ use super::{
     manifest::{Manifest, RunEntry},
     read_settings::Detrending,
 };
-use crate::columns::Rows;
+use crate::{StudyError, columns::Rows};
 
 /// Alignment of the output with the input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -199,6 +199,31 @@ impl Run {
 /// Reads a run.
 pub(super) fn read_run(manifest: &Manifest, base: &Path, entry: &RunEntry, pairing: Pairing) -> Result<Run, String> {
     run_of(read_files(manifest, base, entry, pairing))
+}
+
+/// A run as a group analyses it, for other analyses.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordedRun {
+    /// The prepared record.
+    pub record: Record,
+    /// Time at which the task changes: by the manifest, or the seam of two joined files.
+    pub change_s: Option<f64>,
+}
+
+impl RecordedRun {
+    /// Reads and prepares a run of a manifest; file names are relative to `base`. Rows of e and u are aligned.
+    ///
+    /// # Errors
+    /// [`StudyError::Recording`] with file, reason and remedy.
+    pub fn read(manifest: &Manifest, base: &Path, entry: &RunEntry) -> Result<Self, StudyError> {
+        let run =
+            read_run(manifest, base, entry, Pairing::InTheLoop).map_err(|reason| StudyError::Recording { reason })?;
+        let facts = manifest.conditions.get(&entry.condition);
+        Ok(Self {
+            record: run.record,
+            change_s: run.seam_s.or(facts.and_then(|facts| facts.change_s)),
+        })
+    }
 }
 
 /// The run of one file, or joined from two.

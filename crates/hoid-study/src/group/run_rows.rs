@@ -62,7 +62,7 @@ impl<'a> RunRows<'a> {
         let columns = TraceColumns::of(&manifest.analysis);
         Self {
             entry,
-            element: condition.controlled_element.as_deref().and_then(|e| e.parse().ok()),
+            element: condition.lasting_element().and_then(|e| e.parse().ok()),
             condition,
             input_lead_s: 0.0,
             estimates: Rows::new(&estimates_schema()),

@@ -13,6 +13,7 @@ use std::path::Path;
 use hoid_io::{ColumnKind, ColumnSchema, TableSchema};
 use hoid_model::{
     Record,
+    controlled_element::ControlledElement,
     remnant_gain::NoiseDefinition,
     scenario::{Condition, RemnantStrength, Scenario},
     uncertainty::OperatorEstimate,
@@ -84,14 +85,13 @@ pub fn simulate_group(
     let facts = |condition: &Condition| {
         let scenario = Scenario::condition(*condition);
         let change_s = scenario.schedule.change_s();
-        let element = scenario.initial.controlled_element;
+        let text = |element: ControlledElement| format!("{}/1,{},0", element.k_c, element.omega_b_rad_s);
         let facts = ConditionSettings {
-            // The controlled element in the whole run.
-            controlled_element: change_s
-                .is_none()
-                .then(|| format!("{}/1,{},0", element.k_c, element.omega_b_rad_s)),
+            controlled_element: Some(text(scenario.initial.controlled_element)),
             excitation: Some("f_t".to_owned()),
             change_s,
+            changes_to: change_s.map(|_| text(scenario.last.controlled_element)),
+            change_per_s: scenario.schedule.rate_per_s(),
             ..ConditionSettings::default()
         };
         (condition.to_string(), facts)

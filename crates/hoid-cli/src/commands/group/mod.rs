@@ -13,8 +13,8 @@ use hoid::sim::people::{Population, Range};
 use hoid::study::{
     RunOptions,
     group::{
-        GroupSummary, MANIFEST, Manifest, Pattern, PeopleExperiment, VirtualExperiment, commented, inspect, run_group,
-        simulate_group, simulate_people,
+        ConditionElement, GroupSummary, MANIFEST, Manifest, Pattern, PeopleExperiment, VirtualExperiment, commented,
+        inspect, run_group, simulate_group, simulate_people,
     },
 };
 
@@ -116,6 +116,8 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
         ..args.look.known()
     };
     let evidence = inspect(&mut manifest, &args.directory, &known)?;
+    ConditionElement::apply(&args.element, &mut manifest)
+        .map_err(|reason| CliError::Usage(format!("--element: {reason}")))?;
     if args.out.is_some() {
         // File names are relative to the manifest.
         let directory = args.directory.canonicalize().unwrap_or_else(|_| args.directory.clone());
@@ -153,27 +155,17 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
 }
 
 fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError> {
-    let path = if path.is_dir() {
-        path.join(MANIFEST)
-    } else {
-        path.to_owned()
-    };
-    if !path.exists() {
-        return Err(CliError::Usage(format!(
-            "there is no {}; `hoid group init DIR` writes one",
-            path.display()
-        )));
-    }
+    let path = &Manifest::place(path)?;
     if let Some(figure) = &args.picture.figure {
         figure::check(figure)?;
-        output_paths::check(&[&path], &[Some(figure)], &[])?;
+        output_paths::check(&[path], &[Some(figure)], &[])?;
     }
     paper_table::check(&args.show)?;
-    output_paths::check(&[&path], &[args.show.table.as_deref()], &[])?;
-    let manifest = Manifest::read(&path)?;
+    output_paths::check(&[path], &[args.show.table.as_deref()], &[])?;
+    let manifest = Manifest::read(path)?;
     // A resumed group writes no manifest.
     if !args.resume {
-        hoid::io::check_output_directory(out, &[&path])?;
+        hoid::io::check_output_directory(out, &[path])?;
     }
     let base = path.parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf);
     let runs = manifest.runs.iter().filter(|run| run.counts).count();
@@ -187,7 +179,7 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
         run_group(&manifest, &base, out, &options, progress, go_on)
     })?;
     let summary = GroupSummary::read(&manifest, out)?;
-    let pages = shown(&write_group_pages(&manifest, &path, out)?);
+    let pages = shown(&write_group_pages(&manifest, path, out)?);
     if let Some(place) = &args.picture.figure {
         draw(&group_figures(&manifest, out)?, place, args.picture.width)?;
     }
