@@ -191,19 +191,21 @@ type Reproduced = (PathBuf, usize, Option<[usize; 5]>);
 
 /// Makes the tables, figures and claims of the thesis; `None` after an interrupt.
 #[pyfunction]
-#[pyo3(signature = (directory, *, only, replications, jobs, progress))]
+#[pyo3(signature = (directory, *, only, replications, jobs, recordings, progress))]
 pub fn reproduce(
     py: Python<'_>,
     directory: PathBuf,
     only: Vec<String>,
     replications: u64,
     jobs: Option<usize>,
+    recordings: Option<PathBuf>,
     progress: Option<Bound<'_, PyAny>>,
 ) -> Outcome<Option<Reproduced>> {
     let wanted = Reproduction {
         only,
         replications,
         jobs,
+        recordings,
     };
     let found = interrupt::run(py, 0, progress.as_ref(), true, move |standing| {
         let tell = |event: ReproductionEvent<'_>| {

@@ -20,6 +20,17 @@ pub enum ThesisError {
         /// All names, separated by commas.
         known: String,
     },
+    /// Recordings for something that is made without them.
+    #[error("recordings are for the experiment alone: make only \"experiment\" with them")]
+    NotTheExperiment,
+    /// Recordings to which the procedure of the text cannot be applied.
+    #[error("{place}: {reason}")]
+    Recordings {
+        /// The manifest.
+        place: String,
+        /// What is wrong, and the remedy.
+        reason: String,
+    },
     /// Tables that cannot be read, or a page that cannot be written.
     #[error(transparent)]
     Io(#[from] IoError),

@@ -555,6 +555,7 @@ def reproduce(
     only: list[str],
     replications: int,
     jobs: int | None,
+    recordings: _Path | None,
     progress: _Progress,
 ) -> tuple[Any, int, list[int] | None] | None: ...
 def simulate(

@@ -41,6 +41,7 @@ def reproduce(
     only: Sequence[str] = (),
     replications: int = 100,
     jobs: int | None = None,
+    recordings: str | PathLike[str] | None = None,
     progress: Progress = False,
 ) -> Reproduction:
     """Make the tables, figures and claims of the thesis (Ortiz Moya 2023).
@@ -52,11 +53,14 @@ def reproduce(
     ----------
     directory : path
     only : sequence of str
-        Tables, figures, appendices, studies, or ``"claims"``; default all.
+        Tables, figures, appendices, studies, ``"experiment"``, or ``"claims"``; default all.
     replications : int
         Replications of each cell.
     jobs : int, optional
         Threads; default one for each core.
+    recordings : path, optional
+        Recorded people in place of virtual ones, with ``only="experiment"``: a directory with the
+        manifest that ``hoid group init`` writes, or a manifest.
     progress : bool or callable
 
     Returns
@@ -82,6 +86,7 @@ def reproduce(
         only=list(only),
         replications=int(replications),
         jobs=jobs,
+        recordings=None if recordings is None else Path(recordings),
         progress=_options.reporter(progress, "estimates"),
     )
     if made is None:
@@ -98,7 +103,7 @@ def reproduce(
         tables={file.stem: Table(file) for file in sorted(data, key=lambda file: file.stem)},
         studies={
             found.name: Results(found)
-            for found in sorted((target / "studies").iterdir())
+            for found in sorted((target / "studies").glob("*"))
             if found.is_dir()
         },
         claims=None if tally is None else dict(zip(names, tally, strict=True)),

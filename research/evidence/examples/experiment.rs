@@ -9,7 +9,7 @@ use std::path::Path;
 use hoid_model::scenario::Condition;
 use hoid_study::statistics::median;
 use hoid_thesis::{
-    experiment::{EXPERIMENT, EvaluatedRun, ExperimentPlan, experiment},
+    experiment::{EXPERIMENT, EvaluatedRun, ExperimentPlan, experiment, procedure::Truth},
     reproduction::{Studies, items},
 };
 
@@ -34,7 +34,9 @@ fn main() {
         .nth(2)
         .map(|path| std::fs::read_to_string(path).unwrap());
     let plan = ExperimentPlan::parse(text.as_deref().unwrap_or(EXPERIMENT)).unwrap();
-    let runs = experiment(&plan).unwrap();
+    let found = experiment(&plan, &|| (), &|| true);
+    assert!(found.failed.is_empty(), "{:?}", found.failed);
+    let runs = found.runs;
     println!("## Table 3\n\n| subject | | N1 | N2 | N3 | N4 | N5 |\n|---|---|---|---|---|---|---|");
     for subject in 1..=plan.subjects {
         let own = of(&runs, subject, Condition::C4);
@@ -42,7 +44,7 @@ fn main() {
             let cells: Vec<String> = own.iter().map(|run| value(run)).collect();
             println!("| {subject} | {name} | {} |", cells.join(" | "));
         };
-        row("true n_k", &|run| run.outcome.true_nk.to_string());
+        row("true n_k", &|run| truth(run).nk.to_string());
         row("ARX: n_k*", &|run| run.outcome.nk[0].to_string());
         row("BJ: n_k*", &|run| run.outcome.nk[1].to_string());
         row("BJ: T_n*, s", &|run| format!("{:.2}", run.outcome.t_n_s));
@@ -51,7 +53,7 @@ fn main() {
     println!("| subject | | simulated | RLS | RPEM |\n|---|---|---|---|---|");
     for subject in 1..=plan.subjects {
         let own = of(&runs, subject, Condition::C4);
-        let true_of = |i: usize, end: usize| mean(own.iter().map(|run| run.outcome.truth[end].operator[i]));
+        let true_of = |i: usize, end: usize| mean(own.iter().map(|run| truth(run).states[end].operator[i]));
         let of_method = |method: usize, i: usize, span: (f64, f64)| {
             median(&own.iter().map(|run| middle(run, method, i, span)).collect::<Vec<_>>())
         };
@@ -89,11 +91,14 @@ fn main() {
     println!("Median over subjects and runs of the error of the mean over the last 20.48 s, % (sign kept).\n");
     println!("| condition | method | K_e | T_L | K_ė | ω_nm | ζ_nm |\n|---|---|---|---|---|---|---|");
     for condition in ExperimentPlan::CONDITIONS {
-        let own: Vec<&EvaluatedRun> = runs.iter().filter(|run| run.condition == condition).collect();
+        let own: Vec<&EvaluatedRun> = runs
+            .iter()
+            .filter(|run| run.key.condition == condition.to_string())
+            .collect();
         for (method, name) in ["RLS", "RPEM"].into_iter().enumerate() {
             let cell = |i: usize| {
                 let error = |run: &&EvaluatedRun| {
-                    100.0 * (middle(run, method, i, AFTER_S) / run.outcome.truth[1].operator[i] - 1.0)
+                    100.0 * (middle(run, method, i, AFTER_S) / truth(run).states[1].operator[i] - 1.0)
                 };
                 let all: Vec<f64> = own.iter().map(error).filter(|x| x.is_finite()).collect();
                 // Not -0.
@@ -106,9 +111,14 @@ fn main() {
 }
 
 fn of(runs: &[EvaluatedRun], subject: u64, condition: Condition) -> Vec<&EvaluatedRun> {
+    let (subject, condition) = (subject.to_string(), condition.to_string());
     runs.iter()
-        .filter(|run| (run.subject, run.condition) == (subject, condition))
+        .filter(|run| run.key.subject == subject && run.key.condition == condition)
         .collect()
+}
+
+fn truth(run: &EvaluatedRun) -> &Truth {
+    run.outcome.truth.as_ref().unwrap()
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
@@ -134,7 +144,7 @@ fn middle(run: &EvaluatedRun, method: usize, i: usize, span_s: (f64, f64)) -> f6
 fn fluctuation(run: &EvaluatedRun, method: usize, i: usize) -> f64 {
     let values = within(run, method, i, AFTER_S);
     let middle = mean(values.iter().copied());
-    mean(values.iter().map(|value| (value - middle).powi(2))).sqrt() / run.outcome.truth[1].operator[i].abs()
+    mean(values.iter().map(|value| (value - middle).powi(2))).sqrt() / truth(run).states[1].operator[i].abs()
 }
 
 fn variance_growth(run: &EvaluatedRun) -> f64 {

@@ -253,8 +253,8 @@ const HELP: [Help; 19] = [
     Help {
         command: "reproduce",
         examples: &[
-            "hoid reproduce --replications 10",
-            "hoid reproduce --only fig-5,table-2 --out figures",
+            "hoid reproduce --only fig-5,table-2 --replications 10 --out figures",
+            "hoid reproduce --only experiment --recordings recordings --out experiment",
         ],
         shown: &[],
     },

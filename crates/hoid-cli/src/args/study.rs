@@ -79,13 +79,17 @@ pub struct StudyPlansArgs {
 
 #[derive(Debug, Args)]
 pub struct ReproduceArgs {
-    /// Tables, figures, appendices, studies or the claims, separated by commas, as
-    /// fig-5,table-2,H,recursive,claims. Default: all
+    /// Tables, figures, appendices, studies, the experiment or the claims, separated by commas, as
+    /// fig-5,table-2,H,recursive,experiment,claims. Default: all
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub only: Vec<String>,
     /// Replications of each cell; 10 for a quick look
     #[arg(long, value_name = "M", default_value_t = 100)]
     pub replications: u64,
+    /// Recorded people in place of virtual ones, with --only experiment: a directory with the manifest that
+    /// `hoid group init` writes, or a manifest
+    #[arg(long, value_name = "DIR|MANIFEST")]
+    pub recordings: Option<PathBuf>,
     /// Directory for tables, figures, their data and the index page; studies that are already
     /// present are not run again
     #[arg(long, value_name = "DIR", default_value = "hoid-reproduction")]

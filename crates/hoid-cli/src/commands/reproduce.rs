@@ -28,6 +28,7 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
         only: args.only.clone(),
         replications: args.replications,
         jobs: args.jobs.map(usize::from),
+        recordings: args.recordings.clone(),
     };
     let stopped = stop_at_interrupt();
     let bar = output::progress(0, "estimates");
@@ -49,6 +50,10 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
         ThesisError::UnknownItem { name, .. } => CliError::Usage(format!(
             "--only {name}: no table, figure or study is called so; `hoid reproduce --list` lists them"
         )),
+        ThesisError::NotTheExperiment => CliError::Usage(
+            "--recordings is for the experiment alone: add --only experiment, and no other name".to_owned(),
+        ),
+        ThesisError::Study(error) => CliError::Study(*error),
         other => other.into(),
     })?;
     let Some(found) = found else {

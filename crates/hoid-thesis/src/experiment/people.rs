@@ -4,6 +4,7 @@ use hoid_model::{Record, scenario::Condition};
 use hoid_study::group::VirtualExperiment;
 use toml::{Table, Value};
 
+use super::{Experiment, ExperimentCondition, MeasuredRun, RunKey};
 use crate::ThesisError;
 
 /// The built-in plan.
@@ -49,14 +50,6 @@ impl ExperimentPlan {
         Condition::C5,
         Condition::C6,
     ];
-
-    /// Number of its estimates: for each run and structure the fits of two spans with every delay
-    /// and with the best one, and a recursive one.
-    pub fn estimates(&self) -> u64 {
-        let delays = (self.delays.1 + 1).saturating_sub(self.delays.0) as u64;
-        let of_run = 2 * (2 * delays + 2 + 1);
-        self.subjects * Self::CONDITIONS.len() as u64 * self.evaluated * of_run
-    }
 
     /// Reads and checks the text of a plan.
     ///
@@ -135,6 +128,50 @@ impl ExperimentPlan {
         };
         let cell = Self::CONDITIONS.iter().position(|of| *of == condition).unwrap_or(0);
         Ok(experiment.run(subject, cell as u64, condition, run)?.1)
+    }
+}
+
+impl Experiment for ExperimentPlan {
+    fn runs(&self) -> Vec<RunKey> {
+        let mut all = Vec::new();
+        for subject in 1..=self.subjects {
+            for condition in Self::CONDITIONS {
+                for run in self.runs - self.evaluated + 1..=self.runs {
+                    all.push(RunKey {
+                        subject: subject.to_string(),
+                        condition: condition.to_string(),
+                        run: run.to_string(),
+                    });
+                }
+            }
+        }
+        all
+    }
+
+    fn conditions(&self) -> Vec<ExperimentCondition> {
+        let of = |condition: Condition| ExperimentCondition {
+            name: condition.to_string(),
+            of_text: condition,
+        };
+        Self::CONDITIONS.map(of).to_vec()
+    }
+
+    fn delays(&self) -> (usize, usize) {
+        self.delays
+    }
+
+    /// The simulated operator, in the record, has the change.
+    fn measured(&self, key: &RunKey) -> Result<MeasuredRun, ThesisError> {
+        let number = |key: &str, text: &str| {
+            let number = text.parse::<u64>();
+            number.map_err(|_| wrong(key, text, "a whole number from 1 on"))
+        };
+        let record = self.record(
+            number("subject", &key.subject)?,
+            (key.condition.parse()).map_err(|_| wrong("condition", &key.condition, "C1 to C6"))?,
+            number("run", &key.run)?,
+        )?;
+        Ok(MeasuredRun { record, change_s: None })
     }
 }
 

@@ -9,8 +9,8 @@ use hoid_track::{Method, StartAt, TrackOptions, track_from};
 
 use crate::ThesisError;
 
-/// Spans of the batch fits, s.
-pub const SPANS_S: [(f64, f64); 2] = [(0.0, 30.72), (51.2, 81.92)];
+/// Share of a run in each of the two batch fits, at its start and at its end: 30.72 of 81.92 s.
+const SHARE: f64 = 0.375;
 /// Samples between stored estimates.
 const EVERY: usize = 32;
 /// P0 and memory, as in section V.B.
@@ -36,21 +36,32 @@ pub struct Course {
     pub variances: Vec<[f64; 5]>,
 }
 
+/// The simulated operator of a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Truth {
+    /// Its delay including that of the hold, samples.
+    pub nk: usize,
+    /// At the start and at the end.
+    pub states: [State; 2],
+}
+
 /// Results of one run, by structure (ARX and Box-Jenkins) and by span.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunOutcome {
+    /// The two spans, s.
+    pub spans_s: [(f64, f64); 2],
     /// n_k*, samples.
     pub nk: [usize; 2],
+    /// The best delay of each span, samples.
+    pub nk_of_span: [[usize; 2]; 2],
     /// T_n* of the Box-Jenkins model, s; not a number if neither span has one.
     pub t_n_s: f64,
-    /// The true delay including that of the hold, samples.
-    pub true_nk: usize,
     /// Batch fits.
     pub batch: [[State; 2]; 2],
     /// RLS and RPEM.
     pub courses: [Course; 2],
-    /// True values at the start and at the end.
-    pub truth: [State; 2],
+    /// The simulated operator; none of recorded people.
+    pub truth: Option<Truth>,
 }
 
 /// Applies the procedure of section VI to one run, with the delays from first to last.
@@ -58,23 +69,34 @@ pub struct RunOutcome {
 /// # Errors
 /// [`ThesisError::Estimator`] for a model that cannot be fitted or tracked.
 pub fn evaluate(record: &Record, delays: (usize, usize)) -> Result<RunOutcome, ThesisError> {
+    let spans_s = spans_s(record);
     let span = |(from_s, to_s): (f64, f64)| record.span(from_s, to_s);
-    let spans = [span(SPANS_S[0])?, span(SPANS_S[1])?];
+    let spans = [span(spans_s[0])?, span(spans_s[1])?];
     let arx = of_structure(record, &spans, Structure::Arx, delays)?;
     let bj = of_structure(record, &spans, Structure::BoxJenkins, delays)?;
     Ok(RunOutcome {
+        spans_s,
         nk: [arx.nk, bj.nk],
+        nk_of_span: [arx.nk_of_span, bj.nk_of_span],
         t_n_s: bj.t_n_s,
-        true_nk: true_delay(record),
         batch: [arx.batch, bj.batch],
         courses: [arx.course, bj.course],
-        truth: [true_state(record, 0), true_state(record, record.len() - 1)],
+        truth: truth(record),
     })
+}
+
+/// The two spans of a record, s.
+fn spans_s(record: &Record) -> [(f64, f64); 2] {
+    let from_s = record.time_s(0);
+    let length_s = record.len() as f64 * record.sample_time().s();
+    let (first, last) = (SHARE * length_s, (1.0 - SHARE) * length_s);
+    [(from_s, from_s + first), (from_s + last, from_s + length_s)]
 }
 
 /// Results with one structure.
 struct OfStructure {
     nk: usize,
+    nk_of_span: [usize; 2],
     t_n_s: f64,
     batch: [State; 2],
     course: Course,
@@ -90,8 +112,9 @@ fn of_structure(
         best_delay(&spans[0], structure, delays)?,
         best_delay(&spans[1], structure, delays)?,
     ];
+    let nk_of_span = best.each_ref().map(|fit| fit.orders().nk);
     // Half a sample is rounded up.
-    let nk = (best[0].orders().nk + best[1].orders().nk).div_ceil(2);
+    let nk = (nk_of_span[0] + nk_of_span[1]).div_ceil(2);
     let t_n_s = time_constant(&best);
     let estimator = Estimator::new(structure, structure.operator_orders(nk));
     let fits = [
@@ -100,6 +123,7 @@ fn of_structure(
     ];
     Ok(OfStructure {
         nk,
+        nk_of_span,
         t_n_s,
         batch: fits.each_ref().map(state_of_fit),
         course: course(record, &fits[0])?,
@@ -159,7 +183,7 @@ fn course(record: &Record, start: &Fit) -> Result<Course, ThesisError> {
         _ => TrackOptions::new(Method::rls(), structure, orders),
     };
     let options = TrackOptions {
-        start: StartAt::Span(Some(SPANS_S[0])),
+        start: StartAt::Span(Some(spans_s(record)[0])),
         ..options.with(&SETTINGS)?
     };
     let trace = track_from(record, &options, EVERY, Some(start))?;
@@ -213,26 +237,31 @@ fn values(operator: Option<OperatorParameters>) -> [f64; 5] {
     })
 }
 
-/// The simulated operator at a sample.
-fn true_state(record: &Record, k: usize) -> State {
-    let of = |name: &str| record.channel(name).map_or(f64::NAN, |values| values[k]);
-    let operator = OperatorParameters {
-        k_e: of("K_e"),
-        t_l_s: of("T_L"),
-        omega_nm_rad_s: of("omega_nm"),
-        zeta_nm: of("zeta_nm"),
-        tau_e_s: of("tau_e"),
-    };
-    let held = operator.discretise(record.sample_time()).ok().map(|found| found.held);
-    State {
-        discrete: held.map_or([f64::NAN; 4], |h| [h.f1, h.f2, h.b0, h.b1]),
-        operator: values(Some(operator)),
-    }
+/// The simulated operator, if the record has its parameters.
+fn truth(record: &Record) -> Option<Truth> {
+    let states = [true_state(record, 0)?, true_state(record, record.len() - 1)?];
+    let tau_s = *record.channel("tau_e")?.first()?;
+    Some(Truth {
+        nk: (tau_s / record.sample_time().s()).round() as usize + 1,
+        states,
+    })
 }
 
-fn true_delay(record: &Record) -> usize {
-    let tau_s = record.channel("tau_e").map_or(f64::NAN, |values| values[0]);
-    (tau_s / record.sample_time().s()).round() as usize + 1
+/// The simulated operator at a sample.
+fn true_state(record: &Record, k: usize) -> Option<State> {
+    let of = |name: &str| record.channel(name)?.get(k).copied();
+    let operator = OperatorParameters {
+        k_e: of("K_e")?,
+        t_l_s: of("T_L")?,
+        omega_nm_rad_s: of("omega_nm")?,
+        zeta_nm: of("zeta_nm")?,
+        tau_e_s: of("tau_e")?,
+    };
+    let held = operator.discretise(record.sample_time()).ok().map(|found| found.held);
+    Some(State {
+        discrete: held.map_or([f64::NAN; 4], |h| [h.f1, h.f2, h.b0, h.b1]),
+        operator: values(Some(operator)),
+    })
 }
 
 #[cfg(test)]
@@ -259,9 +288,14 @@ mod tests {
     #[test]
     fn without_remnant_the_procedure_finds_the_operator() {
         let found = evaluate(&run(0.0), (27, 31)).unwrap();
-        assert_eq!((found.nk[0], found.true_nk), (29, 29));
+        let truth = found.truth.unwrap();
+        assert_eq!((found.nk[0], truth.nk), (29, 29));
+        assert_eq!(found.nk_of_span[0], [29, 29]);
+        for (found, of_text) in found.spans_s.iter().zip([(0.0, 30.72), (51.2, 81.92)]) {
+            assert!((found.0 - of_text.0).abs() + (found.1 - of_text.1).abs() < 1e-9);
+        }
         for span in 0..2 {
-            for (a, b) in found.batch[0][span].discrete.iter().zip(found.truth[span].discrete) {
+            for (a, b) in found.batch[0][span].discrete.iter().zip(truth.states[span].discrete) {
                 assert!((a - b).abs() < 1e-3, "{span}: {a} {b}");
             }
         }

@@ -1,5 +1,7 @@
 //! All tables and figures, in the order of the text.
 
+use crate::experiment::RecordedPeople;
+
 use super::{averages, bias, experiment, further, item::Item, orders, responses, setting, starts, traces};
 
 /// All tables and figures, in the order of the text.
@@ -13,6 +15,15 @@ pub fn items() -> Vec<Item> {
     all.extend(averages::items());
     all.extend(experiment::items());
     all.extend(further::items());
+    in_order(all)
+}
+
+/// The tables and figures of the experiment with recorded people, in the order of the text.
+pub(super) fn recorded_items(people: RecordedPeople) -> Vec<Item> {
+    in_order(experiment::recorded_items(people))
+}
+
+fn in_order(mut all: Vec<Item>) -> Vec<Item> {
     all.sort_by_cached_key(|item| place(&item.name));
     all
 }
@@ -20,11 +31,15 @@ pub fn items() -> Vec<Item> {
 /// Sort key: tables, the figures of the article, those of the appendices by number, the rest.
 fn place(name: &str) -> (u8, String, u32, String) {
     let number = |text: &str| text.parse::<f64>().map_or(0, |n| (10.0 * n) as u32);
-    if let Some(n) = name.strip_prefix("table-") {
-        return (0, String::new(), number(n), String::new());
+    let parts = |text: &str| {
+        let (n, more) = text.split_once('-').unwrap_or((text, ""));
+        (number(n), more.to_owned())
+    };
+    if let Some((n, more)) = name.strip_prefix("table-").map(parts) {
+        return (0, String::new(), n, more);
     }
-    if let Some(n) = name.strip_prefix("fig-") {
-        return (1, String::new(), number(n), String::new());
+    if let Some((n, more)) = name.strip_prefix("fig-").map(parts) {
+        return (1, String::new(), n, more);
     }
     match name.split_once('.') {
         Some((letter, n)) => {

@@ -6,6 +6,7 @@ use hoid_io::OutputTable;
 use hoid_study::Results;
 
 use super::table_builder::TableBuilder;
+use crate::ThesisError;
 
 /// Name of the claims among tables and figures.
 pub const CLAIMS: &str = "claims";
@@ -26,8 +27,27 @@ pub(super) struct SharedRuns {
     pub title: &'static str,
     /// Number of estimates.
     pub estimates: u64,
-    /// Makes the runs.
-    pub make: Arc<dyn Fn() + Send + Sync>,
+    /// Makes the runs; notes on those that failed, or the error of all of them.
+    pub make: MakeRuns,
+}
+
+/// Makes shared runs.
+type MakeRuns = Arc<dyn Fn(&Watch<'_>) -> Result<Vec<String>, ThesisError> + Send + Sync>;
+
+/// What follows the making of runs.
+pub(super) struct Watch<'a> {
+    /// Called with a number of completed estimates.
+    pub done: &'a (dyn Fn(u64) + Sync),
+    /// Whether it goes on.
+    pub goes_on: &'a (dyn Fn() -> bool + Sync),
+}
+
+impl Watch<'_> {
+    /// Nothing follows it, and it goes on.
+    pub const NONE: Watch<'static> = Watch {
+        done: &|_| (),
+        goes_on: &|| true,
+    };
 }
 
 /// One table or figure.

@@ -7,23 +7,26 @@
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
+    sync::atomic::{AtomicU64, Ordering},
     time::Instant,
 };
 
 use hoid_io::{DirectoryLock, OutputTable, make_directory, write_atomically, write_table};
-use hoid_study::{NamedPlan, Progress, Results, RunOptions, run};
+use hoid_study::{NamedPlan, Progress, Results, RunOptions, StudyError, run};
 use rayon::prelude::*;
 
 use super::{
-    catalogue::items,
+    catalogue::{items, recorded_items},
+    experiment::NAME as EXPERIMENT_RUNS,
     index::{IndexPage, StudyEntry},
-    item::{CLAIMS, Item, Studies},
+    item::{CLAIMS, Item, Studies, Watch},
 };
 use hoid_report::write_page;
 
 use crate::{
     ThesisError,
     claims::{Evidence, claims, claims_table, findings},
+    experiment::RecordedPeople,
     plans::TEXT_PLANS,
 };
 
@@ -36,6 +39,8 @@ pub struct Reproduction {
     pub replications: u64,
     /// Number of threads; none for one per core.
     pub jobs: Option<usize>,
+    /// Directory or manifest of recorded people: their experiment takes the place of everything else.
+    pub recordings: Option<PathBuf>,
 }
 
 impl Default for Reproduction {
@@ -44,6 +49,7 @@ impl Default for Reproduction {
             only: Vec::new(),
             replications: NamedPlan::REPLICATIONS,
             jobs: None,
+            recordings: None,
         }
     }
 }
@@ -79,7 +85,8 @@ pub struct ReproductionSummary {
 /// call continues.
 ///
 /// # Errors
-/// [`ThesisError::UnknownItem`]; [`ThesisError::Study`] and [`ThesisError::Io`] for failures of
+/// [`ThesisError::UnknownItem`]; [`ThesisError::NotTheExperiment`] and [`ThesisError::Recordings`] for recordings that
+/// cannot be used; [`ThesisError::Study`] and [`ThesisError::Io`] for failures of
 /// running, reading or writing.
 pub fn reproduce(
     wanted: &Reproduction,
@@ -88,14 +95,27 @@ pub fn reproduce(
     goes_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<Option<ReproductionSummary>, ThesisError> {
     let begin = Instant::now();
-    let (chosen, with_claims) = chosen(items(), &wanted.only)?;
+    let mut index = IndexPage::default();
+    let all = match &wanted.recordings {
+        Some(_) if wanted.only != [EXPERIMENT_RUNS] => return Err(ThesisError::NotTheExperiment),
+        Some(place) => {
+            let people = RecordedPeople::open(place)?;
+            for (name, reason) in people.left_out() {
+                let note = format!("condition {name} is left out: {reason}");
+                notify(ReproductionEvent::Note(&note));
+                index.notes.push(note);
+            }
+            recorded_items(people)
+        }
+        None => items(),
+    };
+    let (chosen, with_claims) = chosen(all, wanted)?;
     make_directory(directory)?;
     let _lock = DirectoryLock::take(directory)?;
     let mut plans: BTreeSet<&str> = chosen.iter().filter_map(|item| item.plan).collect();
     if with_claims {
         plans.extend(claims().iter().flat_map(|claim| claim.plans.iter().copied()));
     }
-    let mut index = IndexPage::default();
     let mut studies = Studies::new();
     for named in TEXT_PLANS.iter().filter(|named| plans.contains(named.name)) {
         let Some((entry, results)) = study(named, wanted, directory, notify, goes_on)? else {
@@ -114,7 +134,23 @@ pub fn reproduce(
             return Ok(None);
         }
         let begin = Instant::now();
-        (shared.make)();
+        let done = AtomicU64::new(0);
+        let watch = Watch {
+            done: &|estimates| {
+                let done = done.fetch_add(estimates, Ordering::Relaxed) + estimates;
+                let total = shared.estimates;
+                notify(ReproductionEvent::Progress(Progress { done, total, known: 0 }));
+            },
+            goes_on,
+        };
+        let notes = on_threads(wanted.jobs, || (shared.make)(&watch))??;
+        if !goes_on() {
+            return Ok(None);
+        }
+        for note in notes {
+            notify(ReproductionEvent::Note(&note));
+            index.notes.push(note);
+        }
         let entry = StudyEntry {
             name: shared.name.to_owned(),
             title: shared.title.to_owned(),
@@ -142,12 +178,16 @@ pub fn reproduce(
     } else {
         None
     };
+    let of_runs = match &wanted.recordings {
+        Some(place) => ("recordings".to_owned(), place.display().to_string()),
+        None => ("replications of each cell".to_owned(), wanted.replications.to_string()),
+    };
     index.settings = vec![
         ("made by".to_owned(), format!("hoid {}", env!("CARGO_PKG_VERSION"))),
-        ("replications of each cell".to_owned(), wanted.replications.to_string()),
+        of_runs,
         ("tables and figures".to_owned(), chosen.len().to_string()),
     ];
-    if wanted.replications < NamedPlan::REPLICATIONS {
+    if wanted.recordings.is_none() && wanted.replications < NamedPlan::REPLICATIONS {
         index.notes.push(format!(
             "A quick look: with {} replications instead of {} many claims are not decided.",
             wanted.replications,
@@ -164,16 +204,27 @@ pub fn reproduce(
     }))
 }
 
-/// The selected items, by their name, their plan or the letter of an appendix, and whether the
-/// claims are selected.
-fn chosen(all: Vec<Item>, only: &[String]) -> Result<(Vec<Item>, bool), ThesisError> {
+/// Does something on `jobs` threads, or one per core.
+fn on_threads<R: Send>(jobs: Option<usize>, work: impl FnOnce() -> R + Send) -> Result<R, ThesisError> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.unwrap_or(0)).build();
+    let pool = pool.map_err(|error| StudyError::Threads {
+        reason: error.to_string(),
+    })?;
+    Ok(pool.install(work))
+}
+
+/// The selected items, by their name, their plan, the runs they share or the letter of an appendix, and whether the
+/// claims are selected; those of recorded people have none.
+fn chosen(all: Vec<Item>, wanted: &Reproduction) -> Result<(Vec<Item>, bool), ThesisError> {
+    let only = &wanted.only;
     if only.is_empty() {
-        return Ok((all, true));
+        return Ok((all, wanted.recordings.is_none()));
     }
     let means = |item: &Item, name: &str| {
         let letter = format!("{}.", name.to_ascii_uppercase());
         item.name.eq_ignore_ascii_case(name)
             || item.plan.is_some_and(|plan| plan == name)
+            || item.shared.as_ref().is_some_and(|shared| shared.name == name)
             || (name.len() == 1 && item.name.starts_with(&letter))
     };
     let names: Vec<&str> = only.iter().map(|name| name.trim()).collect();

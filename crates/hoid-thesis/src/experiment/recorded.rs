@@ -1,0 +1,282 @@
+//! Recorded people: the runs of the manifest of a group ([`Manifest`]), read and prepared as `hoid group` does.
+//!
+//! Of each person in a condition the last five runs that count are evaluated, as in the text. Times are those since the
+//! start of the span that counts, `from_s` of the manifest: the text leaves a run-in of 8.08 s out.
+//!
+//! A condition is shown where the text shows the one with the same course of the controlled element. That is known from
+//! `controlled_element`, `changes_to`, `change_s` and `change_per_s` of the manifest: an element is s1 or s2 of the text
+//! by the slope of its logarithmic gain `d ln|H| / d ln w` at 2 rad/s, near the crossover of people, -1.1 in s1 and -2.0
+//! in s2; a change is sudden if its middle 80 % take less than a second, `2 ln 9 / G`. Without an element its name
+//! decides, C1 to C6.
+
+use std::path::{Path, PathBuf};
+
+use hoid_model::{ContinuousTransferFunction, scenario::Condition};
+use hoid_study::group::{ConditionSettings, Manifest, RecordedRun, RunEntry};
+
+use super::{EXPERIMENT, Experiment, ExperimentCondition, ExperimentPlan, MeasuredRun, RunKey};
+use crate::ThesisError;
+
+/// Frequency at which elements are told apart, rad/s.
+const NEAR_CROSSOVER_RAD_S: f64 = 2.0;
+/// Slope between those of a single and of a double integrator.
+const SLOPE_BETWEEN: f64 = -1.5;
+/// Longest duration of the middle 80 % of a sudden change, s.
+const SUDDEN_S: f64 = 1.0;
+
+/// Recordings of people.
+#[derive(Debug, Clone)]
+pub struct RecordedPeople {
+    manifest: Manifest,
+    base: PathBuf,
+    evaluated: Vec<RunEntry>,
+    conditions: Vec<ExperimentCondition>,
+    left_out: Vec<(String, String)>,
+    delays: (usize, usize),
+}
+
+impl RecordedPeople {
+    /// The recordings of a directory with a manifest, or of a manifest.
+    ///
+    /// # Errors
+    /// [`ThesisError::Study`] for a missing or invalid manifest, or if no run can be read;
+    /// [`ThesisError::Recordings`] if no condition is one of the text.
+    pub fn open(place: &Path) -> Result<Self, ThesisError> {
+        let path = Manifest::place(place)?;
+        let manifest = Manifest::read(&path)?;
+        let base = path.parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf);
+        let (conditions, left_out) = conditions(&manifest);
+        if conditions.is_empty() {
+            let reasons: Vec<String> = left_out.iter().map(|(name, why)| format!("{name}: {why}")).collect();
+            return Err(ThesisError::Recordings {
+                place: path.display().to_string(),
+                reason: format!("no condition is one of the text; {}", reasons.join("; ")),
+            });
+        }
+        let count = ExperimentPlan::parse(EXPERIMENT)?.evaluated as usize;
+        let evaluated: Vec<RunEntry> = conditions
+            .iter()
+            .flat_map(|condition| last_runs(&manifest, &condition.name, count))
+            .collect();
+        // The first run that can be read has the sample time; if none can be read, the first has the reason.
+        let mut failed = None;
+        let read = evaluated.iter().find_map(|entry| {
+            let read = RecordedRun::read(&manifest, &base, entry);
+            read.map_err(|error| failed.get_or_insert(error).to_string()).ok()
+        });
+        let Some(read) = read else {
+            return Err(failed.map_or_else(
+                || ThesisError::Recordings {
+                    place: path.display().to_string(),
+                    reason: "no run counts, expected some with counts = true".to_owned(),
+                },
+                ThesisError::from,
+            ));
+        };
+        let samples = |delay_s: f64| (delay_s / read.record.sample_time().s()).round() as usize + 1;
+        let (least_s, most_s) = manifest.analysis.delay_s;
+        Ok(Self {
+            delays: (samples(least_s), samples(most_s)),
+            base,
+            evaluated,
+            conditions,
+            left_out,
+            manifest,
+        })
+    }
+
+    /// Name of the group.
+    pub fn name(&self) -> &str {
+        &self.manifest.name
+    }
+
+    /// Conditions that are none of the text, and why.
+    pub fn left_out(&self) -> &[(String, String)] {
+        &self.left_out
+    }
+}
+
+impl Experiment for RecordedPeople {
+    fn runs(&self) -> Vec<RunKey> {
+        self.evaluated.iter().map(key_of).collect()
+    }
+
+    fn conditions(&self) -> Vec<ExperimentCondition> {
+        self.conditions.clone()
+    }
+
+    fn delays(&self) -> (usize, usize) {
+        self.delays
+    }
+
+    fn measured(&self, key: &RunKey) -> Result<MeasuredRun, ThesisError> {
+        let entry = self.evaluated.iter().find(|entry| key_of(entry) == *key);
+        let entry = entry.ok_or_else(|| ThesisError::Recordings {
+            place: self.manifest.name.clone(),
+            reason: format!("there is no run {} of {} in {}", key.run, key.subject, key.condition),
+        })?;
+        let read = RecordedRun::read(&self.manifest, &self.base, entry)?;
+        let start_s = read.record.time_s(0);
+        Ok(MeasuredRun {
+            change_s: read.change_s.map(|change_s| change_s - start_s),
+            record: read.record.starting_at(0.0),
+        })
+    }
+}
+
+fn key_of(entry: &RunEntry) -> RunKey {
+    RunKey {
+        subject: entry.subject.clone(),
+        condition: entry.condition.clone(),
+        run: entry.run.clone(),
+    }
+}
+
+/// The last runs of each person in a condition, by their numbers where all have one.
+fn last_runs(manifest: &Manifest, condition: &str, count: usize) -> Vec<RunEntry> {
+    let own: Vec<&RunEntry> = (manifest.runs.iter())
+        .filter(|run| run.counts && run.condition == condition)
+        .collect();
+    let mut subjects: Vec<&str> = own.iter().map(|run| run.subject.as_str()).collect();
+    subjects.sort_unstable();
+    subjects.dedup();
+    let mut last = Vec::new();
+    for subject in subjects {
+        let mut runs: Vec<&RunEntry> = own.iter().copied().filter(|run| run.subject == subject).collect();
+        if runs.iter().all(|run| run.run.parse::<u64>().is_ok()) {
+            runs.sort_by_key(|run| run.run.parse::<u64>().unwrap_or(0));
+        }
+        last.extend(
+            runs.iter()
+                .skip(runs.len().saturating_sub(count))
+                .map(|run| (*run).clone()),
+        );
+    }
+    last
+}
+
+/// Conditions with those of the text, and the names of the others with the reason.
+fn conditions(manifest: &Manifest) -> (Vec<ExperimentCondition>, Vec<(String, String)>) {
+    let mut names: Vec<&str> = manifest.runs.iter().map(|run| run.condition.as_str()).collect();
+    names.sort_unstable();
+    names.dedup();
+    let (mut found, mut others) = (Vec::new(), Vec::new());
+    for name in names {
+        let facts = manifest.conditions.get(name).cloned().unwrap_or_default();
+        match of_text(name, &facts) {
+            Ok(of_text) => found.push(ExperimentCondition {
+                name: name.to_owned(),
+                of_text,
+            }),
+            Err(reason) => others.push((name.to_owned(), reason)),
+        }
+    }
+    (found, others)
+}
+
+/// The condition of the text with the same course of the controlled element.
+fn of_text(name: &str, facts: &ConditionSettings) -> Result<Condition, String> {
+    let unknown = |what: &str| {
+        format!(
+            "{what}: write controlled_element into [conditions.{name}], and changes_to, change_s and change_per_s where \
+             it changes, or call the condition C1 to C6 as the text does"
+        )
+    };
+    let Some(before) = &facts.controlled_element else {
+        return name.parse().map_err(|_| unknown("its controlled element is not known"));
+    };
+    let Some(after) = &facts.changes_to else {
+        if facts.change_s.is_some() {
+            return name
+                .parse()
+                .map_err(|_| unknown("the controlled element after the change is not known"));
+        }
+        return Ok(match is_double(before)? {
+            false => Condition::C1,
+            true => Condition::C2,
+        });
+    };
+    let is_sudden = facts
+        .change_per_s
+        .is_none_or(|rate| 2.0 * 9.0_f64.ln() / rate < SUDDEN_S);
+    match (is_double(before)?, is_double(after)?, is_sudden) {
+        (false, true, false) => Ok(Condition::C3),
+        (false, true, true) => Ok(Condition::C4),
+        (true, false, false) => Ok(Condition::C5),
+        (true, false, true) => Ok(Condition::C6),
+        (same, _, _) => Err(format!(
+            "its controlled element changes from {before} to {after}, both like a {} integrator; in the text it \
+             changes from a single to a double one, or back",
+            if same { "double" } else { "single" }
+        )),
+    }
+}
+
+/// Whether an element is like a double integrator near the crossover, as s2.
+fn is_double(element: &str) -> Result<bool, String> {
+    let element: ContinuousTransferFunction = element.parse().map_err(|error| format!("{error}"))?;
+    let step = 1e-3_f64;
+    let log_gain = |shift: f64| element.response(NEAR_CROSSOVER_RAD_S * shift.exp()).norm().ln();
+    Ok((log_gain(step) - log_gain(-step)) / (2.0 * step) < SLOPE_BETWEEN)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn facts(before: &str, after: Option<&str>, change_per_s: Option<f64>) -> ConditionSettings {
+        ConditionSettings {
+            controlled_element: Some(before.to_owned()),
+            change_s: after.map(|_| 50.0),
+            changes_to: after.map(str::to_owned),
+            change_per_s,
+            ..ConditionSettings::default()
+        }
+    }
+
+    #[test]
+    fn a_condition_is_that_of_the_text_with_the_same_course() {
+        let (s1, s2) = ("90/(s(s+6))", "30/(s(s+.2))");
+        for (found, expected) in [
+            (facts(s1, None, None), Condition::C1),
+            (facts(s2, None, None), Condition::C2),
+            (facts(s1, Some(s2), Some(0.5)), Condition::C3),
+            (facts(s1, Some(s2), Some(100.0)), Condition::C4),
+            (facts(s1, Some(s2), None), Condition::C4),
+            (facts(s2, Some(s1), Some(0.5)), Condition::C5),
+            (facts("-5/s^2", Some("4/s"), None), Condition::C6),
+        ] {
+            // What is known of the element wins over the name.
+            assert_eq!(of_text("C1", &found), Ok(expected), "{found:?}");
+        }
+        assert_eq!(of_text("C5", &ConditionSettings::default()), Ok(Condition::C5));
+        let unknown = of_text("slow", &ConditionSettings::default()).unwrap_err();
+        assert!(unknown.contains("[conditions.slow]"), "{unknown}");
+        let same = of_text("C3", &facts(s1, Some("80/(s(s+5))"), None)).unwrap_err();
+        assert!(same.contains("both like a single integrator"), "{same}");
+    }
+
+    #[test]
+    fn the_last_runs_by_their_numbers_are_evaluated() {
+        let run = |number: u64, counts: bool| {
+            format!(
+                "[[runs]]\nfile = \"{number}.csv\"\nsubject = \"a\"\ncondition = \"C1\"\nrun = \"{number}\"\ncounts = {counts}\n"
+            )
+        };
+        let runs: String = [10, 9, 8, 11, 12].map(|number| run(number, number != 11)).join("");
+        let manifest = Manifest::parse(&format!("name = \"x\"\n{runs}"), "group.toml").unwrap();
+        let last: Vec<String> = last_runs(&manifest, "C1", 3).into_iter().map(|run| run.run).collect();
+        assert_eq!(last, ["9", "10", "12"]);
+    }
+
+    #[test]
+    fn a_directory_without_a_manifest_is_refused() {
+        let directory = tempfile::tempdir().unwrap();
+        let refused = RecordedPeople::open(directory.path()).unwrap_err().to_string();
+        assert!(
+            refused.contains("group.toml") && refused.contains("hoid group init"),
+            "{refused}"
+        );
+    }
+}

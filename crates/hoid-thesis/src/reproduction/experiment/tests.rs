@@ -1,0 +1,119 @@
+#![allow(clippy::unwrap_used)]
+
+use super::*;
+use crate::experiment::{
+    RunKey,
+    procedure::{Course, RunOutcome, State, Truth},
+};
+
+fn run(subject: &str, number: u64, value: f64) -> EvaluatedRun {
+    let state = State {
+        discrete: [value; 4],
+        operator: [value; 5],
+    };
+    let course = Course {
+        times_s: vec![0.0, 20.0, 80.0],
+        states: vec![state; 3],
+        variances: vec![[value * value; 5]; 3],
+    };
+    EvaluatedRun {
+        key: RunKey {
+            subject: subject.to_owned(),
+            condition: "C4".to_owned(),
+            run: number.to_string(),
+        },
+        change_s: None,
+        outcome: RunOutcome {
+            spans_s: [(0.0, 30.72), (51.2, 81.92)],
+            nk: [24, 29],
+            nk_of_span: [[23, 25], [28, 30]],
+            t_n_s: 0.06,
+            batch: [[state; 2]; 2],
+            courses: [course.clone(), course],
+            truth: Some(Truth {
+                nk: 29,
+                states: [state; 2],
+            }),
+        },
+    }
+}
+
+fn item() -> Item {
+    items().into_iter().find(|item| item.name == "fig-14").unwrap()
+}
+
+fn column(made: &ItemOutput, name: &str) -> Vec<f64> {
+    match &made.data.column(name).unwrap() {
+        hoid_io::ColumnValues::Real(values) => values.clone(),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn figures_show_the_average_and_the_median_of_the_runs() {
+    let runs = [run("1", 3, 1.0), run("1", 4, 2.0), run("1", 5, 6.0), run("2", 3, 1.0)];
+    for rows in [&DISCRETE[..], &OPERATOR, &VARIANCES] {
+        let made = figures::draw(&item(), &runs, ("C4", Condition::C4), rows);
+        assert!(made.svg.as_ref().unwrap().contains("subject 2"));
+        let expected = if rows.len() == 5 && rows[0].1.starts_with("variance") {
+            41.0 / 3.0
+        } else {
+            3.0
+        };
+        let mean = column(&made, "mean");
+        assert!((mean[0] - expected).abs() < 1e-12, "{mean:?}");
+    }
+    assert_eq!(middle([1.0, f64::NAN, 2.0, 6.0].into_iter()), [3.0, 2.0]);
+    assert!(middle([f64::NAN].into_iter())[0].is_nan());
+    let made = tables::delays(&item(), &runs, &["C4".to_owned()]);
+    assert_eq!((column(&made, "nk_true")[0], column(&made, "nk_BJ")[0]), (29.0, 29.0));
+}
+
+#[test]
+fn recorded_people_have_no_truth_and_may_have_runs_of_different_lengths() {
+    let mut runs = [run("anna", 3, 1.0), run("anna", 4, 2.0)];
+    for run in &mut runs {
+        run.outcome.truth = None;
+        run.change_s = Some(41.92);
+    }
+    for course in &mut runs[0].outcome.courses {
+        course.times_s.pop();
+        course.states.pop();
+        course.variances.pop();
+    }
+    let made = figures::draw(&item(), &runs, ("C4", Condition::C4), &OPERATOR);
+    let svg = made.svg.as_ref().unwrap();
+    assert!(
+        svg.contains("anna") && !svg.contains("deg/deg"),
+        "gains are in units of the recordings"
+    );
+    // RLS of K_e, the longer run alone at the end; then OLS.
+    assert_eq!(column(&made, "mean")[..3], [1.5, 1.5, 2.0]);
+    let made = tables::delays(&item(), &runs, &["C4".to_owned()]);
+    assert_eq!(
+        (column(&made, "nk_ARX_first")[1], column(&made, "nk_BJ_last")[1]),
+        (23.0, 30.0)
+    );
+    runs[0].outcome.batch[0][0].operator = [f64::NAN; 5];
+    let made = tables::operators(&item(), &runs, &["C4".to_owned()]);
+    // OLS, PEM, RLS and RPEM in both spans.
+    assert_eq!(column(&made, "K_e"), [2.0, 1.5, 1.5, 1.5, 1.5, 2.0, 1.5, 2.0]);
+    assert_eq!(column(&made, "determined")[..2], [0.5, 1.0]);
+}
+
+#[test]
+fn figures_have_the_numbers_of_the_text_and_the_names_of_other_conditions() {
+    let names: Vec<String> = items().into_iter().map(|item| item.name).collect();
+    for i in 1..=18 {
+        assert!(names.contains(&format!("I.{i}")));
+    }
+    assert_eq!(names.len(), 21);
+    let condition = |name: &str| ExperimentCondition {
+        name: name.to_owned(),
+        of_text: Condition::C4,
+    };
+    assert_eq!(named("I.10", "x", &condition("C4"), "p").0, "I.10");
+    let (name, title) = named("I.10", "x", &condition("C7 pitch"), "p");
+    assert_eq!(name, "I.10-C7-pitch");
+    assert!(title.contains("C7 pitch") && title.contains("C4"), "{title}");
+}
