@@ -63,6 +63,7 @@ def test_every_method_has_an_example_that_runs(
         "trace": pyhoid.track(c4, "physical", nk=29, nd=1, every=64),
         "tracker": pyhoid.Tracker("physical", nk=29, nd=1, record=c1),
         "found": pyhoid.compare(group_results),
+        "designed": pyhoid.design(controlled_element="4/s"),
         "results": pyhoid.study("noise-level", "study", replications=1),
         "pandas": pytest.importorskip("pandas"),
         "polars": pytest.importorskip("polars"),

@@ -143,7 +143,6 @@ impl CliError {
             | Self::Compare(
                 CompareError::Factor { .. } | CompareError::Quantity { .. } | CompareError::NotInJson { .. },
             )
-            | Self::Design(DesignError::OutOfRange { .. } | DesignError::NotThere { .. })
             | Self::Io(IoError::OutputIsInput { .. } | IoError::OutputAmongInputs { .. })
             | Self::Study(StudyError::Io(IoError::OutputIsInput { .. } | IoError::OutputAmongInputs { .. }))
             | Self::Study(
@@ -152,6 +151,7 @@ impl CliError {
                 | StudyError::Pattern { .. }
                 | StudyError::NoManifest { .. },
             ) => 2,
+            Self::Design(error) if error.is_of_request() => 2,
             Self::Stopped(_) => u8::try_from(interrupt::exit_code()).unwrap_or(1),
             _ => 1,
         }

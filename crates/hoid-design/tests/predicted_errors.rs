@@ -105,7 +105,7 @@ fn checked(
     scenario.run_in_s = 20.0;
     let simulator = FamilySimulator::new(&scenario).unwrap();
     let weight = |omega: f64| 1.0 + (remnant.time_constant_s * omega).powi(2);
-    let names: Vec<&str> = predicted.parameters.iter().map(|p| p.0).collect();
+    let names: Vec<&str> = predicted.parameters.iter().map(|p| p.name).collect();
     let mut all = vec![Vec::new(); names.len()];
     for replication in 0..EXPERIMENTS {
         let run = RunSeed {
@@ -121,9 +121,9 @@ fn checked(
             values.push(parameter.value);
         }
     }
-    for ((name, values), (_, _, estimate)) in names.iter().zip(&all).zip(&predicted.parameters) {
+    for ((name, values), parameter) in names.iter().zip(&all).zip(&predicted.parameters) {
         let sd = hoid_numerics::statistics::sample_variance(values).sqrt();
-        let ratio = sd / estimate.standard_error.unwrap();
+        let ratio = sd / parameter.estimate.standard_error.unwrap();
         println!("{element} {enters:?} {share} {name}: scatter {sd:.5}, {ratio:.3} of what was predicted");
         assert!((ratio - 1.0).abs() < 0.15, "{name}: {ratio}");
     }

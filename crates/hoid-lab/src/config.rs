@@ -18,7 +18,10 @@
 
 use std::path::Path;
 
-use hoid_model::{family_scenario::MultiSine, scenario::Condition as Reference};
+use hoid_model::{
+    family_scenario::{Display, MultiSine},
+    scenario::Condition as Reference,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::{LabError, plant::MOST_STATES};
@@ -65,19 +68,6 @@ pub enum LiveFor {
     During,
     /// Never.
     Never,
-}
-
-/// Display of the task.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Display {
-    /// Error only.
-    #[default]
-    Compensatory,
-    /// Target and output.
-    Pursuit,
-    /// Output, target, and future target.
-    Preview,
 }
 
 /// Limits above which a run is unverified.

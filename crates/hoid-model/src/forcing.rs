@@ -14,7 +14,7 @@ use std::f64::consts::TAU;
 use crate::{ModelError, SampleTime, remnant_gain::SpectralLine};
 
 /// One term of the forcing function.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Sinusoid {
     /// Amplitude A_k, deg.
     pub amplitude_deg: f64,

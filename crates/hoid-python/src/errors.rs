@@ -6,7 +6,7 @@ use hoid_analysis::{
     AnalysisError,
     registry::{CHANGE, OPERATOR, REMNANT},
 };
-use hoid_design::compare::CompareError;
+use hoid_design::{compare::CompareError, experiment::DesignError};
 use hoid_ident::IdentError;
 use hoid_io::{IoError, ScenarioFileError};
 use hoid_model::{ModelError, NotConvertible, UnknownName};
@@ -180,6 +180,21 @@ impl From<CompareError> for Failure {
             CompareError::NoGroup { .. } => FormatError::new_err(text),
             _ => DataError::new_err(text),
         })
+    }
+}
+
+impl From<DesignError> for Failure {
+    fn from(error: DesignError) -> Self {
+        let text = in_python(&error.to_string());
+        match error {
+            DesignError::Io(error) => error.into(),
+            DesignError::Scenario(error) => error.into(),
+            DesignError::Study(error) => (*error).into(),
+            DesignError::Model(error) => error.into(),
+            DesignError::NoPeople { .. } | DesignError::NoLines { .. } => Self(FormatError::new_err(text)),
+            error if error.is_of_request() => bad_option(text),
+            _ => Self(DataError::new_err(text)),
+        }
     }
 }
 

@@ -16,6 +16,7 @@
 //! | `simulate` | scenarios, margins, conversions |
 //! | `describing` | describing functions |
 //! | `compare` | conditions and people compared |
+//! | `design` | forcing function and errors of an experiment before it is done |
 //! | `study`, `group` | studies, the reproduction, groups |
 //! | `files`, `survey` | files of records and tables, and what is in them |
 //! | `interrupt` | long work that an interrupt can end |
@@ -28,6 +29,7 @@ mod arrays;
 mod compare;
 mod controlled_element;
 mod describing;
+mod design;
 mod errors;
 mod family;
 mod faults;
@@ -63,6 +65,9 @@ fn _pyhoid(module: &Bound<'_, PyModule>) -> PyResult<()> {
     for function in [
         wrap_pyfunction!(compare::compare, module)?,
         wrap_pyfunction!(compare::comparison_figure_of, module)?,
+        wrap_pyfunction!(design::design, module)?,
+        wrap_pyfunction!(design::design_figures_of, module)?,
+        wrap_pyfunction!(design::design_files_of, module)?,
         wrap_pyfunction!(describing::describe, module)?,
         wrap_pyfunction!(describing::describing_function, module)?,
         wrap_pyfunction!(files::check_record, module)?,

@@ -43,6 +43,7 @@
 //! | [`TrackReport`], [`TraceSection`], [`BatchLine`], [`batch_fit`], [`default_batch_fits`] | one such page about recursive estimates over a record |
 //! | [`GroupReport`], [`GroupTables`], [`write_group_pages`], [`group_figures`] | one such page about a group of recorded runs |
 //! | [`comparison_figure`] | people by condition, with the means |
+//! | [`design_figure`], [`runs_figure`] | a designed experiment: lines and response, errors over runs |
 //! | [`PaperTable`] | a result as a table for a paper |
 //! | [`facts`] | the settings on all of these pages |
 //! | [`figures`] | the figures of these pages, each as an SVG text of its own |
@@ -53,6 +54,7 @@
 
 mod cells;
 mod comparison;
+mod design;
 mod error;
 mod facts;
 pub mod figures;
@@ -68,6 +70,7 @@ mod tables;
 mod track;
 
 pub use comparison::comparison_figure;
+pub use design::{design_figure, runs_figure};
 pub use error::ReportError;
 pub use facts::facts;
 pub use fit_summary::{FitSummary, ParameterRow, sentence};

@@ -57,6 +57,8 @@ impl PaperTable {
             level.unwrap_or_default()
         )];
         let columns = match (object.get("people"), object.get("lines")) {
+            // People of a design are next to the typical one, whom the table represents.
+            _ if text("kind") == "design" => of_estimates(object),
             _ if text("kind") == "comparison" => of_differences(object.get("differences")?.as_array()?),
             (Some(people), _) => of_people(people.as_array()?),
             (None, Some(lines)) if text("kind") == "description" => of_lines(lines.as_array()?),

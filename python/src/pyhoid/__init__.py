@@ -34,6 +34,7 @@ from .errors import (
     StudyStateError,
 )
 from .estimates import Estimate, Operator, Remnant
+from .experiment import ExperimentDesign, design
 from .fit import Fit, FrequencyResponse, Series, Validation
 from .groups import group, group_manifest, simulate_group, simulate_people
 from .identification import from_json, identify, identify_operator
@@ -65,6 +66,7 @@ __all__ = [
     "Error",
     "Estimate",
     "EstimationError",
+    "ExperimentDesign",
     "FileError",
     "FileMissingError",
     "Fit",
@@ -93,6 +95,7 @@ __all__ = [
     "convert",
     "describe",
     "describing_function",
+    "design",
     "discretise",
     "errors",
     "from_control",

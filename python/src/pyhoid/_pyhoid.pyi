@@ -50,6 +50,9 @@ __all__ = [
     "decimated",
     "describe",
     "describing_function",
+    "design",
+    "design_figures_of",
+    "design_files_of",
     "detrended",
     "discretise_transfer_function",
     "even_times",
@@ -487,6 +490,29 @@ def compare(
     weights: str,
 ) -> str: ...
 def comparison_figure_of(text: str) -> str: ...
+def design(
+    people: str,
+    *,
+    condition: str | None,
+    controlled_element: str | tuple[list[float], list[float]] | None,
+    form: str | None,
+    wanted: list[str],
+    disturbance: bool,
+    remnant: tuple[float, float],
+    length: float,
+    runs: int | None,
+    lines: int,
+    band: tuple[float, float],
+    shelf: float,
+    limits: tuple[float | None, float | None],
+    against: str | None,
+    difference: str | None,
+    statistics: tuple[float, float, float, float],
+    display: str,
+    seed: int,
+) -> str: ...
+def design_figures_of(text: str) -> tuple[str, str]: ...
+def design_files_of(text: str, scenario: str) -> tuple[str, str, str]: ...
 def from_json(text: str) -> OperatorFit | Fit | TimeVaryingFit: ...
 def from_state(text: str) -> Fit: ...
 def group_manifest(directory: _Path, pattern: str) -> tuple[str, list[str]]: ...

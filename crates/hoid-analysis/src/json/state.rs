@@ -7,7 +7,10 @@
 //! not against deliberate forgery.
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde_json::Value;
 use sha2::{Digest, Sha256};
+
+use crate::AnalysisError;
 
 /// Digits of the checksum.
 const DIGITS: usize = 16;
@@ -41,6 +44,20 @@ pub fn read<T: DeserializeOwned>(text: &str) -> Result<T, String> {
         )
     })?;
     Ok(table.value)
+}
+
+/// Returns the value in the `state` of the JSON of a result of this kind.
+///
+/// # Errors
+/// [`AnalysisError::NotAResult`] if the text is invalid or damaged, of another kind, or of another version.
+pub fn of_kind<T: DeserializeOwned>(text: &str, kind: &str) -> Result<T, AnalysisError> {
+    let none = |found: String| AnalysisError::NotAResult { found };
+    let object: Value = serde_json::from_str(text).map_err(|error| none(format!("it is not JSON: {error}")))?;
+    if object["kind"] != kind {
+        return Err(none(format!("its kind is {}, expected {kind:?}", object["kind"])));
+    }
+    let state = object["state"].as_str();
+    read(state.ok_or_else(|| none("it has no state".to_owned()))?).map_err(none)
 }
 
 fn sum(text: &str) -> String {

@@ -3,22 +3,30 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use hoid::design::experiment::{Remnant, Wanted};
-use hoid::model::ContinuousTransferFunction;
+use hoid::design::experiment::{ALPHA, Against, BETWEEN_PEOPLE, POWER, People, RUN_TO_RUN, Remnant, Sought, Wanted};
+use hoid::model::{ContinuousTransferFunction, Form, family_scenario::Display};
 
-use super::{parse::parse_span, show::ShowArgs};
+use super::{choices::choice_of, figure::FigureArgs, parse::parse_span, show::ShowArgs};
 
 #[derive(Debug, Args)]
 pub struct DesignArgs {
-    /// The person: a scenario of the family (.toml), or a fit that `hoid identify --json` printed
-    #[arg(long, value_name = "PERSON.toml|FIT.json")]
-    pub people: PathBuf,
-    /// The controlled element, as 90/(s(s+6)) or 90/1,6,0 [default: that of the scenario]
+    /// The people: population (as people are known to adapt to the controlled element), a scenario of the family (.toml),
+    /// a fit that `hoid identify --json` printed, the directory that `hoid group --out` wrote, its JSON or its
+    /// population.json. Of several people the errors of the typical one and of the worst one are reported
+    #[arg(long, value_name = "population|FILE|DIR", default_value = "population")]
+    pub people: People,
+    /// The condition of a group that has several
+    #[arg(long, value_name = "NAME")]
+    pub condition: Option<String>,
+    /// Form of the population's operator: gain, lead, lag, lead-lag ... [default: the one that people use with the element]
+    #[arg(long, value_name = "FORM", value_parser = choice_of(&Form::OF_ERROR))]
+    pub form: Option<Form>,
+    /// The controlled element, as 90/(s(s+6)) or 90/1,6,0 [default: that of the scenario or group]
     #[arg(long, value_name = "TF")]
     pub controlled_element: Option<ContinuousTransferFunction>,
     /// The quantities requested, with the standard error that is accepted: crossover=3%,tau_e=5%,phase_margin=2 (deg)
     /// [default: all parameters alike]
-    #[arg(long = "for", value_name = "LIST", value_delimiter = ',', value_parser = parse_wanted)]
+    #[arg(long = "for", value_name = "LIST", value_delimiter = ',')]
     pub wanted: Vec<Wanted>,
     /// The forcing function is a disturbance at the input of the controlled element, not a target
     #[arg(long)]
@@ -51,35 +59,40 @@ pub struct DesignArgs {
     /// Greatest rms of the control
     #[arg(long, value_name = "RMS")]
     pub max_u: Option<f64>,
-    /// A forcing function to be judged next to it: a scenario with a target or disturbance, or reference (the ten sines
-    /// of the text)
-    #[arg(long, value_name = "SCENARIO.toml|reference")]
-    pub against: Option<PathBuf>,
-    /// Directory for the design: design.json, scenario.toml, forcing.csv
+    /// A forcing function to be judged next to it: a scenario with a target or disturbance, a table of lines (columns
+    /// omega_rad_s, amplitude, phase_rad), or reference (the ten sines of the text)
+    #[arg(long, value_name = "FORCING.toml|.csv|reference")]
+    pub against: Option<Against>,
+    /// Difference between two conditions to be found, each person in both: crossover=.5 (rad/s), phase_margin=5 (deg),
+    /// tau_e=10% (of its value). The answer is the number of people and of runs in each condition
+    #[arg(long, value_name = "NAME=SIZE")]
+    pub difference: Option<Sought>,
+    /// Probability with which the difference is to be found
+    #[arg(long, value_name = "P", default_value_t = POWER, requires = "difference")]
+    pub power: f64,
+    /// Level of the test of the difference, of both sides
+    #[arg(long, value_name = "P", default_value_t = ALPHA, requires = "difference")]
+    pub alpha: f64,
+    /// Standard deviation of the difference between people, as a part of the quantity (of the phase margin: as by a gain
+    /// of this spread)
+    #[arg(long, value_name = "PART", default_value_t = BETWEEN_PEOPLE, requires = "difference")]
+    pub between_people: f64,
+    /// Standard deviation of a person from run to run, likewise
+    #[arg(long, value_name = "PART", default_value_t = RUN_TO_RUN, requires = "difference")]
+    pub run_to_run: f64,
+    /// Display of the task, written for the lab: compensatory (error only), pursuit (target and output), preview. On the
+    /// last two the design is that of the disturbance
+    #[arg(long, value_name = "NAME", default_value = "compensatory", value_parser = choice_of(&Display::ALL))]
+    pub display: Display,
+    /// Start of the search for phases: each gives other phases of the same lines; the same seed gives the same design
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Directory for the design: design.json, scenario.toml, lab.toml, forcing.csv, design.csv and .md, design.svg,
+    /// runs.svg; with --difference power.csv
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     #[command(flatten)]
+    pub picture: FigureArgs,
+    #[command(flatten)]
     pub show: ShowArgs,
-}
-
-/// `NAME=5%`, `NAME=0.05`.
-fn parse_wanted(text: &str) -> Result<Wanted, String> {
-    let (name, error) = text
-        .split_once('=')
-        .ok_or_else(|| format!("{text:?} has no error; write NAME=5%"))?;
-    let error = error.trim();
-    let (number, scale) = error.strip_suffix('%').map_or((error, 1.0), |number| (number, 0.01));
-    let number: f64 = number
-        .trim()
-        .parse()
-        .map_err(|_| format!("{error:?} is not an error; write NAME=5%"))?;
-    let name = match name.trim() {
-        "margin" => "phase_margin",
-        "delay" => "tau_e",
-        name => name,
-    };
-    Ok(Wanted {
-        name: name.to_owned(),
-        error: number * scale,
-    })
 }

@@ -2,36 +2,52 @@
 
 use std::path::Path;
 
-use hoid::design::experiment::{Designed, Designing, Enters, Expected, Remnant, Task, expected, periods};
-use hoid::io::{AnyScenario, read_any_scenario};
-use hoid::model::{
-    ContinuousTransferFunction, FamilyOperator, FamilyState,
-    forcing::{ForcingFunction, Sinusoid},
-    operator_family::NamedParameter,
-    uncertainty::Estimate,
+use hoid::design::experiment::{
+    DesignRequest, Designing, DifferencePlan, DifferenceRequest, Enters, Expected, ExperimentDesign, Remnant,
 };
-use serde_json::{Map, Value, json};
+use hoid::model::uncertainty::Estimate;
+use hoid::report::{PaperTable, design_figure, runs_figure};
+use serde_json::Value;
 
-use super::{output_paths, paper_table};
-use crate::{args::DesignArgs, error::CliError, json, output, text};
+use super::{figure, output_paths, paper_table};
+use crate::{args::DesignArgs, error::CliError, json, output, table::Rows, text};
 
-/// `--against` the ten sines of the text.
-const REFERENCE: &str = "reference";
-
-/// A forcing function for comparison with the design, over the same time.
-struct Other {
-    name: String,
-    expected: Expected,
-}
+/// The files of `--out` with the estimates as tables, and the scenario.
+const TABLES: [&str; 2] = ["design.csv", "design.md"];
+const SCENARIO: &str = "scenario.toml";
 
 pub fn run(args: &DesignArgs) -> Result<(), CliError> {
-    paper_table::check(&args.show)?;
-    output_paths::check(&[&args.people], &[args.show.table.as_deref()], &[])?;
-    if let Some(out) = &args.out {
-        hoid::io::check_output_directory(out, &[&args.people])?;
+    if let Some(figure) = &args.picture.figure {
+        figure::check(figure)?;
     }
-    let task = Task {
-        state: person(args)?,
+    paper_table::check(&args.show)?;
+    let inputs: Vec<&Path> = args.people.path().into_iter().collect();
+    let files = [args.picture.figure.as_deref(), args.show.table.as_deref()];
+    output_paths::check(&inputs, &files, &[])?;
+    if let Some(out) = &args.out {
+        hoid::io::check_output_directory(out, &inputs)?;
+    }
+    let found = request(args).run()?;
+    if let Some(path) = &args.picture.figure {
+        figure::write(path, &design_figure(&found), args.picture.width)?;
+    }
+    if let Some(out) = &args.out {
+        write_all(&found, out)?;
+    }
+    paper_table::write(&args.show, || Ok(found.json()))?;
+    if args.show.json {
+        json::print(&Value::Object(found.json()))
+    } else {
+        output::show(&page(&found, args.show.verbose))
+    }
+}
+
+fn request(args: &DesignArgs) -> DesignRequest {
+    DesignRequest {
+        people: args.people.clone(),
+        condition: args.condition.clone(),
+        controlled_element: args.controlled_element.clone(),
+        form: args.form,
         enters: if args.disturbance {
             Enters::Disturbance
         } else {
@@ -42,298 +58,206 @@ pub fn run(args: &DesignArgs) -> Result<(), CliError> {
             time_constant_s: args.remnant_time_constant,
             ..Remnant::default()
         },
-    };
-    let designing = Designing {
-        wanted: args.wanted.clone(),
-        period_s: args.length,
-        lines: args.lines,
-        band_rad_s: args.band,
-        shelf: args.shelf,
-        most_rms: [args.max_rms_e, args.max_u],
-    };
-    let designed = designing.run(&task)?;
-    let runs = args.runs.map_or(designed.periods, |runs| runs as usize);
-    let length_s = args.length * runs as f64;
-    let all_runs = expected(&task, &designed.forcing, length_s)?;
-    let other = args
-        .against
-        .as_deref()
-        .map(|path| against(path, &task, length_s))
-        .transpose()?;
-    let object = object(args, &task, &designed, (&all_runs, runs), other.as_ref());
-    if let Some(out) = &args.out {
-        write_all(args, &task, &designed, &object, out)?;
-    }
-    paper_table::write(&args.show, || Ok(object.clone()))?;
-    if args.show.json {
-        json::print(&Value::Object(object))
-    } else {
-        output::show(&page(args, &designed, (&all_runs, runs), other.as_ref()))
-    }
-}
-
-fn person(args: &DesignArgs) -> Result<FamilyState, CliError> {
-    let element = || -> Result<ContinuousTransferFunction, CliError> {
-        let missing = || {
-            CliError::Usage(
-                "a fit does not report the controlled element: add --controlled-element '90/(s(s+6))'".to_owned(),
-            )
-        };
-        args.controlled_element.clone().ok_or_else(missing)
-    };
-    if hoid::io::is_fit_file(&args.people.to_string_lossy()) {
-        let fit = hoid::io::read_fit(&args.people)?.operator()?;
-        return Ok(FamilyState {
-            operator: fit.operator,
-            controlled_element: element()?,
-        });
-    }
-    let mut state = family(&args.people)?.initial;
-    if let Some(element) = &args.controlled_element {
-        state.controlled_element = element.clone();
-    }
-    Ok(state)
-}
-
-fn family(path: &Path) -> Result<hoid::model::FamilyScenario, CliError> {
-    match read_any_scenario(path)? {
-        AnyScenario::Family(scenario) => Ok(*scenario),
-        AnyScenario::Reference(_) => Err(CliError::Usage(format!(
-            "{} is a scenario of the thesis; write one with the key form, as form = \"lead\"",
-            path.display()
-        ))),
-    }
-}
-
-fn against(path: &Path, task: &Task, length_s: f64) -> Result<Other, CliError> {
-    let name = path.display().to_string();
-    let forcing = if name == REFERENCE {
-        ForcingFunction::reference()
-    } else {
-        let scenario = family(path)?;
-        match task.enters {
-            Enters::Target => scenario.target.function,
-            Enters::Disturbance => scenario.disturbance.function,
-        }
-    };
-    Ok(Other {
-        expected: expected(task, &forcing, length_s)?,
-        name,
-    })
-}
-
-fn object(
-    args: &DesignArgs,
-    task: &Task,
-    designed: &Designed,
-    (all_runs, runs): (&Expected, usize),
-    other: Option<&Other>,
-) -> Map<String, Value> {
-    let mut map = Map::new();
-    let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
-    set("hoid", json!(env!("CARGO_PKG_VERSION")));
-    set("kind", json!("design"));
-    set("form", json!(task.state.operator.form().name()));
-    set("runs", json!(runs));
-    set("length_s", json::number(args.length));
-    set("runs_needed", json!(designed.periods));
-    set("crest_factor", json::number(designed.crest_factor));
-    for (key, value) in of_expected(all_runs) {
-        set(&key, value);
-    }
-    let line =
-        |l: &Sinusoid| json!({"omega_rad_s": l.omega_rad_s, "amplitude": l.amplitude_deg, "phase_rad": l.phase_rad});
-    set("lines", designed.forcing.sinusoids().iter().map(line).collect());
-    set(
-        "against",
-        other.map_or(Value::Null, |o| {
-            let mut of = of_expected(&o.expected);
-            of.insert("name".to_owned(), json!(o.name));
-            Value::Object(of)
+        designing: Designing {
+            wanted: args.wanted.clone(),
+            period_s: args.length,
+            lines: args.lines,
+            band_rad_s: args.band,
+            shelf: args.shelf,
+            most_rms: [args.max_rms_e, args.max_u],
+            seed: args.seed,
+        },
+        runs: args.runs.map(|runs| runs as usize),
+        against: args.against.clone(),
+        display: args.display,
+        difference: args.difference.clone().map(|sought| DifferenceRequest {
+            sought,
+            power: args.power,
+            alpha: args.alpha,
+            between_people: args.between_people,
+            run_to_run: args.run_to_run,
         }),
-    );
-    map
+    }
 }
 
-fn of_expected(e: &Expected) -> Map<String, Value> {
-    let parameter = |(name, unit, estimate): &(&str, &str, Estimate)| {
-        let mut one = json::named(name, estimate);
-        one["unit"] = json!(unit);
-        one
-    };
-    let mut map = Map::new();
-    map.insert("parameters".to_owned(), e.parameters.iter().map(parameter).collect());
-    map.insert(
-        "open_loop".to_owned(),
-        json!({"crossover_rad_s": json::estimate(&e.crossover_rad_s), "phase_margin_deg": json::estimate(&e.phase_margin_deg)}),
-    );
-    map.insert("rms_e".to_owned(), json::number(e.rms_e));
-    map.insert("rms_u".to_owned(), json::number(e.rms_u));
-    map
-}
-
-fn page(args: &DesignArgs, designed: &Designed, (all_runs, runs): (&Expected, usize), other: Option<&Other>) -> String {
-    let counted = text::counted(runs as u64, "run");
-    let mut page = format!("Errors to be expected of {counted} of {} s\n", args.length);
-    let mut header = vec!["", "value", "error", "relative"];
-    let name = other.map(|o| format!("with {}", o.name));
-    header.extend(name.as_deref());
-    let mut rows = text::table(&header);
-    let all = |e: &Expected| {
-        let mut all = vec![
-            ("crossover (rad/s)".to_owned(), e.crossover_rad_s),
-            ("phase margin (deg)".to_owned(), e.phase_margin_deg),
-        ];
-        all.extend(e.parameters.iter().map(|(name, unit, estimate)| match *unit {
-            "" => ((*name).to_owned(), *estimate),
-            unit => (format!("{name} ({unit})"), *estimate),
-        }));
-        all
-    };
-    let others = other.map(|o| all(&o.expected));
-    for (k, (name, estimate)) in all(all_runs).into_iter().enumerate() {
-        let error = estimate.standard_error.unwrap_or(f64::NAN);
-        let mut cells = vec![
-            name,
-            text::significant(estimate.value),
-            text::significant(error),
-            format!("{:.1} %", 100.0 * error / estimate.value.abs()),
-        ];
-        cells.extend(
-            others
-                .as_ref()
-                .map(|o| text::significant(o[k].1.standard_error.unwrap_or(f64::NAN))),
-        );
-        rows.add_row(cells);
-    }
-    page.push_str(&format!(
-        "{rows}\nrms of e {}, of u {}",
-        text::significant(all_runs.rms_e),
-        text::significant(all_runs.rms_u)
-    ));
-    if let Some(o) = other {
-        page.push_str(&format!(
-            " (with {}: {}, {})",
-            o.name,
-            text::significant(o.expected.rms_e),
-            text::significant(o.expected.rms_u)
-        ));
-    }
-    page.push_str(".\n");
-    if !args.wanted.is_empty() {
-        let needed = text::counted(designed.periods as u64, "run");
-        page.push_str(&format!("What is wanted takes {needed}.\n"));
-        if let Some(o) = other {
-            let of_one = o.expected.scaled((runs as f64).sqrt());
-            page.push_str(&format!(
-                "With {} it takes {}.\n",
-                o.name,
-                periods(&of_one, &args.wanted)
-            ));
-        }
-    }
-    let mut lines = text::table(&["line (rad/s)", "periods a run", "amplitude", "phase (rad)"]);
-    for line in designed.forcing.sinusoids() {
-        lines.add_row([
-            format!("{:.4}", line.omega_rad_s),
-            format!("{:.0}", line.omega_rad_s * args.length / std::f64::consts::TAU),
-            text::significant(line.amplitude_deg),
-            format!("{:.3}", line.phase_rad),
-        ]);
-    }
-    page.push_str(&format!(
-        "\nThe forcing function, crest factor {:.2}\n{lines}\n\
-         By the information of its lines, of a person who is as supposed in every run: what they vary by from run to run comes on top.\n",
-        designed.crest_factor
-    ));
-    page
-}
-
-fn write_all(
-    args: &DesignArgs,
-    task: &Task,
-    designed: &Designed,
-    object: &Map<String, Value>,
-    out: &Path,
-) -> Result<(), CliError> {
+fn write_all(found: &ExperimentDesign, out: &Path) -> Result<(), CliError> {
     hoid::io::make_directory(out)?;
     let write =
         |name: &str, text: &str| hoid::io::write_atomically(&out.join(name), |file| file.write_all(text.as_bytes()));
-    write("design.json", &format!("{:#}\n", Value::Object(object.clone())))?;
-    write("scenario.toml", &scenario(args, task, designed))?;
-    let line = |l: &Sinusoid| format!("{},{},{}\n", l.omega_rad_s, l.amplitude_deg, l.phase_rad);
-    let lines: String = designed.forcing.sinusoids().iter().map(line).collect();
-    write("forcing.csv", &format!("omega_rad_s,amplitude,phase_rad\n{lines}"))?;
+    write("design.json", &format!("{}\n", found.to_json()))?;
+    write(SCENARIO, &found.scenario())?;
+    match found.lab(SCENARIO) {
+        Some(lab) => write("lab.toml", &lab)?,
+        None => output::notice(
+            "",
+            "lab.toml: none is written, the lab takes runs of whole hundredths of a second; give --length so"
+                .to_owned(),
+        ),
+    }
+    write("forcing.csv", &found.forcing_csv())?;
+    write("design.svg", &design_figure(found))?;
+    write("runs.svg", &runs_figure(found))?;
+    if let Some(plan) = &found.difference {
+        write("power.csv", &plan.csv())?;
+    }
+    if let Some(table) = PaperTable::of(&found.json()) {
+        for name in TABLES {
+            table.write(&out.join(name))?;
+        }
+    }
     output::notice("", format!("the design: {}", out.display()));
     Ok(())
 }
 
-/// A scenario with the designed forcing function.
-fn scenario(args: &DesignArgs, task: &Task, designed: &Designed) -> String {
-    let numbers = |all: &[f64]| all.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
-    let element = &task.state.controlled_element;
-    let lines: Vec<String> = designed
-        .forcing
-        .sinusoids()
-        .iter()
-        .map(|l| {
-            format!(
-                "  {{ amplitude = {}, omega_rad_s = {}, phase_rad = {} }}",
-                l.amplitude_deg, l.omega_rad_s, l.phase_rad
-            )
-        })
-        .collect();
-    // A run is a whole number of samples: of 1/100 s if possible.
-    let hundredths = 100.0 * args.length;
-    let ts = match (hundredths - hundredths.round()).abs() < 1e-6 {
-        true => 0.01,
-        false => args.length / hundredths.ceil(),
+fn page(found: &ExperimentDesign, verbose: bool) -> String {
+    let counted = text::counted(found.runs as u64, "run");
+    let mut page = format!(
+        "Errors to be expected of {counted} of {} s, {} ({})\n{}\n{}",
+        found.length_s,
+        found.person,
+        found.task.state.operator.form(),
+        errors(found),
+        sizes(found)
+    );
+    page.push_str(&needed(found));
+    if let Some(plan) = &found.difference {
+        page.push_str(&difference(plan));
+    }
+    page.push_str(&format!(
+        "\nThe forcing function, crest factor {:.2}\n{}\n\
+         By the information of its lines, of a person who is as supposed in every run: what they vary by from run to run comes on top.\n",
+        found.crest_factor,
+        lines(found)
+    ));
+    for reason in found.verdict.reasons().chain(found.verdict.notes()) {
+        page.push_str(&format!("- {reason}\n"));
+    }
+    if verbose {
+        page.push_str(&text::settings(&found.settings));
+    }
+    page
+}
+
+/// Crossover, margin and parameters with their units.
+fn quantities(e: &Expected) -> Vec<(String, &'static str, Estimate)> {
+    let mut all = vec![
+        ("crossover (rad/s)".to_owned(), "crossover", e.crossover_rad_s),
+        ("phase margin (deg)".to_owned(), "phase_margin", e.phase_margin_deg),
+    ];
+    all.extend(e.parameters.iter().map(|p| match p.unit {
+        "" => (p.name.to_owned(), p.name, p.estimate),
+        unit => (format!("{} ({unit})", p.name), p.name, p.estimate),
+    }));
+    all
+}
+
+fn errors(found: &ExperimentDesign) -> Rows {
+    let others = [
+        found.worst.as_ref().map(|w| (format!("of {}", w.name), &w.expected)),
+        found
+            .against
+            .as_ref()
+            .map(|o| (format!("with {}", o.name), &o.expected)),
+    ];
+    let others: Vec<(String, &Expected)> = others.into_iter().flatten().collect();
+    let mut header = vec!["", "value", "error", "relative"];
+    header.extend(others.iter().map(|(name, _)| name.as_str()));
+    let mut rows = text::table(&header);
+    for (label, name, estimate) in quantities(&found.expected) {
+        let error = estimate.standard_error.unwrap_or(f64::NAN);
+        let mut cells = vec![
+            label,
+            text::significant(estimate.value),
+            text::significant(error),
+            format!("{:.1} %", 100.0 * error / estimate.value.abs()),
+        ];
+        cells.extend(others.iter().map(|(_, e)| {
+            let error = e.estimate(name).and_then(|e| e.standard_error);
+            error.map_or_else(String::new, text::significant)
+        }));
+        rows.add_row(cells);
+    }
+    rows
+}
+
+fn sizes(found: &ExperimentDesign) -> String {
+    let of = |e: &Expected| (text::significant(e.rms_e), text::significant(e.rms_u));
+    let (e, u) = of(&found.expected);
+    let other = found.against.as_ref().map_or_else(String::new, |o| {
+        let (e, u) = of(&o.expected);
+        format!(" (with {}: {e}, {u})", o.name)
+    });
+    format!("rms of e {e}, of u {u}{other}.\n")
+}
+
+/// The number of runs that the requested quantities need.
+fn needed(found: &ExperimentDesign) -> String {
+    if found.wanted.is_empty() {
+        return String::new();
+    }
+    let mut needed = format!(
+        "What is wanted takes {}.\n",
+        text::counted(found.runs_needed as u64, "run")
+    );
+    if let Some(worst) = &found.worst {
+        needed.push_str(&format!("Of {} it takes {}.\n", worst.name, worst.runs_needed));
+    }
+    if let Some(other) = &found.against {
+        needed.push_str(&format!("With {} it takes {}.\n", other.name, other.runs_needed));
+    }
+    needed
+}
+
+/// People and runs for a difference, and the table of the power.
+fn difference(plan: &DifferencePlan) -> String {
+    let sought = &plan.request.sought.name;
+    let unit = match sought.as_str() {
+        "crossover" => " rad/s",
+        "phase_margin" => " deg",
+        _ => "",
     };
-    let shape = match args.remnant_time_constant {
-        0.0 => "shape = \"white\"\n".to_owned(),
-        t => format!("shape = \"lag\"\nT_n_s = {t}\n"),
+    let size = format!("{sought} of {}{unit}", text::significant(plan.size));
+    let answer = match plan.answer() {
+        Some(row) => {
+            let runs = text::counted(row.runs as u64, "run");
+            match row.people {
+                Some(people) => format!("{people} people, {runs} of each in each condition"),
+                None => format!("more than 1000 people with {runs} of each"),
+            }
+        }
+        None => String::new(),
     };
+    let people: Vec<String> = plan.people.iter().map(|n| format!("{n} people")).collect();
+    let mut header = vec!["runs", "needed"];
+    header.extend(people.iter().map(String::as_str));
+    let mut rows = text::table(&header);
+    for row in &plan.rows {
+        let needed = row.people.map_or_else(|| "> 1000".to_owned(), |n| n.to_string());
+        let mut cells = vec![row.runs.to_string(), needed];
+        cells.extend(row.power.iter().map(|p| format!("{p:.2}")));
+        rows.add_row(cells);
+    }
     format!(
-        "# Made by `hoid design`.\nname = \"design\"\nform = \"{}\"\nneuromuscular = {}\nsample_time_s = {}\nmeasurement_s = {}\nrun_in_s = {}\n\n\
-         [initial]\n{}controlled_element = \"{}/{}\"\n\n[{}]\nlines = [\n{},\n]\n\n[[remnant]]\n{shape}share = {}\n",
-        task.state.operator.form().name(),
-        task.state.operator.has_neuromuscular(),
-        ts,
-        args.length,
-        ts * (10.0 / ts).round(),
-        operator_keys(&task.state.operator),
-        numbers(element.num()),
-        numbers(element.den()),
-        if args.disturbance { "disturbance" } else { "target" },
-        lines.join(",\n"),
-        args.remnant_share,
+        "\nA difference in {size} between two conditions takes {answer} (power {}, alpha {}).\n{rows}\n\
+         Power of the paired t test. A person's difference: {} between people, {} from run to run, {} expected error of a run.\n",
+        plan.request.power,
+        plan.request.alpha,
+        text::significant(plan.between_people),
+        text::significant(plan.run_to_run),
+        text::significant(plan.error_of_run),
     )
 }
 
-fn operator_keys(operator: &FamilyOperator) -> String {
-    let key = |p: &NamedParameter| {
-        let name = match p.name {
-            "K_e" => "K",
-            "T_L" => "T_L_s",
-            "T_I" => "T_I_s",
-            "c_1" => "c_1_s",
-            "c_2" => "c_2_s2",
-            "alpha" => "alpha_rad_s",
-            "omega_nm" => "omega_nm_rad_s",
-            "tau_e" => "tau_e_s",
-            other => other,
-        };
-        let value = if p.value.is_finite() {
-            p.value.to_string()
-        } else {
-            "inf".to_owned()
-        };
-        format!("{name} = {value}\n")
-    };
-    operator
-        .named()
-        .iter()
-        .filter(|p| p.coordinate.is_some())
-        .map(key)
-        .collect()
+fn lines(found: &ExperimentDesign) -> Rows {
+    let mut lines = text::table(&["line (rad/s)", "periods a run", "amplitude", "phase (rad)"]);
+    for designed in &found.lines {
+        let line = designed.line;
+        lines.add_row([
+            format!("{:.4}", line.omega_rad_s),
+            format!("{:.0}", line.omega_rad_s * found.length_s / std::f64::consts::TAU),
+            text::significant(line.amplitude_deg),
+            format!("{:.3}", line.phase_rad),
+        ]);
+    }
+    lines
 }

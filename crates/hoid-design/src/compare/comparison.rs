@@ -183,14 +183,6 @@ impl Comparison {
     /// # Errors
     /// [`AnalysisError::NotAResult`] if the text is invalid or damaged, or has another version.
     pub fn from_json(text: &str) -> Result<Self, AnalysisError> {
-        let none = |found: String| AnalysisError::NotAResult { found };
-        let object: Value = serde_json::from_str(text).map_err(|error| none(format!("it is not JSON: {error}")))?;
-        if object["kind"] != KIND {
-            return Err(none(format!("its kind is {}, expected {KIND:?}", object["kind"])));
-        }
-        let state = object["state"]
-            .as_str()
-            .ok_or_else(|| none("it has no state".to_owned()))?;
-        json::state::read(state).map_err(none)
+        json::state::of_kind(text, KIND)
     }
 }

@@ -24,19 +24,11 @@ use hoid_numerics::statistics::mean;
 use nalgebra::{DMatrix, DVector};
 
 use super::{
-    DesignError, Expected, Task,
+    DesignError, Expected, Task, Wanted,
     information::{Loop, inverse},
     lines::{crest_factor, multiples, set_phases},
+    periods,
 };
-
-/// A quantity to be estimated, with its accepted error.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Wanted {
-    /// `crossover`, `phase_margin`, or a parameter.
-    pub name: String,
-    /// The accepted standard error: in deg for the phase margin, relative to the value for all others.
-    pub error: f64,
-}
 
 /// Options of the design of a forcing function.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,6 +45,8 @@ pub struct Designing {
     pub shelf: f64,
     /// Largest rms of e and of u; without limits the forcing function has an rms of one.
     pub most_rms: [Option<f64>; 2],
+    /// Start of the search for phases: each gives other phases of the same lines, so that a signal is not learned.
+    pub seed: u64,
 }
 
 impl Default for Designing {
@@ -64,6 +58,7 @@ impl Default for Designing {
             band_rad_s: (0.2, 18.0),
             shelf: 0.2,
             most_rms: [None; 2],
+            seed: 0,
         }
     }
 }
@@ -158,7 +153,7 @@ impl Designing {
         if scale.is_finite() {
             lines.iter_mut().for_each(|line| line.amplitude_deg *= scale);
         }
-        set_phases(&mut lines, self.period_s);
+        set_phases(&mut lines, self.period_s, self.seed);
         let forcing = ForcingFunction::new(lines)?;
         let expected = all.expected(&forcing, self.period_s)?;
         Ok(Designed {
@@ -197,14 +192,6 @@ impl Designing {
         }
         self.wanted.iter().map(of).collect()
     }
-}
-
-/// Number of periods until each quantity has its accepted error.
-pub fn periods(of_one: &Expected, wanted: &[Wanted]) -> usize {
-    let needed = wanted
-        .iter()
-        .filter_map(|w| Some((of_one.relative_error(&w.name)? / w.error).powi(2)));
-    needed.fold(1.0, f64::max).ceil() as usize
 }
 
 struct Search<'a> {
@@ -308,7 +295,7 @@ mod tests {
         let sum = |of: &Expected| -> f64 {
             of.parameters
                 .iter()
-                .map(|(_, _, e)| (e.standard_error.unwrap() / e.value).powi(2))
+                .map(|p| (p.estimate.standard_error.unwrap() / p.estimate.value).powi(2))
                 .sum()
         };
         println!(

@@ -30,11 +30,12 @@ use hoid_model::{
     uncertainty::Estimate,
 };
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 
-use super::DesignError;
+use super::{DesignError, Expected, ExpectedParameter};
 
 /// Point at which the forcing function enters the loop.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Enters {
     /// It is the target signal.
     #[default]
@@ -43,8 +44,13 @@ pub enum Enters {
     Disturbance,
 }
 
+hoid_model::named_choice!(Enters, "point of entry of the forcing function", 2, {
+    Target => "target",
+    Disturbance => "disturbance",
+});
+
 /// The remnant of a person.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Remnant {
     /// Its share of the variance of u.
     pub share: f64,
@@ -66,7 +72,7 @@ impl Default for Remnant {
 }
 
 /// The loop of an experiment: person, controlled element, forcing function and remnant.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Task {
     /// The person and the controlled element.
     pub state: FamilyState,
@@ -74,21 +80,6 @@ pub struct Task {
     pub enters: Enters,
     /// Remnant of the person.
     pub remnant: Remnant,
-}
-
-/// Expected standard errors.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Expected {
-    /// Parameters of the person: name, unit, and value with standard error.
-    pub parameters: Vec<(&'static str, &'static str, Estimate)>,
-    /// Crossover frequency, rad/s.
-    pub crossover_rad_s: Estimate,
-    /// Phase margin, deg.
-    pub phase_margin_deg: Estimate,
-    /// Root mean square of the error, in the unit of the forcing function.
-    pub rms_e: f64,
-    /// Root mean square of the control.
-    pub rms_u: f64,
 }
 
 /// Power and information of a line, for unit amplitude.
@@ -103,7 +94,7 @@ struct Worth {
 
 /// Quantities of a task that do not depend on the forcing function.
 pub(super) struct Loop<'a> {
-    task: &'a Task,
+    pub task: &'a Task,
     /// `int |S|^2 density df`, and the same through P, for a remnant of unit gain.
     noise: [f64; 2],
     pub crossover_rad_s: f64,
@@ -145,13 +136,14 @@ impl<'a> Loop<'a> {
     }
 
     /// Returns S and P.
-    fn sensitivity(&self, omega: f64) -> (Complex64, Complex64) {
+    pub fn sensitivity(&self, omega: f64) -> (Complex64, Complex64) {
         let p = self.task.state.controlled_element.response(omega);
         let h = self.task.state.operator.response(omega);
         (1.0 / (1.0 + h * p), p)
     }
 
-    fn density(&self, omega: f64) -> f64 {
+    /// Density of the remnant of unit gain.
+    pub fn density(&self, omega: f64) -> f64 {
         let Remnant {
             time_constant_s, order, ..
         } = self.task.remnant;
@@ -202,28 +194,50 @@ impl<'a> Loop<'a> {
             });
         }
         let lines = forcing.sinusoids();
-        let worths: Vec<Worth> = lines.iter().map(|line| self.worth(line.omega_rad_s)).collect();
-        let [rms_e, rms_u, gain] = self.powers(&worths, lines);
+        let [rms_e, rms_u, _] = self.powers(&self.worths(lines), lines);
+        let covariance = self.covariance(lines, length_s)?;
+        let rows: Vec<f64> = covariance.transpose().iter().copied().collect();
+        let operator = &self.task.state.operator;
+        let parameters = operator.named_estimates(Some(&rows)).into_iter();
+        let [crossover_rad_s, phase_margin_deg] = self.margins(operator, &covariance);
+        Ok(Expected {
+            parameters: parameters
+                .map(|(p, estimate)| ExpectedParameter {
+                    name: p.name,
+                    unit: p.unit,
+                    estimate,
+                })
+                .collect(),
+            crossover_rad_s,
+            phase_margin_deg,
+            rms_e,
+            rms_u,
+        })
+    }
+
+    fn worths(&self, lines: &[Sinusoid]) -> Vec<Worth> {
+        lines.iter().map(|line| self.worth(line.omega_rad_s)).collect()
+    }
+
+    /// Returns K^2 of the remnant with these lines.
+    pub fn remnant_gain(&self, lines: &[Sinusoid]) -> f64 {
+        let [_, _, gain] = self.powers(&self.worths(lines), lines);
+        gain
+    }
+
+    /// Returns the least covariance of the coordinates.
+    pub fn covariance(&self, lines: &[Sinusoid], length_s: f64) -> Result<DMatrix<f64>, DesignError> {
+        let worths = self.worths(lines);
+        let [_, _, gain] = self.powers(&worths, lines);
         let n = self.task.state.operator.coordinates().len();
         let mut information = DMatrix::zeros(n, n);
         for (worth, line) in worths.iter().zip(lines) {
             let scale = 0.5 * length_s * line.amplitude_deg.powi(2) * worth.error / gain;
             information += &worth.information * scale;
         }
-        let covariance = inverse(&information).ok_or(DesignError::NotIdentifiable {
+        inverse(&information).ok_or(DesignError::NotIdentifiable {
             lines: lines.len(),
             coordinates: n,
-        })?;
-        let rows: Vec<f64> = covariance.transpose().iter().copied().collect();
-        let operator = &self.task.state.operator;
-        let parameters = operator.named_estimates(Some(&rows)).into_iter();
-        let [crossover_rad_s, phase_margin_deg] = self.margins(operator, &covariance);
-        Ok(Expected {
-            parameters: parameters.map(|(p, estimate)| (p.name, p.unit, estimate)).collect(),
-            crossover_rad_s,
-            phase_margin_deg,
-            rms_e,
-            rms_u,
         })
     }
 
@@ -241,6 +255,11 @@ impl<'a> Loop<'a> {
         self.worth(omega).control
     }
 
+    /// Variance of e divided by that of a line of the forcing function.
+    pub fn error_by_power(&self, omega: f64) -> f64 {
+        self.worth(omega).error
+    }
+
     /// Quantities that can be requested: name, gradient with respect to the coordinates, and the scale of the error: 1
     /// deg, or the value.
     pub fn gradients(&self) -> Vec<(&'static str, DVector<f64>, f64)> {
@@ -251,6 +270,15 @@ impl<'a> Loop<'a> {
             .into_iter()
             .chain(parameters.map(|(p, gradient)| (p.name, DVector::from_vec(gradient), p.value.abs())))
             .collect()
+    }
+
+    /// Change of the phase margin in deg with the logarithm of the gain, without its sign.
+    pub fn margin_by_gain_deg(&self) -> f64 {
+        let operator = &self.task.state.operator;
+        let [_, (_, gradient)] = self.margin_gradients(operator);
+        // The first coordinate is the gain.
+        let gain = operator.coordinates().first();
+        gain.map_or(f64::NAN, |gain| (gradient[0] * gain).abs())
     }
 
     fn margins(&self, operator: &FamilyOperator, covariance: &DMatrix<f64>) -> [Estimate; 2] {
@@ -278,37 +306,6 @@ impl<'a> Loop<'a> {
         let phase = 180.0 + logarithm(omega).im.to_degrees();
         let phase = phase - 360.0 * (phase / 360.0).round();
         [(omega, shift), (phase, margin)]
-    }
-}
-
-impl Expected {
-    /// Returns the same with all errors multiplied by a factor.
-    #[must_use]
-    pub fn scaled(&self, by: f64) -> Self {
-        let of = |e: &Estimate| Estimate {
-            standard_error: e.standard_error.map(|error| error * by),
-            ..*e
-        };
-        Self {
-            parameters: self
-                .parameters
-                .iter()
-                .map(|(name, unit, e)| (*name, *unit, of(e)))
-                .collect(),
-            crossover_rad_s: of(&self.crossover_rad_s),
-            phase_margin_deg: of(&self.phase_margin_deg),
-            ..*self
-        }
-    }
-
-    /// Error of `crossover` or of a parameter relative to its value; of `phase_margin` in deg.
-    pub fn relative_error(&self, name: &str) -> Option<f64> {
-        let relative = |e: &Estimate| Some(e.standard_error? / e.value.abs());
-        match name {
-            "crossover" => relative(&self.crossover_rad_s),
-            "phase_margin" => self.phase_margin_deg.standard_error,
-            name => relative(&self.parameters.iter().find(|(n, _, _)| *n == name)?.2),
-        }
     }
 }
 
@@ -371,8 +368,12 @@ pub(super) mod tests {
         let of = |task: &Task, length| expected(task, &forcing, length).unwrap();
         let (one, four) = (of(&task(0.2), 81.92), of(&task(0.2), 4.0 * 81.92));
         let error = |e: &Estimate| e.standard_error.unwrap();
-        for ((name, _, a), (_, _, b)) in one.parameters.iter().zip(&four.parameters) {
-            assert!((error(a) / error(b) - 2.0).abs() < 1e-9, "{name}");
+        for (a, b) in one.parameters.iter().zip(&four.parameters) {
+            assert!(
+                (error(&a.estimate) / error(&b.estimate) - 2.0).abs() < 1e-9,
+                "{}",
+                a.name
+            );
         }
         let tenth: Vec<Sinusoid> = forcing
             .sinusoids()

@@ -2,59 +2,44 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`expected`] | standard errors of a person from the information of the lines of a forcing function |
+//! | [`DesignRequest`] | from the question to the answer, an [`ExperimentDesign`] with its JSON and its files (`files`) |
+//! | [`People`] | for whom: the population (`adapted`), a person, a group (`group_people`) |
+//! | [`expected`](fn@expected) | standard errors of a person from the information of the lines of a forcing function |
 //! | [`Designing`] | most informative amplitudes and frequencies of the lines, under limits |
 //! | [`crest_factor`] | lines without common harmonics (`lines`), and their phases |
+//! | [`Against`] | another forcing function for comparison |
+//! | [`DifferenceRequest`] | people and runs to find a difference between conditions, by the [`power`](fn@power) of the test |
+//! | [`Wanted`] | requested quantities, and the number of runs that they need |
 
+mod adapted;
+mod against;
+mod answer;
 mod designing;
+mod difference;
+mod error;
+mod expected;
+mod files;
+mod group_people;
 mod information;
 mod lines;
+mod people;
+mod power;
+mod request;
+mod response;
+mod wanted;
 
-use hoid_model::ModelError;
-use thiserror::Error;
-
-pub use designing::{Designed, Designing, Wanted, periods};
-pub use information::{Enters, Expected, Remnant, Task, expected};
+pub use against::Against;
+pub use answer::{Compared, ExperimentDesign, PersonExpected};
+pub use designing::{Designed, Designing};
+pub use difference::{
+    ALPHA, BETWEEN_PEOPLE, DifferencePlan, DifferenceRequest, POWER, RUN_TO_RUN, RunsAndPeople, Sought,
+};
+pub use error::DesignError;
+pub use expected::{Expected, ExpectedParameter};
+pub use information::{Enters, Remnant, Task, expected};
 pub use lines::crest_factor;
-
-/// Errors of the prediction of an experiment.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum DesignError {
-    /// A number out of range.
-    #[error("{quantity} is {found}, expected {expected}")]
-    OutOfRange {
-        /// Name of the quantity.
-        quantity: &'static str,
-        /// The value found.
-        found: f64,
-        /// The admissible values.
-        expected: &'static str,
-    },
-    /// A loop without a crossover.
-    #[error(
-        "the gain of the loop does not fall through one between 0.01 and 100 rad/s: give the person another gain, or other units of the element"
-    )]
-    NoCrossover,
-    /// Lines that do not determine the parameters of the person.
-    #[error(
-        "{lines} lines do not determine {coordinates} parameters: add lines, each of which gives two numbers, and spread them over the frequencies at which the person works"
-    )]
-    NotIdentifiable {
-        /// Number of lines.
-        lines: usize,
-        /// Number of parameters of the person.
-        coordinates: usize,
-    },
-    /// A requested quantity that is not a parameter of the person.
-    #[error("{name} is nothing that this person has; expected one of {expected}")]
-    NotThere {
-        /// Name of the requested quantity.
-        name: String,
-        /// The available quantities.
-        expected: String,
-    },
-    /// An invalid operator or element, or an unstable loop.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-}
+pub use people::People;
+pub use power::{noncentral_t_cdf, people_needed, power};
+pub use request::DesignRequest;
+pub use response::{DesignedLine, ExpectedResponse};
+pub use wanted::{Wanted, periods};

@@ -9,15 +9,18 @@
 //! | file | contents |
 //! |---|---|
 //! | `state` | [`FamilyState`]: operator and controlled element at one instant |
+//! | `display` | [`Display`]: what the person sees |
 //! | `multi_sine` | [`MultiSine`], [`Excitation`]: targets and disturbances as in recorded tasks |
 //! | `remnant` | [`RemnantPart`], [`Stick`]: components of u other than the response |
 //! | `scenario` | [`FamilyScenario`] and its quantities for a simulation |
 
+mod display;
 mod multi_sine;
 mod remnant;
 mod scenario;
 mod state;
 
+pub use display::Display;
 pub use multi_sine::{Excitation, Interleaved, MultiSine};
 pub use remnant::{Followed, Intermittence, PartStrength, Pulses, RemnantPart, RemnantShape, SignalDependence, Stick};
 pub use scenario::{FamilyScenario, Feedforward, ResolvedFamilyScenario};

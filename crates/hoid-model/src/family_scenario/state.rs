@@ -7,7 +7,7 @@ use crate::{
 };
 
 /// Operator of the family and controlled element at one instant.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FamilyState {
     /// The operator.
     pub operator: FamilyOperator,

@@ -1,0 +1,107 @@
+//! Forcing functions that are judged next to the designed one.
+
+use std::{
+    convert::Infallible,
+    path::{Path, PathBuf},
+    str::FromStr,
+};
+
+use hoid_io::{AnyScenario, ColumnValues, OutputTable, read_any_scenario, read_table};
+use hoid_model::{
+    FamilyScenario,
+    forcing::{ForcingFunction, Sinusoid},
+};
+
+use super::{DesignError, Enters};
+
+/// Another forcing function: the ten sines of the text by the name `reference`, those of a scenario, or the lines in a
+/// table with the columns omega_rad_s, amplitude and, if there is one, phase_rad.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Against {
+    /// The ten sines of the text.
+    Reference,
+    /// A scenario (`.toml`) or a table of lines.
+    File(PathBuf),
+}
+
+/// Name of [`Against::Reference`].
+const REFERENCE: &str = "reference";
+
+impl Against {
+    /// Returns what a text names.
+    pub fn of_text(text: &str) -> Self {
+        match text {
+            REFERENCE => Self::Reference,
+            file => Self::File(file.into()),
+        }
+    }
+}
+
+impl FromStr for Against {
+    type Err = Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Infallible> {
+        Ok(Self::of_text(text))
+    }
+}
+
+impl Against {
+    pub(super) fn name(&self) -> String {
+        match self {
+            Self::Reference => REFERENCE.to_owned(),
+            Self::File(path) => path.display().to_string(),
+        }
+    }
+
+    pub(super) fn forcing(&self, enters: Enters) -> Result<ForcingFunction, DesignError> {
+        match self {
+            Self::Reference => Ok(ForcingFunction::reference()),
+            Self::File(path) if is_scenario(path) => {
+                let scenario = family(path)?;
+                Ok(match enters {
+                    Enters::Target => scenario.target.function,
+                    Enters::Disturbance => scenario.disturbance.function,
+                })
+            }
+            Self::File(path) => lines(&read_table(path)?, path),
+        }
+    }
+}
+
+fn is_scenario(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
+}
+
+/// Reads a scenario of the family.
+pub(super) fn family(path: &Path) -> Result<FamilyScenario, DesignError> {
+    match read_any_scenario(path)? {
+        AnyScenario::Family(scenario) => Ok(*scenario),
+        AnyScenario::Reference(_) => Err(DesignError::OtherScenario {
+            path: path.display().to_string(),
+        }),
+    }
+}
+
+fn lines(table: &OutputTable, path: &Path) -> Result<ForcingFunction, DesignError> {
+    let column = |name: &str| match table.column(name) {
+        Some(ColumnValues::Real(values)) => Some(values.clone()),
+        Some(ColumnValues::Whole(values)) => Some(values.iter().map(|v| *v as f64).collect()),
+        _ => None,
+    };
+    let (Some(omega), Some(amplitude)) = (column("omega_rad_s"), column("amplitude")) else {
+        let names: Vec<&str> = table.columns.iter().map(|c| c.name.as_str()).collect();
+        return Err(DesignError::NoLines {
+            path: path.display().to_string(),
+            found: names.join(", "),
+        });
+    };
+    let phase = column("phase_rad").unwrap_or_else(|| vec![0.0; omega.len()]);
+    let line = |((omega_rad_s, amplitude_deg), phase_rad)| Sinusoid {
+        amplitude_deg,
+        omega_rad_s,
+        phase_rad,
+    };
+    let lines = omega.into_iter().zip(amplitude).zip(phase).map(line).collect();
+    Ok(ForcingFunction::new(lines)?)
+}

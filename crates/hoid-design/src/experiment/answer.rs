@@ -1,0 +1,171 @@
+//! The designed experiment: forcing function, expected errors of the typical person and of the others, and its JSON.
+
+use hoid_analysis::{AnalysisError, Setting, json};
+use hoid_model::{Verdict, family_scenario::Display};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
+
+use super::{DesignedLine, DifferencePlan, Expected, ExpectedResponse, Task, Wanted};
+
+/// A person with the errors to be expected of them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PersonExpected {
+    /// Name of the person.
+    pub name: String,
+    /// Errors of all runs.
+    pub expected: Expected,
+    /// Number of runs until every requested quantity has its accepted error.
+    pub runs_needed: usize,
+}
+
+/// Another forcing function, judged over the same time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Compared {
+    /// Its name.
+    pub name: String,
+    /// Errors of all runs.
+    pub expected: Expected,
+    /// Number of runs until every requested quantity has its accepted error.
+    pub runs_needed: usize,
+}
+
+/// A designed experiment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ExperimentDesign {
+    /// The typical person, with element, point of entry and remnant.
+    pub task: Task,
+    /// Name of the typical person.
+    pub person: String,
+    /// Length of a run in s, the period of the forcing function.
+    pub length_s: f64,
+    /// Number of runs.
+    pub runs: usize,
+    /// Number of runs until every requested quantity of the typical person has its accepted error.
+    pub runs_needed: usize,
+    /// The requested quantities.
+    pub wanted: Vec<Wanted>,
+    /// Display of the task.
+    pub display: Display,
+    /// Lines of the forcing function, with the errors of all runs.
+    pub lines: Vec<DesignedLine>,
+    /// The operator between the lines, with the errors of all runs.
+    pub response: Vec<ExpectedResponse>,
+    /// Its peak divided by its rms.
+    pub crest_factor: f64,
+    /// Errors of all runs of the typical person.
+    pub expected: Expected,
+    /// The other people, with the same forcing function.
+    pub people: Vec<PersonExpected>,
+    /// The person with the greatest errors; `None` for one person.
+    pub worst: Option<PersonExpected>,
+    /// Another forcing function.
+    pub against: Option<Compared>,
+    /// People and runs to find a difference.
+    pub difference: Option<DifferencePlan>,
+    /// The settings.
+    pub settings: Vec<Setting>,
+    /// The verdict.
+    pub verdict: Verdict,
+}
+
+/// Value of `kind` in the JSON of [`ExperimentDesign::json`].
+const KIND: &str = "design";
+
+impl ExperimentDesign {
+    /// Returns the JSON object.
+    pub fn json(&self) -> Map<String, Value> {
+        let mut map = json::envelope(KIND, &[], &[], &[], &self.verdict, &self.settings);
+        let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
+        set("person", json!(self.person));
+        set("form", json!(self.task.state.operator.form().name()));
+        set(
+            "controlled_element",
+            json!(self.task.state.controlled_element.to_string()),
+        );
+        set("display", json!(self.display.name()));
+        set("runs", json!(self.runs));
+        set("length_s", json::number(self.length_s));
+        set("runs_needed", json!(self.runs_needed));
+        set("crest_factor", json::number(self.crest_factor));
+        for (key, value) in of_expected(&self.expected) {
+            set(&key, value);
+        }
+        set("lines", self.lines.iter().map(of_line).collect());
+        set("response", self.response.iter().map(of_response).collect());
+        set("people", self.people.iter().map(of_person).collect());
+        set("worst", self.worst.as_ref().map_or(Value::Null, of_person));
+        set(
+            "against",
+            self.against.as_ref().map_or(Value::Null, |other| {
+                of_named(&other.name, &other.expected, other.runs_needed)
+            }),
+        );
+        set(
+            "difference",
+            self.difference.as_ref().map_or(Value::Null, DifferencePlan::json),
+        );
+        let state = json::state::written(self).map_or(Value::Null, Value::String);
+        set("state", state);
+        map
+    }
+
+    /// Returns the JSON as indented text.
+    pub fn to_json(&self) -> String {
+        format!("{:#}", Value::Object(self.json()))
+    }
+
+    /// Reads the output of [`Self::to_json`].
+    ///
+    /// # Errors
+    /// [`AnalysisError::NotAResult`] if the text is invalid or damaged, or has another version.
+    pub fn from_json(text: &str) -> Result<Self, AnalysisError> {
+        json::state::of_kind(text, KIND)
+    }
+}
+
+fn of_line(designed: &DesignedLine) -> Value {
+    let mut one = of_response(&designed.response);
+    one["amplitude"] = json::number(designed.line.amplitude_deg);
+    one["phase_rad"] = json::number(designed.line.phase_rad);
+    one["to_remnant"] = json::number(designed.to_remnant);
+    one
+}
+
+fn of_response(r: &ExpectedResponse) -> Value {
+    json!({
+        "omega_rad_s": json::number(r.omega_rad_s),
+        "gain_db": json::number(r.gain_db.value),
+        "gain_se_db": json::optional(r.gain_db.standard_error),
+        "phase_deg": json::number(r.phase_deg.value),
+        "phase_se_deg": json::optional(r.phase_deg.standard_error),
+    })
+}
+
+fn of_person(person: &PersonExpected) -> Value {
+    of_named(&person.name, &person.expected, person.runs_needed)
+}
+
+fn of_named(name: &str, expected: &Expected, runs_needed: usize) -> Value {
+    let mut map = Map::new();
+    map.insert("name".to_owned(), json!(name));
+    map.insert("runs_needed".to_owned(), json!(runs_needed));
+    map.extend(of_expected(expected));
+    Value::Object(map)
+}
+
+fn of_expected(e: &Expected) -> Map<String, Value> {
+    let parameter = |p: &super::ExpectedParameter| {
+        let mut one = json::named(p.name, &p.estimate);
+        one["unit"] = json!(p.unit);
+        one
+    };
+    let mut map = Map::new();
+    map.insert("parameters".to_owned(), e.parameters.iter().map(parameter).collect());
+    map.insert(
+        "open_loop".to_owned(),
+        json!({"crossover_rad_s": json::estimate(&e.crossover_rad_s), "phase_margin_deg": json::estimate(&e.phase_margin_deg)}),
+    );
+    map.insert("rms_e".to_owned(), json::number(e.rms_e));
+    map.insert("rms_u".to_owned(), json::number(e.rms_u));
+    map
+}

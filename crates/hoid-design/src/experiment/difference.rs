@@ -1,0 +1,358 @@
+//! Number of people and runs to find a difference between two conditions, each person in both.
+//!
+//! A person's difference of the means of r runs in each of two conditions has the variance
+//!
+//! `sigma^2 = b^2 + 2 (w^2 + s^2)/r`
+//!
+//! with the standard deviation b of the true difference between people, w of a person from run to run, and the expected
+//! error s of one run (`information`). The power of the paired t test is that of `power`. More runs help against w and
+//! s, and only more people against b.
+//!
+//! **Defaults.** From run to run 6 % (4 to 9 % of the gain in three recorded people), between people 10 % (the crossover of three
+//! recorded people fell by .31 to .78 rad/s from one element to another: a standard deviation of 10 % of its mean). A
+//! spread is relative to the quantity, and of the phase margin that which a gain of this spread makes.
+//!
+//! **Answer.** Without a number of runs it is the one for which people cost least, if a person costs as much as four
+//! runs more (instruction and training).
+
+use std::str::FromStr;
+
+use hoid_analysis::json;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
+
+use super::{
+    DesignError, Expected, Task,
+    information::Loop,
+    power::{MOST_PEOPLE, people_needed, power},
+    wanted::named_number,
+};
+
+/// The difference to be found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Sought {
+    /// `crossover`, `phase_margin`, or a parameter.
+    pub name: String,
+    /// Its size: in the unit of the quantity, or relative to its value.
+    pub size: f64,
+    /// True if the size is relative.
+    pub relative: bool,
+}
+
+impl FromStr for Sought {
+    type Err = DesignError;
+
+    /// `crossover=.5` in rad/s, `tau_e=10%` of its value.
+    fn from_str(text: &str) -> Result<Self, DesignError> {
+        let (name, number, relative) = named_number(text, "quantity with the size of its difference")?;
+        Ok(Self {
+            name,
+            size: if relative { number / 100.0 } else { number },
+            relative,
+        })
+    }
+}
+
+/// Options of the search for a difference.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DifferenceRequest {
+    /// The difference.
+    pub sought: Sought,
+    /// The probability with which it is to be found.
+    pub power: f64,
+    /// The level of the test.
+    pub alpha: f64,
+    /// Standard deviation of the difference between people, relative.
+    pub between_people: f64,
+    /// Standard deviation of a person from run to run, relative.
+    pub run_to_run: f64,
+}
+
+/// Probability with which a difference is to be found.
+pub const POWER: f64 = 0.8;
+/// Level of the test.
+pub const ALPHA: f64 = 0.05;
+/// Standard deviation of the difference between people, relative.
+pub const BETWEEN_PEOPLE: f64 = 0.1;
+/// Standard deviation of a person from run to run, relative.
+pub const RUN_TO_RUN: f64 = 0.06;
+
+impl DifferenceRequest {
+    /// The difference with the defaults.
+    pub fn new(sought: Sought) -> Self {
+        Self {
+            sought,
+            power: POWER,
+            alpha: ALPHA,
+            between_people: BETWEEN_PEOPLE,
+            run_to_run: RUN_TO_RUN,
+        }
+    }
+}
+
+/// A number of runs in each condition with the people that it takes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RunsAndPeople {
+    /// Number of runs in each condition.
+    pub runs: usize,
+    /// Standard deviation of a person's difference.
+    pub of_person: f64,
+    /// Number of people; `None` if it is above a thousand.
+    pub people: Option<usize>,
+    /// Power for each number of people of the table.
+    pub power: Vec<f64>,
+}
+
+/// People and runs for a difference.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DifferencePlan {
+    /// The request.
+    pub request: DifferenceRequest,
+    /// Difference in the unit of the quantity.
+    pub size: f64,
+    /// Expected error of one run.
+    pub error_of_run: f64,
+    /// Standard deviation from run to run.
+    pub run_to_run: f64,
+    /// Standard deviation of the difference between people.
+    pub between_people: f64,
+    /// Numbers of people in the table.
+    pub people: Vec<usize>,
+    /// Numbers of runs with their power.
+    pub rows: Vec<RunsAndPeople>,
+    /// The row of the answer.
+    pub answer: usize,
+}
+
+/// Numbers of runs in the table.
+const RUNS: [usize; 6] = [1, 2, 3, 4, 6, 8];
+/// Numbers of people in the table.
+const PEOPLE: [usize; 10] = [3, 4, 6, 8, 10, 12, 16, 20, 30, 40];
+/// Cost of a person in runs.
+const COST_OF_PERSON: usize = 4;
+
+impl DifferenceRequest {
+    /// Plans people and runs; `of_run` are the errors of one run.
+    ///
+    /// # Errors
+    /// [`DesignError::OutOfRange`], [`DesignError::NotThere`].
+    pub(super) fn plan(
+        &self,
+        task: &Task,
+        of_run: &Expected,
+        runs: Option<usize>,
+    ) -> Result<DifferencePlan, DesignError> {
+        self.check()?;
+        let found = of_run
+            .estimate(&self.sought.name)
+            .ok_or_else(|| DesignError::NotThere {
+                name: self.sought.name.clone(),
+                expected: of_run.names().join(", "),
+            })?;
+        let value = found.value.abs();
+        let unit = match self.sought.name.as_str() {
+            "phase_margin" => Loop::of(task)?.margin_by_gain_deg(),
+            _ => value,
+        };
+        let size = if self.sought.relative {
+            self.sought.size * value
+        } else {
+            self.sought.size
+        };
+        let mut plan = DifferencePlan {
+            request: self.clone(),
+            size,
+            error_of_run: found.standard_error.unwrap_or(f64::NAN),
+            run_to_run: self.run_to_run * unit,
+            between_people: self.between_people * unit,
+            people: PEOPLE.to_vec(),
+            rows: Vec::new(),
+            answer: 0,
+        };
+        let mut all = RUNS.to_vec();
+        all.extend(runs.filter(|runs| !RUNS.contains(runs)));
+        all.sort_unstable();
+        plan.rows = all.into_iter().map(|runs| self.row(&plan, runs)).collect();
+        plan.answer = answer(&plan.rows, runs);
+        Ok(plan)
+    }
+
+    fn row(&self, plan: &DifferencePlan, runs: usize) -> RunsAndPeople {
+        let within = plan.run_to_run.powi(2) + plan.error_of_run.powi(2);
+        let of_person = (plan.between_people.powi(2) + 2.0 * within / runs as f64).sqrt();
+        let effect = plan.size / of_person;
+        let of = |people: &usize| power(effect, *people, self.alpha).unwrap_or(f64::NAN);
+        RunsAndPeople {
+            runs,
+            of_person,
+            people: people_needed(effect, self.power, self.alpha),
+            power: plan.people.iter().map(of).collect(),
+        }
+    }
+
+    fn check(&self) -> Result<(), DesignError> {
+        let part = |quantity, found: f64, expected| match found > 0.0 && found < 1.0 {
+            true => Ok(()),
+            false => Err(DesignError::OutOfRange {
+                quantity,
+                found,
+                expected,
+            }),
+        };
+        part("power of the test", self.power, "above 0 and below 1, as 0.8")?;
+        part("level of the test (alpha)", self.alpha, "above 0 and below 1, as 0.05")?;
+        let spread = |quantity, found: f64| match (0.0..=10.0).contains(&found) {
+            true => Ok(()),
+            false => Err(DesignError::OutOfRange {
+                quantity,
+                found,
+                expected: "0 to 10, relative to the quantity, as 0.1",
+            }),
+        };
+        spread("spread of the difference between people", self.between_people)?;
+        spread("spread from run to run", self.run_to_run)?;
+        if !(self.sought.size.is_finite() && self.sought.size != 0.0) {
+            return Err(DesignError::OutOfRange {
+                quantity: "size of the difference",
+                found: self.sought.size,
+                expected: "a number other than zero, as crossover=0.5",
+            });
+        }
+        Ok(())
+    }
+}
+
+/// The row of the given number of runs, or the one that costs least.
+fn answer(rows: &[RunsAndPeople], runs: Option<usize>) -> usize {
+    if let Some(place) = rows.iter().position(|row| Some(row.runs) == runs) {
+        return place;
+    }
+    let cost = |row: &RunsAndPeople| row.people.unwrap_or(MOST_PEOPLE) * (2 * row.runs + COST_OF_PERSON);
+    let least = rows.iter().enumerate().min_by_key(|(_, row)| cost(row));
+    least.map_or(0, |(place, _)| place)
+}
+
+impl DifferencePlan {
+    /// The answer: runs, and people.
+    pub fn answer(&self) -> Option<&RunsAndPeople> {
+        self.rows.get(self.answer)
+    }
+
+    pub(super) fn json(&self) -> Value {
+        let row = |row: &RunsAndPeople| {
+            let power: Map<String, Value> = self
+                .people
+                .iter()
+                .zip(&row.power)
+                .map(|(people, power)| (people.to_string(), json::number(*power)))
+                .collect();
+            json!({"runs": row.runs, "of_person": json::number(row.of_person), "people": row.people, "power": power})
+        };
+        json!({
+            "of": self.request.sought.name,
+            "size": json::number(self.size),
+            "power": self.request.power,
+            "alpha": self.request.alpha,
+            "people": self.answer().and_then(|row| row.people),
+            "runs": self.answer().map(|row| row.runs),
+            "error_of_run": json::number(self.error_of_run),
+            "run_to_run": json::number(self.run_to_run),
+            "between_people": json::number(self.between_people),
+            "table": self.rows.iter().map(row).collect::<Vec<_>>(),
+        })
+    }
+
+    /// Returns the table of the power as CSV: a row for each number of runs and people.
+    pub fn csv(&self) -> String {
+        let mut text = "runs,people,power\n".to_owned();
+        for row in &self.rows {
+            for (people, power) in self.people.iter().zip(&row.power) {
+                text.push_str(&format!("{},{people},{power}\n", row.runs));
+            }
+        }
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+    use rand_distr::{Distribution, StandardNormal};
+    use statrs::distribution::{ContinuousCDF, StudentsT};
+
+    use super::*;
+    use crate::experiment::{Designing, information::tests::task};
+
+    fn plan(text: &str, runs: Option<usize>) -> Result<DifferencePlan, DesignError> {
+        let task = task(0.2);
+        let designed = Designing::default().run(&task).unwrap();
+        DifferenceRequest::new(text.parse()?).plan(&task, &designed.expected, runs)
+    }
+
+    #[test]
+    fn more_runs_take_fewer_people_down_to_those_between() {
+        let plan = plan("crossover=0.3", None).unwrap();
+        let people: Vec<usize> = plan.rows.iter().map(|row| row.people.unwrap()).collect();
+        assert!(people.windows(2).all(|two| two[1] <= two[0]), "{people:?}");
+        let of_one = &plan.rows[0];
+        let within = plan.run_to_run.powi(2) + plan.error_of_run.powi(2);
+        assert!((of_one.of_person.powi(2) - plan.between_people.powi(2) - 2.0 * within).abs() < 1e-12);
+        assert!(plan.rows.iter().all(|row| row.of_person > plan.between_people));
+        assert_eq!(plan.csv().lines().count(), 1 + 60);
+        assert_eq!(plan.json()["people"], plan.answer().unwrap().people.unwrap());
+    }
+
+    #[test]
+    fn sizes_are_absolute_or_relative() {
+        let relative = plan("crossover=10%", Some(5)).unwrap();
+        let value = relative.size / 0.1;
+        assert_eq!(relative.answer().unwrap().runs, 5);
+        let absolute = plan(&format!("crossover={}", relative.size), Some(5)).unwrap();
+        assert_eq!(absolute.answer().unwrap().people, relative.answer().unwrap().people);
+        assert!((relative.between_people - 0.1 * value).abs() < 1e-12);
+        // Of the margin a gain of 6 %: some degrees.
+        let margin = plan("margin=5", None).unwrap();
+        assert!((0.3..6.0).contains(&margin.run_to_run), "{}", margin.run_to_run);
+        for bad in ["crossover=0", "T_I=1", "crossover", "crossover=x"] {
+            assert!(plan(bad, None).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn simulated_experiments_find_it_as_often() {
+        let plan = plan("crossover=8%", Some(2)).unwrap();
+        let row = plan.answer().unwrap();
+        let people = row.people.unwrap();
+        let mut rng = ChaCha8Rng::seed_from_u64(11);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        let critical = StudentsT::new(0.0, 1.0, people as f64 - 1.0)
+            .unwrap()
+            .inverse_cdf(0.975);
+        let mut found = 0;
+        for _ in 0..4000 {
+            let mut condition = |truth: f64| {
+                let runs = (0..row.runs).map(|_| plan.run_to_run * normal() + plan.error_of_run * normal());
+                truth + runs.sum::<f64>() / row.runs as f64
+            };
+            let mut person = |_| {
+                let (one, two) = (condition(0.0), condition(plan.size));
+                two - one
+            };
+            let mut differences: Vec<f64> = (0..people).map(&mut person).collect();
+            differences
+                .iter_mut()
+                .for_each(|d| *d += plan.between_people * normal());
+            let n = people as f64;
+            let mean = differences.iter().sum::<f64>() / n;
+            let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
+            found += usize::from((mean / (variance / n).sqrt()).abs() > critical);
+        }
+        let rate = found as f64 / 4000.0;
+        let k = people_needed(plan.size / row.of_person, 0.8, 0.05).unwrap();
+        let predicted = power(plan.size / row.of_person, k, 0.05).unwrap();
+        println!("{people} people: found in {rate:.3}, predicted {predicted:.3}");
+        // Of 4000 the standard error is .006.
+        assert!((rate - predicted).abs() < 0.02, "{rate} {predicted}");
+    }
+}

@@ -1,0 +1,78 @@
+//! Standard errors to be expected: `se(theta_k) = sqrt((I^-1)_kk)` with the information I of the lines
+//! (`information`); N runs have errors that are `1/sqrt(N)` of those of one.
+
+use hoid_model::{interned::Name, uncertainty::Estimate};
+use serde::{Deserialize, Serialize};
+
+/// A parameter of a person with its expected standard error.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ExpectedParameter {
+    /// Its name.
+    #[serde(deserialize_with = "hoid_model::interned::name")]
+    pub name: Name,
+    /// Its unit.
+    #[serde(deserialize_with = "hoid_model::interned::name")]
+    pub unit: Name,
+    /// Value and standard error.
+    pub estimate: Estimate,
+}
+
+/// Expected standard errors.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Expected {
+    /// Parameters of the person.
+    pub parameters: Vec<ExpectedParameter>,
+    /// Crossover frequency, rad/s.
+    pub crossover_rad_s: Estimate,
+    /// Phase margin, deg.
+    pub phase_margin_deg: Estimate,
+    /// Root mean square of the error, in the unit of the forcing function.
+    pub rms_e: f64,
+    /// Root mean square of the control.
+    pub rms_u: f64,
+}
+
+impl Expected {
+    /// Returns the same with all errors multiplied by a factor.
+    #[must_use]
+    pub fn scaled(&self, by: f64) -> Self {
+        let of = |e: &Estimate| Estimate {
+            standard_error: e.standard_error.map(|error| error * by),
+            ..*e
+        };
+        let parameter = |p: &ExpectedParameter| ExpectedParameter {
+            estimate: of(&p.estimate),
+            ..p.clone()
+        };
+        Self {
+            parameters: self.parameters.iter().map(parameter).collect(),
+            crossover_rad_s: of(&self.crossover_rad_s),
+            phase_margin_deg: of(&self.phase_margin_deg),
+            ..*self
+        }
+    }
+
+    /// Returns `crossover` in rad/s, `phase_margin` in deg, or a parameter, with its error.
+    pub fn estimate(&self, name: &str) -> Option<Estimate> {
+        match name {
+            "crossover" => Some(self.crossover_rad_s),
+            "phase_margin" => Some(self.phase_margin_deg),
+            name => Some(self.parameters.iter().find(|p| p.name == name)?.estimate),
+        }
+    }
+
+    /// Error of `crossover` or of a parameter relative to its value; of `phase_margin` in deg.
+    pub fn relative_error(&self, name: &str) -> Option<f64> {
+        let found = self.estimate(name)?;
+        match name {
+            "phase_margin" => found.standard_error,
+            _ => Some(found.standard_error? / found.value.abs()),
+        }
+    }
+
+    /// Returns the names of all quantities.
+    pub fn names(&self) -> Vec<&'static str> {
+        let parameters = self.parameters.iter().map(|p| p.name);
+        ["crossover", "phase_margin"].into_iter().chain(parameters).collect()
+    }
+}

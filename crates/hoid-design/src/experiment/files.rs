@@ -1,0 +1,114 @@
+//! The files of a designed experiment: a scenario that simulates it, the lines as a table, and an experiment for `hoid lab`.
+
+use hoid_model::{FamilyOperator, operator_family::NamedParameter};
+
+use super::{DesignedLine, Enters, ExperimentDesign};
+
+/// Time between samples of the simulation, s, if the length is a whole number of them.
+const SAMPLE_S: f64 = 0.01;
+/// Time before the measurement, s.
+const RUN_IN_S: f64 = 10.0;
+
+impl ExperimentDesign {
+    /// Returns a scenario with the designed forcing function: the text of its file.
+    pub fn scenario(&self) -> String {
+        let operator = &self.task.state.operator;
+        let line = |DesignedLine { line: l, .. }: &DesignedLine| {
+            format!(
+                "  {{ amplitude = {}, omega_rad_s = {}, phase_rad = {} }}",
+                l.amplitude_deg, l.omega_rad_s, l.phase_rad
+            )
+        };
+        let lines: Vec<String> = self.lines.iter().map(line).collect();
+        let shape = match self.task.remnant.time_constant_s {
+            0.0 => "shape = \"white\"\n".to_owned(),
+            t => format!("shape = \"lag\"\nT_n_s = {t}\n"),
+        };
+        let sample_s = self.sample_s();
+        format!(
+            "# Made by `hoid design`.\nname = \"design\"\nform = \"{}\"\nneuromuscular = {}\nsample_time_s = {}\nmeasurement_s = {}\nrun_in_s = {}\n\n\
+             [initial]\n{}controlled_element = \"{}\"\n\n[{}]\nlines = [\n{},\n]\n\n[[remnant]]\n{shape}share = {}\n",
+            operator.form().name(),
+            operator.has_neuromuscular(),
+            sample_s,
+            self.length_s,
+            sample_s * (RUN_IN_S / sample_s).round(),
+            operator_keys(operator),
+            self.task.state.controlled_element,
+            match self.task.enters {
+                Enters::Target => "target",
+                Enters::Disturbance => "disturbance",
+            },
+            lines.join(",\n"),
+            self.task.remnant.share,
+        )
+    }
+
+    /// Time between samples, of which a run is a whole number.
+    fn sample_s(&self) -> f64 {
+        let whole = self.length_s / SAMPLE_S;
+        match (whole - whole.round()).abs() < 1e-6 {
+            true => SAMPLE_S,
+            false => self.length_s / whole.ceil(),
+        }
+    }
+
+    /// Returns the lines as a table in CSV, which [`super::Against`] reads.
+    pub fn forcing_csv(&self) -> String {
+        let line = |DesignedLine { line: l, .. }: &DesignedLine| {
+            format!("{},{},{}\n", l.omega_rad_s, l.amplitude_deg, l.phase_rad)
+        };
+        let lines: String = self.lines.iter().map(line).collect();
+        format!("omega_rad_s,amplitude,phase_rad\n{lines}")
+    }
+}
+
+/// Half width of the display and full deflection, in rms of e and u: Gaussian signals are beyond in 1 of 16000 samples.
+const ROOM: f64 = 4.0;
+/// Most runs of a condition of `hoid lab`.
+const MOST_RUNS: usize = 100;
+
+impl ExperimentDesign {
+    /// Returns an experiment for `hoid lab --config`, whose condition is the scenario in a file of this name next to it.
+    /// `None` if a run is no whole number of hundredths of a second, which the lab takes.
+    pub fn lab(&self, scenario: &str) -> Option<String> {
+        if self.sample_s().to_bits() != SAMPLE_S.to_bits() {
+            return None;
+        }
+        let room = |rms: f64| ROOM * if rms > 0.0 { rms } else { 1.0 };
+        Some(format!(
+            "# Made by `hoid design`; show it with `hoid lab --config`.\nname = \"design\"\n\n[[condition]]\nname = \"design\"\n\
+             text = \"Keep the error small.\"\nscenario = \"{scenario}\"\ndisplay = \"{}\"\n\
+             # {ROOM} rms of the error and of the control that are to be expected.\nhalf_width = {:.4}\nfull_deflection = {:.4}\n\
+             training = 1\nruns = {}\n",
+            self.display.name(),
+            room(self.expected.rms_e),
+            room(self.expected.rms_u),
+            self.runs.clamp(1, MOST_RUNS),
+        ))
+    }
+}
+
+fn operator_keys(operator: &FamilyOperator) -> String {
+    let key = |p: &NamedParameter| {
+        let name = match p.name {
+            "K_e" => "K",
+            "T_L" => "T_L_s",
+            "T_I" => "T_I_s",
+            "c_1" => "c_1_s",
+            "c_2" => "c_2_s2",
+            "alpha" => "alpha_rad_s",
+            "omega_nm" => "omega_nm_rad_s",
+            "tau_e" => "tau_e_s",
+            other => other,
+        };
+        let value = if p.value.is_finite() {
+            p.value.to_string()
+        } else {
+            "inf".to_owned()
+        };
+        format!("{name} = {value}\n")
+    };
+    let named = operator.named();
+    named.iter().filter(|p| p.coordinate.is_some()).map(key).collect()
+}

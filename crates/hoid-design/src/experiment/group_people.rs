@@ -1,0 +1,269 @@
+//! People of a group: from the directory that `hoid group --out` wrote, from its JSON, or from `population.json` of
+//! `hoid group --pool`.
+//!
+//! The typical person has the form that most people have, and the geometric mean of each of their parameters
+//! (arithmetic if one is not positive); of a pooled population its medians. With a pooled population a person has the
+//! estimates from all people, if the population has every parameter of the form.
+
+use std::path::Path;
+
+use hoid_model::{ContinuousTransferFunction, FamilyOperator, FamilyState, Finding, Form, VerdictLevel};
+use hoid_numerics::statistics::mean;
+use hoid_study::group::{GroupSummary, MANIFEST, Manifest};
+use serde_json::Value;
+
+use super::{
+    DesignError,
+    people::{Chosen, Given, NamedState},
+};
+
+/// A person in a condition: parameters by name.
+#[derive(Debug, Clone, PartialEq)]
+struct Row {
+    subject: String,
+    condition: String,
+    form: String,
+    parameters: Vec<(String, f64)>,
+}
+
+/// A pooled population of a condition.
+struct Pooled {
+    centre: Row,
+    people: Vec<Row>,
+}
+
+pub(super) fn of_directory(directory: &Path, given: &Given<'_>) -> Result<Chosen, DesignError> {
+    let manifest = directory.join(MANIFEST);
+    if !manifest.exists() {
+        return Err(none(directory, format!("there is no {MANIFEST} in it")));
+    }
+    let manifest = Manifest::read(&manifest)?;
+    let summary = GroupSummary::read(&manifest, directory)?;
+    let determined = |p: &&hoid_study::group::Person| {
+        p.is_of_all_runs() && p.verdict.is_some_and(|level| level != VerdictLevel::NotDetermined)
+    };
+    let row = |p: &hoid_study::group::Person| Row {
+        subject: p.subject.clone(),
+        condition: p.condition.clone(),
+        form: p.form.clone(),
+        parameters: p.parameters.iter().map(|q| (q.name.clone(), q.value)).collect(),
+    };
+    let rows: Vec<Row> = summary.people.iter().filter(determined).map(row).collect();
+    let condition = condition_of(&rows, directory, given)?;
+    let element = match given.controlled_element {
+        Some(element) => element.clone(),
+        None => element_of(&manifest, &condition, directory)?,
+    };
+    let pooled = read_pooled(directory, &condition)?;
+    let rows = rows.into_iter().filter(|row| row.condition == condition).collect();
+    match pooled.map(|pooled| of_pooled(&pooled, directory, &element)) {
+        Some(Ok(chosen)) => Ok(chosen),
+        // A population without all parameters of a form: each person by themselves.
+        _ => of_rows(rows, directory, &element),
+    }
+}
+
+pub(super) fn of_json(object: &Value, path: &Path, given: &Given<'_>) -> Result<Chosen, DesignError> {
+    let people = object["people"].as_array().map(Vec::as_slice).unwrap_or_default();
+    let of_all = |p: &&Value| p["run"] == "all" && p["verdict"]["level"] != VerdictLevel::NotDetermined.name();
+    let text = |p: &Value, key: &str| p[key].as_str().unwrap_or_default().to_owned();
+    let row = |p: &Value| Row {
+        subject: text(p, "subject"),
+        condition: text(p, "condition"),
+        form: text(p, "form"),
+        parameters: match p["parameters"].as_object() {
+            Some(all) => all
+                .iter()
+                .filter_map(|(name, q)| Some((name.clone(), q["value"].as_f64()?)))
+                .collect(),
+            None => Vec::new(),
+        },
+    };
+    let rows: Vec<Row> = people.iter().filter(of_all).map(row).collect();
+    let condition = condition_of(&rows, path, given)?;
+    let element = given.element(&path.display().to_string())?;
+    let rows = rows.into_iter().filter(|row| row.condition == condition).collect();
+    of_rows(rows, path, &element)
+}
+
+pub(super) fn of_population(object: &Value, path: &Path, given: &Given<'_>) -> Result<Chosen, DesignError> {
+    let element = given.element(&path.display().to_string())?;
+    of_pooled(&pooled(object), path, &element)
+}
+
+fn none(place: &Path, reason: impl Into<String>) -> DesignError {
+    DesignError::NoPeople {
+        place: place.display().to_string(),
+        reason: reason.into(),
+    }
+}
+
+/// The condition: the given one, or the only one.
+fn condition_of(rows: &[Row], place: &Path, given: &Given<'_>) -> Result<String, DesignError> {
+    let mut all: Vec<&str> = Vec::new();
+    for row in rows {
+        if !all.contains(&row.condition.as_str()) {
+            all.push(&row.condition);
+        }
+    }
+    match (given.condition, all.as_slice()) {
+        (_, []) => Err(none(place, "the data determine the operator of no person")),
+        (Some(wanted), _) if all.contains(&wanted) => Ok(wanted.to_owned()),
+        (None, [one]) => Ok((*one).to_owned()),
+        (wanted, _) => Err(DesignError::Condition {
+            found: wanted.unwrap_or("none").to_owned(),
+            expected: all.join(", "),
+        }),
+    }
+}
+
+fn element_of(
+    manifest: &Manifest,
+    condition: &str,
+    directory: &Path,
+) -> Result<ContinuousTransferFunction, DesignError> {
+    let known = manifest.conditions.get(condition);
+    let text = known.and_then(|facts| facts.controlled_element.as_deref());
+    let missing = || DesignError::NoElement {
+        people: format!("the condition {condition:?} in {}", directory.display()),
+    };
+    Ok(text.ok_or_else(missing)?.parse()?)
+}
+
+/// The pooled population of a condition among the files of a directory.
+fn read_pooled(directory: &Path, condition: &str) -> Result<Option<Pooled>, DesignError> {
+    let unreadable = |error: std::io::Error| none(directory, error.to_string());
+    let mut names: Vec<_> = std::fs::read_dir(directory)
+        .map_err(unreadable)?
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|path| {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            name.starts_with("population") && hoid_io::is_fit_file(&name)
+        })
+        .collect();
+    names.sort();
+    for path in names {
+        let object: Value = serde_json::from_str(&hoid_io::read_settings(&path)?).unwrap_or_default();
+        if object["kind"] == "population" && object["condition"] == condition {
+            return Ok(Some(pooled(&object)));
+        }
+    }
+    Ok(None)
+}
+
+fn pooled(object: &Value) -> Pooled {
+    let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+    let row = |subject: String| Row {
+        subject,
+        condition: text(&object["condition"]),
+        form: text(&object["form"]),
+        parameters: Vec::new(),
+    };
+    let mut all = Pooled {
+        centre: row("typical".to_owned()),
+        people: Vec::new(),
+    };
+    for parameter in object["parameters"].as_array().into_iter().flatten() {
+        let name = text(&parameter["name"]);
+        all.centre
+            .parameters
+            .extend(parameter["value"].as_f64().map(|v| (name.clone(), v)));
+        for person in parameter["people"].as_array().into_iter().flatten() {
+            let subject = text(&person["subject"]);
+            let place = all.people.iter().position(|row| row.subject == subject);
+            let place = place.unwrap_or_else(|| {
+                all.people.push(row(subject));
+                all.people.len() - 1
+            });
+            let value = person["value"].as_f64().map(|v| (name.clone(), v));
+            all.people[place].parameters.extend(value);
+        }
+    }
+    all
+}
+
+fn of_pooled(pooled: &Pooled, place: &Path, element: &ContinuousTransferFunction) -> Result<Chosen, DesignError> {
+    let state = state_of(&pooled.centre, element).map_err(|reason| none(place, reason))?;
+    let name = format!("typical of {} people", pooled.people.len());
+    Ok(with_others(NamedState { name, state }, &pooled.people, element))
+}
+
+fn of_rows(rows: Vec<Row>, place: &Path, element: &ContinuousTransferFunction) -> Result<Chosen, DesignError> {
+    let count = |form: &str| rows.iter().filter(|row| row.form == form).count();
+    // Of two forms with as many people, the first.
+    let first = rows.iter().rev().max_by_key(|row| count(&row.form));
+    let form = first.map(|row| row.form.clone()).unwrap_or_default();
+    let alike: Vec<&Row> = rows.iter().filter(|row| row.form == form).collect();
+    let centre = |name: &String| {
+        let of = |row: &&Row| row.parameters.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
+        let values: Vec<f64> = alike.iter().filter_map(of).filter(|v| v.is_finite()).collect();
+        let positive = values.iter().all(|v| *v > 0.0);
+        let middle = match positive {
+            true => mean(&values.iter().map(|v| v.ln()).collect::<Vec<_>>()).exp(),
+            false => mean(&values),
+        };
+        (!values.is_empty()).then_some((name.clone(), middle))
+    };
+    let names = alike.first().map(|row| row.parameters.iter().map(|(name, _)| name));
+    let typical = Row {
+        subject: "typical".to_owned(),
+        condition: String::new(),
+        parameters: names.into_iter().flatten().filter_map(centre).collect(),
+        form,
+    };
+    let state = state_of(&typical, element).map_err(|reason| none(place, reason))?;
+    let name = match alike.len() == rows.len() {
+        true => format!("typical of {} people", rows.len()),
+        false => format!("typical of {} of {} people", alike.len(), rows.len()),
+    };
+    Ok(with_others(NamedState { name, state }, &rows, element))
+}
+
+fn with_others(typical: NamedState, rows: &[Row], element: &ContinuousTransferFunction) -> Chosen {
+    let (mut others, mut findings) = (Vec::new(), Vec::new());
+    for row in rows {
+        match state_of(row, element) {
+            Ok(state) => others.push(NamedState {
+                name: row.subject.clone(),
+                state,
+            }),
+            Err(reason) => findings.push(left_out(&row.subject, &reason)),
+        }
+    }
+    Chosen {
+        typical,
+        others,
+        findings,
+    }
+}
+
+/// The finding that a person is left out.
+pub(super) fn left_out(name: &str, reason: &str) -> Finding {
+    Finding::doubt("person-left-out", format!("{name} is left out: {reason}"))
+}
+
+/// The loop of a person, or the reason why there is none.
+fn state_of(row: &Row, element: &ContinuousTransferFunction) -> Result<FamilyState, String> {
+    let form: Form = row.form.parse().map_err(|_| match row.form.is_empty() {
+        true => {
+            "the people have no common form: write form = \"lead\" or another under [analysis] in group.toml".to_owned()
+        }
+        false => format!("its form is {:?}, which is not known", row.form),
+    })?;
+    let value = |name: &str| row.parameters.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
+    let neuromuscular = value("omega_nm").is_some();
+    let dependent = |name: &&str| *name == "K_e_dot" || (*name == "K" && form.has_lag());
+    let pair = |name: &str| match value(name) {
+        Some(v) if v.is_finite() => Ok((name.to_owned(), v)),
+        // The lag of an integration.
+        _ if name == "T_I" => Ok((name.to_owned(), f64::INFINITY)),
+        _ => Err(format!("{name} of the form {form} is not known")),
+    };
+    let names = form.parameters(neuromuscular);
+    let pairs: Result<Vec<(String, f64)>, String> = names.iter().filter(|n| !dependent(n)).map(|n| pair(n)).collect();
+    let operator = FamilyOperator::of_names(form, &pairs?).map_err(|error| error.to_string())?;
+    Ok(FamilyState {
+        operator,
+        controlled_element: element.clone(),
+    })
+}

@@ -1,0 +1,156 @@
+//! The people for whom an experiment is designed.
+//!
+//! | source | typical person | others |
+//! |---|---|---|
+//! | `population` | of the crossover model (`adapted`) | one spread to each side of each parameter of the prior |
+//! | scenario, fit | that one | none |
+//! | result of a group, `population.json` | mean or median over people (`group_people`) | each person |
+
+use std::{
+    convert::Infallible,
+    path::{Path, PathBuf},
+    str::FromStr,
+};
+
+use hoid_model::{ContinuousTransferFunction, FamilyState, Finding, Form};
+use serde_json::Value;
+
+use super::{DesignError, adapted, against::family, group_people};
+
+/// The people for whom an experiment is designed.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum People {
+    /// People in general, as they adapt to the controlled element.
+    #[default]
+    Population,
+    /// A scenario (`.toml`), a fit, the population or the result of a group (`.json`), or the directory of a group.
+    File(PathBuf),
+}
+
+/// Name of [`People::Population`].
+const POPULATION: &str = "population";
+
+impl People {
+    /// Returns what a text names.
+    pub fn of_text(text: &str) -> Self {
+        match text {
+            POPULATION => Self::Population,
+            file => Self::File(file.into()),
+        }
+    }
+}
+
+impl FromStr for People {
+    type Err = Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Infallible> {
+        Ok(Self::of_text(text))
+    }
+}
+
+impl std::fmt::Display for People {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Population => f.write_str(POPULATION),
+            Self::File(path) => write!(f, "{}", path.display()),
+        }
+    }
+}
+
+/// A person with a name.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct NamedState {
+    pub name: String,
+    pub state: FamilyState,
+}
+
+/// The people of a design.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Chosen {
+    pub typical: NamedState,
+    pub others: Vec<NamedState>,
+    pub findings: Vec<Finding>,
+}
+
+/// What is given next to the people.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Given<'a> {
+    pub controlled_element: Option<&'a ContinuousTransferFunction>,
+    pub form: Option<Form>,
+    pub condition: Option<&'a str>,
+}
+
+impl Given<'_> {
+    /// The controlled element, which these people do not state.
+    pub fn element(&self, people: &str) -> Result<ContinuousTransferFunction, DesignError> {
+        let missing = || DesignError::NoElement {
+            people: people.to_owned(),
+        };
+        self.controlled_element.cloned().ok_or_else(missing)
+    }
+}
+
+impl People {
+    /// Returns the file, if there is one.
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Population => None,
+            Self::File(path) => Some(path),
+        }
+    }
+
+    pub(super) fn chosen(&self, given: &Given<'_>) -> Result<Chosen, DesignError> {
+        let Self::File(path) = self else {
+            let (typical, others) = adapted::population(&given.element(POPULATION)?, given.form)?;
+            return Ok(Chosen {
+                typical,
+                others,
+                findings: Vec::new(),
+            });
+        };
+        if let Some(form) = given.form {
+            return Err(DesignError::FormOfPeople {
+                people: path.display().to_string(),
+                form,
+            });
+        }
+        if path.is_dir() {
+            return group_people::of_directory(path, given);
+        }
+        if !hoid_io::is_fit_file(&path.to_string_lossy()) {
+            return Ok(one(path, of_scenario(path, given)?));
+        }
+        let text = hoid_io::read_settings(path)?;
+        let object: Value = serde_json::from_str(&text).unwrap_or_default();
+        if object["kind"] == "population" {
+            return group_people::of_population(&object, path, given);
+        }
+        if object["people"].is_array() && object["kind"] != "design" {
+            return group_people::of_json(&object, path, given);
+        }
+        let name = path.display().to_string();
+        let fit = hoid_io::parse_fit(&text, &name)?.operator()?;
+        let state = FamilyState {
+            operator: fit.operator,
+            controlled_element: given.element(&name)?,
+        };
+        Ok(one(path, state))
+    }
+}
+
+fn of_scenario(path: &Path, given: &Given<'_>) -> Result<FamilyState, DesignError> {
+    let mut state = family(path)?.initial;
+    if let Some(element) = given.controlled_element {
+        state.controlled_element = element.clone();
+    }
+    Ok(state)
+}
+
+fn one(path: &Path, state: FamilyState) -> Chosen {
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    Chosen {
+        typical: NamedState { name, state },
+        others: Vec::new(),
+        findings: Vec::new(),
+    }
+}

@@ -1,0 +1,63 @@
+//! Requested quantities with their accepted errors, and the number of runs that they need: errors of N runs are
+//! `1/sqrt(N)` of those of one, so that a quantity with the error s of one run and the accepted error a needs `(s/a)^2`.
+
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use super::{DesignError, Expected};
+
+/// A quantity to be estimated, with its accepted error; as text `crossover=3%`, `tau_e=0.05`, `phase_margin=2`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Wanted {
+    /// `crossover`, `phase_margin`, or a parameter.
+    pub name: String,
+    /// The accepted standard error: in deg for the phase margin, relative to the value for all others.
+    pub error: f64,
+}
+
+/// The name of a quantity, from one of its names.
+pub(super) fn known_name(name: &str) -> String {
+    match name.trim() {
+        "margin" => "phase_margin",
+        "delay" => "tau_e",
+        name => name,
+    }
+    .to_owned()
+}
+
+/// `NAME=5%`, `NAME=0.05`: the name, and the number with its sign of percent.
+pub(super) fn named_number(text: &str, what: &'static str) -> Result<(String, f64, bool), DesignError> {
+    let unreadable = || DesignError::Unreadable {
+        what,
+        found: text.to_owned(),
+    };
+    let (name, number) = text.split_once('=').ok_or_else(unreadable)?;
+    let number = number.trim();
+    let (digits, percent) = match number.strip_suffix('%') {
+        Some(digits) => (digits, true),
+        None => (number, false),
+    };
+    let value: f64 = digits.trim().parse().map_err(|_| unreadable())?;
+    Ok((known_name(name), value, percent))
+}
+
+impl FromStr for Wanted {
+    type Err = DesignError;
+
+    fn from_str(text: &str) -> Result<Self, DesignError> {
+        let (name, number, percent) = named_number(text, "quantity with its error")?;
+        Ok(Self {
+            name,
+            error: if percent { number / 100.0 } else { number },
+        })
+    }
+}
+
+/// Number of periods until each quantity has its accepted error.
+pub fn periods(of_one: &Expected, wanted: &[Wanted]) -> usize {
+    let needed = wanted
+        .iter()
+        .filter_map(|w| Some((of_one.relative_error(&w.name)? / w.error).powi(2)));
+    needed.fold(1.0, f64::max).ceil() as usize
+}

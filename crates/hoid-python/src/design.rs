@@ -1,0 +1,98 @@
+//! `pyhoid.design`: a forcing function and the errors to be expected; the package reads the JSON of the result.
+
+use hoid_design::experiment::{
+    Against, DesignRequest, Designing, DifferenceRequest, Enters, ExperimentDesign, People, Remnant,
+};
+use hoid_model::{Form, family_scenario::Display};
+use hoid_report::{design_figure, runs_figure};
+use pyo3::prelude::*;
+
+use crate::{controlled_element::ControlledElement, errors::Outcome, names};
+
+/// Designs, and returns the result as JSON.
+#[pyfunction]
+#[pyo3(signature = (people, *, condition, controlled_element, form, wanted, disturbance, remnant, length, runs, lines, band, shelf, limits, against, difference, statistics, display, seed))]
+#[allow(clippy::too_many_arguments)]
+pub fn design(
+    py: Python<'_>,
+    people: &str,
+    condition: Option<String>,
+    controlled_element: Option<ControlledElement>,
+    form: Option<&str>,
+    wanted: Vec<String>,
+    disturbance: bool,
+    remnant: (f64, f64),
+    length: f64,
+    runs: Option<usize>,
+    lines: usize,
+    band: (f64, f64),
+    shelf: f64,
+    limits: (Option<f64>, Option<f64>),
+    against: Option<&str>,
+    difference: Option<&str>,
+    statistics: (f64, f64, f64, f64),
+    display: &str,
+    seed: u64,
+) -> Outcome<String> {
+    let (power, alpha, between_people, run_to_run) = statistics;
+    let sought = |text: &str| -> Outcome<DifferenceRequest> {
+        Ok(DifferenceRequest {
+            sought: text.parse()?,
+            power,
+            alpha,
+            between_people,
+            run_to_run,
+        })
+    };
+    let request = DesignRequest {
+        people: People::of_text(people),
+        condition,
+        controlled_element: controlled_element
+            .map(|element| element.transfer_function())
+            .transpose()?,
+        form: form.map(|name| names::choice::<Form>("form", name)).transpose()?,
+        enters: if disturbance {
+            Enters::Disturbance
+        } else {
+            Enters::Target
+        },
+        remnant: Remnant {
+            share: remnant.0,
+            time_constant_s: remnant.1,
+            ..Remnant::default()
+        },
+        designing: Designing {
+            wanted: wanted.iter().map(|text| text.parse()).collect::<Result<_, _>>()?,
+            period_s: length,
+            lines,
+            band_rad_s: band,
+            shelf,
+            most_rms: [limits.0, limits.1],
+            seed,
+        },
+        runs,
+        against: against.map(Against::of_text),
+        difference: difference.map(sought).transpose()?,
+        display: names::choice::<Display>("display", display)?,
+    };
+    let found = py.detach(|| request.run())?;
+    Ok(found.to_json())
+}
+
+/// The files of a design, checked: scenario, experiment of the lab (empty if there is none), lines.
+#[pyfunction]
+pub fn design_files_of(text: &str, scenario: &str) -> Outcome<(String, String, String)> {
+    let found = ExperimentDesign::from_json(text)?;
+    Ok((
+        found.scenario(),
+        found.lab(scenario).unwrap_or_default(),
+        found.forcing_csv(),
+    ))
+}
+
+/// The figures of a design as SVG: lines and response, errors over runs.
+#[pyfunction]
+pub fn design_figures_of(text: &str) -> Outcome<(String, String)> {
+    let found = ExperimentDesign::from_json(text)?;
+    Ok((design_figure(&found), runs_figure(&found)))
+}

@@ -1,0 +1,200 @@
+//! A designed experiment as figures: the forcing function with the response of the person, and errors over runs.
+
+use hoid_design::experiment::{DesignedLine, Expected, ExpectedResponse, ExperimentDesign};
+use hoid_model::uncertainty::Estimate;
+
+use crate::{
+    figures::{Curve, CurveGrid, CurvePanel, LineKind, Shade, curves},
+    numbers::Z_95,
+};
+
+/// Amplitudes of the lines, and gain and phase of the person: the operator with its band, and the lines with their bars,
+/// each of 95 % over all runs.
+pub fn design_figure(design: &ExperimentDesign) -> String {
+    let lines = &design.lines;
+    let of_lines = |of: &dyn Fn(&DesignedLine) -> f64| lines.iter().map(of).collect::<Vec<f64>>();
+    let omega = of_lines(&|l| l.line.omega_rad_s);
+    let amplitudes = Curve {
+        kind: LineKind::Stems,
+        ..curve("", 0, omega.clone(), of_lines(&|l| l.line.amplitude_deg))
+    };
+    let response = |name: &str, unit: &str, of: fn(&ExpectedResponse) -> Estimate| {
+        let band: Vec<Estimate> = design.response.iter().map(of).collect();
+        let points: Vec<Estimate> = lines.iter().map(|l| of(&l.response)).collect();
+        let values = |all: &[Estimate]| all.iter().map(|e| e.value).collect::<Vec<f64>>();
+        let operator = Curve {
+            band: band.iter().map(ends).collect(),
+            ..curve(
+                "operator, band 95 %",
+                1,
+                design.response.iter().map(|r| r.omega_rad_s).collect(),
+                values(&band),
+            )
+        };
+        let at_lines = Curve {
+            kind: LineKind::Points,
+            bars: points.iter().map(ends).collect(),
+            ..curve("one line alone, bars 95 %", 0, omega.clone(), values(&points))
+        };
+        panel(name, unit, vec![operator, at_lines])
+    };
+    let grid = CurveGrid {
+        panels: vec![
+            panel("amplitude", "", vec![amplitudes]),
+            response("gain", "dB", |r| r.gain_db),
+            response("phase", "deg", |r| r.phase_deg),
+        ],
+        columns: 1,
+        abscissa: "frequency \u{3c9} (rad/s)".to_owned(),
+        logarithmic_abscissa: true,
+        ..CurveGrid::default()
+    };
+    let title = format!(
+        "the forcing function, and the response of {} with the errors to be expected of {} of {} s",
+        design.person,
+        counted(design.runs),
+        design.length_s
+    );
+    curves("design", &title, &grid)
+}
+
+/// Fewest runs of the abscissa.
+const FEWEST_RUNS: usize = 8;
+/// Most runs of the abscissa.
+const MOST_RUNS: usize = 200;
+
+/// Errors over the number of runs: relative to the accepted ones, or in percent of the values; and the people that a
+/// difference takes.
+pub fn runs_figure(design: &ExperimentDesign) -> String {
+    let last = (2 * design.runs_needed).max(design.runs).clamp(FEWEST_RUNS, MOST_RUNS);
+    let runs: Vec<f64> = (1..=last).map(|runs| runs as f64).collect();
+    let of_one = |expected: &Expected| expected.scaled((design.runs as f64).sqrt());
+    let falling = |error: f64| runs.iter().map(|n| error / n.sqrt()).collect::<Vec<f64>>();
+    let mut errors: Vec<Curve> = Vec::new();
+    let mut people = vec![("", &design.expected, LineKind::Line)];
+    people.extend(
+        design
+            .worst
+            .as_ref()
+            .map(|w| (w.name.as_str(), &w.expected, LineKind::Dashed)),
+    );
+    for (who, expected, kind) in people {
+        let one = of_one(expected);
+        for (k, (name, scale)) in shown(design).iter().enumerate() {
+            let Some(error) = one.relative_error(name).filter(|e| e.is_finite()) else {
+                continue;
+            };
+            let label = match who {
+                "" => name.clone(),
+                who => format!("{name}, {who}"),
+            };
+            errors.push(Curve {
+                kind,
+                ..curve(&label, k, runs.clone(), falling(error * scale))
+            });
+        }
+    }
+    let mut panels = match design.wanted.is_empty() {
+        true => vec![panel("relative error", "%", errors)],
+        false => {
+            errors.push(Curve {
+                kind: LineKind::Truth,
+                ..curve("accepted", 0, vec![1.0, last as f64], vec![1.0; 2])
+            });
+            vec![panel("error / accepted", "", errors)]
+        }
+    };
+    panels[0].logarithmic = true;
+    if let Some(plan) = &design.difference {
+        let known: Vec<(f64, f64)> = plan
+            .rows
+            .iter()
+            .filter_map(|row| Some((row.runs as f64, row.people? as f64)))
+            .collect();
+        let (x, y) = known.into_iter().unzip();
+        let people = Curve {
+            kind: LineKind::Points,
+            ..curve("", 0, x, y)
+        };
+        panels.push(panel("people for the difference", "", vec![people]));
+    }
+    let grid = CurveGrid {
+        panels,
+        columns: 1,
+        abscissa: "runs of a person".to_owned(),
+        ..CurveGrid::default()
+    };
+    curves("runs", "errors to be expected over the number of runs", &grid)
+}
+
+/// The quantities of the figure, each with the factor of its relative error.
+fn shown(design: &ExperimentDesign) -> Vec<(String, f64)> {
+    if !design.wanted.is_empty() {
+        return design.wanted.iter().map(|w| (w.name.clone(), 1.0 / w.error)).collect();
+    }
+    // The margin has no relative error.
+    let names = design
+        .expected
+        .names()
+        .into_iter()
+        .filter(|name| *name != "phase_margin");
+    names.map(|name| (name.to_owned(), 100.0)).collect()
+}
+
+fn counted(runs: usize) -> String {
+    match runs {
+        1 => "1 run".to_owned(),
+        runs => format!("{runs} runs"),
+    }
+}
+
+fn ends(e: &Estimate) -> (f64, f64) {
+    let half = e.standard_error.map_or(f64::NAN, |s| Z_95 * s);
+    (e.value - half, e.value + half)
+}
+
+fn curve(name: &str, shade: usize, x: Vec<f64>, y: Vec<f64>) -> Curve {
+    Curve {
+        name: name.to_owned(),
+        kind: LineKind::Line,
+        shade: Shade::of_method(shade),
+        x,
+        y,
+        band: Vec::new(),
+        bars: Vec::new(),
+    }
+}
+
+fn panel(name: &str, unit: &str, curves: Vec<Curve>) -> CurvePanel {
+    CurvePanel {
+        name: name.to_owned(),
+        unit: unit.to_owned(),
+        curves,
+        ..CurvePanel::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_design::experiment::{DesignRequest, DifferenceRequest};
+
+    use super::*;
+
+    #[test]
+    fn a_design_is_drawn() {
+        let request = DesignRequest {
+            controlled_element: Some("4/s".parse().unwrap()),
+            difference: Some(DifferenceRequest::new("crossover=10%".parse().unwrap())),
+            ..DesignRequest::default()
+        };
+        let mut design = request.run().unwrap();
+        let figure = design_figure(&design);
+        // A stem for each line, and two bars with caps.
+        assert!(figure.matches("<circle").count() >= 3 * design.lines.len() && !figure.contains("NaN"));
+        let runs = runs_figure(&design);
+        assert!(runs.contains("tau") && runs.contains("relative error") && !runs.contains("NaN"));
+        design.wanted = vec!["crossover=3%".parse().unwrap()];
+        assert!(runs_figure(&design).contains("accepted"));
+    }
+}

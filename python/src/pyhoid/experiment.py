@@ -1,0 +1,272 @@
+"""How many runs, how long, which forcing function: an experiment before it is done."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from os import PathLike, fspath
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from . import _options, _pyhoid
+from .verdict import Verdict
+
+if TYPE_CHECKING:
+    from typing import Literal
+
+    import pandas as pd
+
+__all__ = ["ExperimentDesign", "design"]
+
+
+class ExperimentDesign:
+    """A forcing function and the errors to be expected. `design` makes it.
+
+    Examples
+    --------
+    >>> designed = pyhoid.design(controlled_element="4/s", wanted={"tau_e": 0.05})
+    >>> designed.runs_needed, designed.errors["tau_e"]
+    """
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+        found = json.loads(text)
+        #: Level, reasons and notes.
+        self.verdict = Verdict(*(found["verdict"][key] for key in ("level", "reasons", "notes")))
+        #: Form of the typical person's operator.
+        self.form: str = found["form"]
+        #: Number of runs, and length of one in s.
+        self.runs: int = found["runs"]
+        self.length: float = found["length_s"]
+        #: Runs until every wanted quantity has its accepted error.
+        self.runs_needed: int = found["runs_needed"]
+        #: Peak of the forcing function divided by its rms.
+        self.crest_factor: float = found["crest_factor"]
+        #: Each line: omega_rad_s, amplitude, phase_rad, and the response of the person with its errors.
+        self.lines: list[dict[str, Any]] = found["lines"]
+        #: The operator between the lines, with its errors.
+        self.response: list[dict[str, Any]] = found["response"]
+        #: The person with the greatest errors, if there are several people.
+        self.worst: dict[str, Any] | None = found["worst"]
+        #: The other people.
+        self.people: list[dict[str, Any]] = found["people"]
+        #: Another forcing function, with ``against``.
+        self.against: dict[str, Any] | None = found["against"]
+        #: People and runs to find a difference, with ``difference``.
+        self.difference: dict[str, Any] | None = found["difference"]
+        #: The settings that were used.
+        self.settings: dict[str, str] = {s["name"]: s["value"] for s in found["settings"]}
+        self._parameters: list[dict[str, Any]] = _rows(found)
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """Standard error of each quantity over all runs, by name.
+
+        >>> designed.errors["crossover"]
+        """
+        return {row["quantity"]: row["standard_error"] for row in self._parameters}
+
+    def to_dataframe(self, table: Literal["errors", "lines", "response", "people", "power"] = "errors") -> pd.DataFrame:
+        """A table of the result: errors of the typical person, lines, response, errors of each of
+        several people, or the power over runs and people.
+
+        >>> designed.to_dataframe("lines")
+        """
+        import pandas as pd
+
+        if table == "errors":
+            return pd.DataFrame(self._parameters)
+        if table == "people":
+            rows = [{"person": one["name"], **row} for one in self.people for row in _rows(one)]
+            return pd.DataFrame(rows)
+        if table == "power":
+            power = self.difference["table"] if self.difference else []
+            rows = [
+                {"runs": row["runs"], "people": int(people), "power": value}
+                for row in power
+                for people, value in row["power"].items()
+            ]
+            return pd.DataFrame(rows, columns=["runs", "people", "power"])
+        return pd.DataFrame(getattr(self, table))
+
+    def to_svg(self, figure: Literal["response", "runs"] = "response") -> str:
+        """A figure as the text of an SVG file: the lines with the response of the person, or the
+        errors over the number of runs.
+
+        >>> from pathlib import Path
+        >>> Path("design.svg").write_text(designed.to_svg())
+        """
+        response, runs = _pyhoid.design_figures_of(self._text)
+        return {"response": response, "runs": runs}[figure]
+
+    def write(self, directory: str | PathLike[str]) -> None:
+        """Writes scenario.toml, lab.toml (for ``hoid lab --config``), forcing.csv and design.json.
+
+        >>> designed.write("design")
+        """
+        scenario, lab, forcing = _pyhoid.design_files_of(self._text, "scenario.toml")
+        place = Path(directory)
+        place.mkdir(parents=True, exist_ok=True)
+        files = {"scenario.toml": scenario, "lab.toml": lab, "forcing.csv": forcing, "design.json": self._text}
+        for name, text in files.items():
+            if text:
+                (place / name).write_text(text)
+
+    def to_json(self) -> str:
+        """The object of ``hoid design --json``; `from_json` reads it again.
+
+        >>> text = designed.to_json()
+        """
+        return self._text
+
+    @classmethod
+    def from_json(cls, text: str) -> ExperimentDesign:
+        """A design that `to_json` wrote, or ``hoid design --json`` printed.
+
+        Raises
+        ------
+        DataError
+            For a text that is not a result, was changed, or is of another version.
+
+        Examples
+        --------
+        >>> again = pyhoid.ExperimentDesign.from_json(designed.to_json())
+        """
+        _pyhoid.design_files_of(text, "scenario.toml")
+        return cls(text)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, ExperimentDesign):
+            return NotImplemented
+        return bool(json.loads(self._text) == json.loads(other._text))
+
+    def __hash__(self) -> int:
+        return hash(json.dumps(json.loads(self._text)))
+
+    def __repr__(self) -> str:
+        runs = f"{self.runs} run{'s' if self.runs != 1 else ''} of {self.length:g} s"
+        rows = [f"{r['quantity']}: {r['value']:.4g} ± {r['standard_error']:.2g} {r['unit']}" for r in self._parameters]
+        return "\n".join([f"Errors to be expected of {runs}", *(row.rstrip() for row in rows)])
+
+
+def _rows(found: Mapping[str, Any]) -> list[dict[str, Any]]:
+    loop = {"crossover": ("crossover_rad_s", "rad/s"), "phase_margin": ("phase_margin_deg", "deg")}
+    rows = [{"quantity": name, **found["open_loop"][key], "unit": unit} for name, (key, unit) in loop.items()]
+    return rows + [
+        {"quantity": p["name"], "value": p["value"], "standard_error": p["standard_error"], "unit": p["unit"]}
+        for p in found["parameters"]
+    ]
+
+
+def design(
+    people: str | PathLike[str] = "population",
+    *,
+    controlled_element: str | tuple[Sequence[float], Sequence[float]] | None = None,
+    wanted: Mapping[str, float] | str | Sequence[str] = (),
+    difference: Mapping[str, float] | str | None = None,
+    power: float = 0.8,
+    alpha: float = 0.05,
+    between_people: float = 0.1,
+    run_to_run: float = 0.06,
+    condition: str | None = None,
+    form: str | None = None,
+    disturbance: bool = False,
+    display: Literal["compensatory", "pursuit", "preview"] = "compensatory",
+    length: float = 81.92,
+    runs: int | None = None,
+    lines: int = 10,
+    band: tuple[float, float] = (0.2, 18.0),
+    shelf: float = 0.2,
+    max_rms_e: float | None = None,
+    max_u: float | None = None,
+    remnant_share: float = 0.2,
+    remnant_time_constant: float = 0.06,
+    against: str | PathLike[str] | None = None,
+    seed: int = 0,
+) -> ExperimentDesign:
+    """How many runs, how long, which forcing function.
+
+    Parameters
+    ----------
+    people : str or path
+        ``"population"`` (as people are known to adapt to the controlled element), a scenario
+        (``.toml``), a fit (``.json``), the directory that `group` wrote, or its ``population.json``.
+    controlled_element : str or (array_like, array_like)
+        As ``"90/(s(s+6))"``, or numerator and denominator; that of the scenario or group if not given.
+    wanted : mapping, str, or sequence of str
+        Accepted standard errors: ``{"tau_e": 0.05, "phase_margin": 2}``, or ``"tau_e=5%"``; the margin
+        in deg, all else relative. Without it all parameters.
+    difference : mapping or str
+        A difference between two conditions to be found: ``{"crossover": 0.5}`` in its unit, or
+        ``"crossover=10%"`` of its value.
+    power, alpha : float
+        Probability to find it, and level of the test.
+    between_people, run_to_run : float
+        Standard deviation of the difference between people, and of a person from run to run, relative.
+    condition : str
+        The condition of a group that has several.
+    form : str
+        Form of the population's operator; the one that people use with the element if not given.
+    disturbance : bool
+        The forcing function enters at the input of the controlled element; else it is the target.
+    display : {"compensatory", "pursuit", "preview"}
+        Display of the task, for the lab.
+    length : float
+        Length of a run in s, the period of the forcing function.
+    runs : int
+        Number of runs; by default that which the wanted errors take.
+    lines, band, shelf
+        Number of lines, their lowest and highest frequency in rad/s, and the largest amplitude beyond
+        the crossover as a part of the mean below.
+    max_rms_e, max_u : float
+        Largest rms of error and control.
+    remnant_share, remnant_time_constant : float
+        Share of the remnant in the variance of u, and its time constant in s.
+    against : str or path
+        Another forcing function: ``"reference"``, a scenario, or a table of lines.
+    seed : int
+        Start of the search for phases.
+
+    Returns
+    -------
+    ExperimentDesign
+
+    Raises
+    ------
+    OptionError, FileError, DataError
+
+    Examples
+    --------
+    >>> designed = pyhoid.design(controlled_element="4/s", wanted={"tau_e": 0.05})
+    >>> print(designed)
+    """
+    element = None if controlled_element is None else _options.controlled_element(controlled_element)
+    text = _pyhoid.design(
+        fspath(people),
+        condition=condition,
+        controlled_element=element,
+        form=form,
+        wanted=_assignments(wanted),
+        disturbance=disturbance,
+        remnant=(remnant_share, remnant_time_constant),
+        length=length,
+        runs=runs,
+        lines=lines,
+        band=band,
+        shelf=shelf,
+        limits=(max_rms_e, max_u),
+        against=None if against is None else fspath(against),
+        difference=None if difference is None else ",".join(_assignments(difference)),
+        statistics=(power, alpha, between_people, run_to_run),
+        display=display,
+        seed=seed,
+    )
+    return ExperimentDesign(text)
+
+
+def _assignments(given: Mapping[str, float] | str | Sequence[str]) -> list[str]:
+    if isinstance(given, str):
+        return given.split(",")
+    if isinstance(given, Mapping):
+        return [f"{name}={value!r}" for name, value in given.items()]
+    return list(given)
