@@ -190,9 +190,8 @@ fn whole_text(directory: &Path, replications: u64) -> (f64, Vec<f64>) {
     let out = directory.join("reproduction");
     let _ = std::fs::remove_dir_all(&out);
     let wanted = Reproduction {
-        only: Vec::new(),
         replications,
-        jobs: None,
+        ..Reproduction::default()
     };
     let begun = Instant::now();
     let made = reproduce(&wanted, &out, &|_| {}, &|| true).unwrap().unwrap();
