@@ -37,6 +37,8 @@ def spoilt(how: str) -> list[tuple[Any, ...]]:
         all_rows.insert(100, all_rows[99])
     elif how == "empty":
         all_rows[100] = (all_rows[100][0], "", all_rows[100][2])
+    elif how == "sparse":
+        all_rows = [(t, e if k % 2 == 0 else "", u) for k, (t, e, u) in enumerate(all_rows)]
     elif how == "still":
         all_rows[101] = (all_rows[100][0], *all_rows[101][1:])
     elif how == "gap":
@@ -49,6 +51,7 @@ def spoilt(how: str) -> list[tuple[Any, ...]]:
 REMEDIES = [
     ("twice", "drop_repeated=True", {"drop_repeated": True}),
     ("empty", "fill=True", {"fill": True}),
+    ("sparse", 'sparse={"e": "hold"}', {"sparse": {"e": "linear"}}),
     ("still", "sampling_frequency=HZ", {"sampling_frequency": 50.0}),
     ("gap", "resample=True", {"resample": True}),
     ("trials", 'trial="t=1"', {"trial": "t=1"}),

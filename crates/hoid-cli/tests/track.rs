@@ -750,10 +750,14 @@ fn the_methods_are_listed_without_a_record() {
 #[test]
 fn a_method_that_is_no_recursion_says_so() {
     let directory = TempDir::new().unwrap();
-    for (typed, name) in [("wavelet", "wavelet"), ("lpv", "lpv-subspace")] {
+    for (typed, name) in [
+        ("wavelet", "wavelet is no recursion"),
+        ("lpv", "lpv-subspace is no recursion"),
+        ("rls-fir", "rls-fir does not track recordings"),
+    ] {
         let (code, message) = bad(directory.path(), &["track", "c.csv", "--method", typed]);
         assert_eq!(code, 2);
-        assert!(message.contains(&format!("{name} is no recursion")), "{message}");
+        assert!(message.contains(name), "{message}");
         assert!(message.contains("survey_methods"), "{message}");
     }
 }

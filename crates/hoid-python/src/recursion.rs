@@ -67,7 +67,7 @@ fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
         Some(name) => {
             // A pickle may contain an earlier name.
             let name = renamed_method(&name).map_or(name, |(now, _)| now.to_owned());
-            if let Some(reason) = hoid_thesis::comparators::not_a_recursion(&name) {
+            if let Some(reason) = hoid_thesis::comparators::not_tracked(&name) {
                 return Err(bad_option(reason));
             }
             let words = hoid_survey::methods().into_iter().map(|method| (method.name(), method));

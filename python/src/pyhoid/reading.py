@@ -236,7 +236,7 @@ def _read(
     stop: float | None = None,
     resample: bool = False,
     fill: bool = False,
-    sparse: Mapping[str, Sparse] | None = None,
+    sparse: Mapping[str, str] | None = None,
     drop_repeated: bool = False,
     unit: Mapping[str, str] | None = None,
     scale: Mapping[str, float | str] | None = None,

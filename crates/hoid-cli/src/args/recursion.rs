@@ -177,7 +177,7 @@ pub(super) fn method_names() -> impl TypedValueParser<Value = String> {
     };
     let batch = comparators::names().map(|(name, _)| PossibleValue::new(name).hide(true));
     let all = hoid::survey::methods().into_iter().map(value).chain(batch);
-    PossibleValuesParser::new(all).try_map(|name| match comparators::not_a_recursion(&name) {
+    PossibleValuesParser::new(all).try_map(|name| match comparators::not_tracked(&name) {
         Some(reason) => Err(reason),
         None => Ok(name.to_lowercase()),
     })

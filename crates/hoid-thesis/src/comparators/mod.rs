@@ -50,30 +50,41 @@ pub fn comparators() -> Vec<Box<dyn Comparator>> {
     ]
 }
 
-/// Why a comparator, by its name or the first word of it, cannot follow a recording as a recursion does, and the command
-/// that runs it; `None` for a name that no comparator has.
-pub fn not_a_recursion(name: &str) -> Option<String> {
+/// Why a comparator, by its name or the first word of it, does not track a recording, and the command that runs it;
+/// `None` for a name that no comparator has.
+pub fn not_tracked(name: &str) -> Option<String> {
     let typed = name.trim().to_ascii_lowercase();
-    let about = names().find(|(word, _)| *word == typed)?.1;
+    let (_, about) = names().find(|(word, _)| *word == typed)?;
     let About {
         name,
         help,
         source,
         told,
     } = about;
+    let (what, why) = match told {
+        // A recursion, of more coefficients than a model has.
+        "" => (
+            "does not track recordings",
+            "with more coefficients than the 64 of a tracked model; up to 64 are followed by --method rls --structure fir"
+                .to_owned(),
+        ),
+        told => ("is no recursion over a recording", format!("which has to know {told}")),
+    };
     Some(format!(
-        "{name} is no recursion over a recording: {help} ({source}), which has to know {told}. It follows simulated runs \
-         only: cargo run --release -p hoid-evidence --example survey_methods. For recordings there are the methods of \
-         hoid track --methods, and hoid describe for the response at the lines of an excitation"
+        "{name} {what}: {help} ({source}), {why}. It follows simulated runs only: cargo run --release -p hoid-evidence \
+         --example survey_methods. For recordings there are the methods of hoid track --methods, and hoid describe for \
+         the response at the lines of an excitation"
     ))
 }
 
-/// The names under which [`not_a_recursion`] knows the comparators: each with its first word, as `lpv`.
+/// The names under which [`not_tracked`] knows the comparators: each with its first word, as `lpv`, where that is no
+/// recursive method.
 pub fn names() -> impl Iterator<Item = (&'static str, About)> {
-    let batch = comparators().into_iter().map(|one| one.about());
-    batch.filter(|about| !about.told.is_empty()).flat_map(|about| {
+    let all = comparators().into_iter().map(|one| one.about());
+    all.flat_map(|about| {
         let first = about.name.split('-').next().unwrap_or(about.name);
-        let short = (first != about.name && first != "rpem").then_some((first, about));
+        let is_short = first != about.name && !["rpem", "rls"].contains(&first);
+        let short = is_short.then_some((first, about));
         [Some((about.name, about)), short].into_iter().flatten()
     })
 }

@@ -12,7 +12,7 @@ use num_complex::Complex64;
 
 use super::{
     comparator::{Task, response_of},
-    comparators, names, not_a_recursion,
+    comparators, names, not_tracked,
 };
 
 /// A record at 100 Hz.
@@ -178,16 +178,17 @@ fn what_is_no_recursion_says_what_it_is_and_where_it_runs() {
     for (typed, words) in [
         ("wavelet", "what was before"),
         ("lpv", "lpv-subspace is no recursion"),
+        ("rls-fir", "--method rls --structure fir"),
         ("LPV-subspace", "the whole record"),
     ] {
-        let message = not_a_recursion(typed).unwrap();
+        let message = not_tracked(typed).unwrap();
         assert!(
             message.contains(words) && message.contains("survey_methods"),
             "{message}"
         );
     }
-    for typed in ["rpem", "rls-fir", "kalman", ""] {
-        assert_eq!(not_a_recursion(typed), None, "{typed}");
+    for typed in ["rpem", "rls", "kalman", ""] {
+        assert_eq!(not_tracked(typed), None, "{typed}");
     }
     let all: BTreeSet<&str> = names().map(|(name, _)| name).collect();
     assert_eq!(all.len(), names().count());
