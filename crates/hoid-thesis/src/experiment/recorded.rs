@@ -17,7 +17,7 @@ use hoid_study::group::{ConditionSettings, Manifest, RecordedRun, RunEntry};
 use super::{EXPERIMENT, Experiment, ExperimentCondition, ExperimentPlan, MeasuredRun, RunKey};
 use crate::ThesisError;
 
-/// Frequency at which elements are told apart, rad/s.
+/// Frequency at which the slopes of elements are compared, rad/s.
 const NEAR_CROSSOVER_RAD_S: f64 = 2.0;
 /// Slope between those of a single and of a double integrator.
 const SLOPE_BETWEEN: f64 = -1.5;

@@ -3,13 +3,16 @@
 use hoid_model::scenario::{Condition, Scenario};
 use hoid_report::figures::{CurveKind, Ordinate, TraceCurve, TraceGrid, TracePanel, trace_panels};
 
-use super::{ItemOutput, TableBuilder, middle, of, subjects};
+use super::of_runs::{middle, of, subjects};
 use crate::{
     experiment::{
         EvaluatedRun,
         procedure::{Course, State},
     },
-    reproduction::item::Item,
+    reproduction::{
+        item::{Item, ItemOutput},
+        table_builder::TableBuilder,
+    },
 };
 
 /// Quantities of a panel.

@@ -7,21 +7,18 @@
 //! | module | contents |
 //! |---|---|
 //! | `figures` | quantities over time, mean and median of the runs |
+//! | `of_runs` | the runs of a subject, their mean and median |
 //! | `tables` | Table 3; for recorded people of all conditions, and operators before and after |
 
 mod figures;
+mod of_runs;
 mod tables;
 
 use std::sync::{Arc, OnceLock};
 
 use hoid_model::scenario::Condition;
-use hoid_numerics::statistics::mean;
-use hoid_study::statistics::median;
 
-use super::{
-    item::{Item, ItemOutput, SharedRuns, Watch},
-    table_builder::TableBuilder,
-};
+use super::item::{Item, ItemOutput, SharedRuns, Watch};
 use crate::{
     ThesisError,
     experiment::{
@@ -213,34 +210,6 @@ fn named(number: &str, what: &str, condition: &ExperimentCondition, people: &str
         format!("{number}-{suffix}"),
         format!("{what}, condition {name}, in the text {of_text} ({people})"),
     )
-}
-
-/// Runs of a subject in a condition.
-fn of<'a>(runs: &'a [EvaluatedRun], subject: &str, condition: &str) -> Vec<&'a EvaluatedRun> {
-    let own = runs
-        .iter()
-        .filter(|run| run.key.subject == subject && run.key.condition == condition);
-    own.collect()
-}
-
-/// The subjects of a condition, in their order.
-fn subjects<'a>(runs: &'a [EvaluatedRun], condition: &str) -> Vec<&'a str> {
-    let mut all: Vec<&str> = Vec::new();
-    for run in runs.iter().filter(|run| run.key.condition == condition) {
-        if !all.contains(&run.key.subject.as_str()) {
-            all.push(&run.key.subject);
-        }
-    }
-    all
-}
-
-/// Mean and median of the finite values.
-fn middle(values: impl Iterator<Item = f64>) -> [f64; 2] {
-    let finite: Vec<f64> = values.filter(|value| value.is_finite()).collect();
-    if finite.is_empty() {
-        return [f64::NAN; 2];
-    }
-    [mean(&finite), median(&finite)]
 }
 
 #[cfg(test)]

@@ -1,9 +1,12 @@
 //! Table 3 of the text, and operators before and after the change.
 
-use super::{ItemOutput, TableBuilder, middle, of, subjects};
+use super::of_runs::{middle, of, subjects};
 use crate::{
     experiment::{EvaluatedRun, procedure::RunOutcome},
-    reproduction::item::Item,
+    reproduction::{
+        item::{Item, ItemOutput},
+        table_builder::TableBuilder,
+    },
 };
 
 /// Delays and time constants of the remnant, a row a run: Table 3.

@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used)]
 
-use super::*;
+use super::{of_runs::middle, *};
 use crate::experiment::{
     RunKey,
     procedure::{Course, RunOutcome, State, Truth},
