@@ -6,8 +6,9 @@ import json
 import pickle
 from pathlib import Path
 
-import pyhoid
 import pytest
+
+import pyhoid
 
 
 def test_an_experiment_is_designed(tmp_path: Path) -> None:
@@ -22,7 +23,10 @@ def test_an_experiment_is_designed(tmp_path: Path) -> None:
     assert len(designed.to_dataframe("lines")) == 10
     assert set(designed.to_dataframe("people")["person"]) >= {designed.worst["name"]}  # type: ignore[index]
     power = designed.to_dataframe("power")
-    assert power["power"].between(0.05, 1).all() and power.query("runs == 8")["power"].is_monotonic_increasing
+    assert (
+        power["power"].between(0.05, 1).all()
+        and power.query("runs == 8")["power"].is_monotonic_increasing
+    )
     assert designed.against is not None and designed.against["name"] == "reference"
     for figure in ("response", "runs"):
         assert designed.to_svg(figure).startswith("<svg ")  # type: ignore[arg-type]
@@ -46,7 +50,9 @@ def test_a_design_is_read_again() -> None:
 
 
 def test_a_group_is_designed_for(group_results: Path) -> None:
-    designed = pyhoid.design(group_results, condition="fo", controlled_element="1/s", disturbance=True)
+    designed = pyhoid.design(
+        group_results, condition="fo", controlled_element="1/s", disturbance=True
+    )
     assert len(designed.people) >= 3
     with pytest.raises(pyhoid.OptionError, match="several conditions"):
         pyhoid.design(group_results)

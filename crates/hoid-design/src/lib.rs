@@ -3,7 +3,7 @@
 //! | module | contents |
 //! |---|---|
 //! | [`compare`] | differences between conditions and between people, from the estimates of each person |
-//! | [`experiment`] | standard errors of an experiment before it is done |
+//! | [`experiment`] | an experiment before it is done: forcing function, standard errors, people for a difference |
 //! | [`pool`](mod@pool) | estimates of each person from all people, and the population as a prior |
 
 pub mod compare;

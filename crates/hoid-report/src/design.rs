@@ -111,12 +111,16 @@ pub fn runs_figure(design: &ExperimentDesign) -> String {
             .iter()
             .filter_map(|row| Some((row.runs as f64, row.people? as f64)))
             .collect();
-        let (x, y) = known.into_iter().unzip();
+        let (x, y): (Vec<f64>, Vec<f64>) = known.into_iter().unzip();
+        let most = 1.1 * y.iter().copied().fold(1.0, f64::max);
         let people = Curve {
             kind: LineKind::Points,
             ..curve("", 0, x, y)
         };
-        panels.push(panel("people for the difference", "", vec![people]));
+        panels.push(CurvePanel {
+            within: Some((0.0, most)),
+            ..panel("people", "", vec![people])
+        });
     }
     let grid = CurveGrid {
         panels,

@@ -66,7 +66,9 @@ class ExperimentDesign:
         """
         return {row["quantity"]: row["standard_error"] for row in self._parameters}
 
-    def to_dataframe(self, table: Literal["errors", "lines", "response", "people", "power"] = "errors") -> pd.DataFrame:
+    def to_dataframe(
+        self, table: Literal["errors", "lines", "response", "people", "power"] = "errors"
+    ) -> pd.DataFrame:
         """A table of the result: errors of the typical person, lines, response, errors of each of
         several people, or the power over runs and people.
 
@@ -107,7 +109,12 @@ class ExperimentDesign:
         scenario, lab, forcing = _pyhoid.design_files_of(self._text, "scenario.toml")
         place = Path(directory)
         place.mkdir(parents=True, exist_ok=True)
-        files = {"scenario.toml": scenario, "lab.toml": lab, "forcing.csv": forcing, "design.json": self._text}
+        files = {
+            "scenario.toml": scenario,
+            "lab.toml": lab,
+            "forcing.csv": forcing,
+            "design.json": self._text,
+        }
         for name, text in files.items():
             if text:
                 (place / name).write_text(text)
@@ -145,17 +152,34 @@ class ExperimentDesign:
 
     def __repr__(self) -> str:
         runs = f"{self.runs} run{'s' if self.runs != 1 else ''} of {self.length:g} s"
-        rows = [f"{r['quantity']}: {r['value']:.4g} ± {r['standard_error']:.2g} {r['unit']}" for r in self._parameters]
+        rows = [
+            f"{r['quantity']}: {r['value']:.4g} ± {r['standard_error']:.2g} {r['unit']}"
+            for r in self._parameters
+        ]
         return "\n".join([f"Errors to be expected of {runs}", *(row.rstrip() for row in rows)])
 
 
 def _rows(found: Mapping[str, Any]) -> list[dict[str, Any]]:
-    loop = {"crossover": ("crossover_rad_s", "rad/s"), "phase_margin": ("phase_margin_deg", "deg")}
-    rows = [{"quantity": name, **found["open_loop"][key], "unit": unit} for name, (key, unit) in loop.items()]
-    return rows + [
-        {"quantity": p["name"], "value": p["value"], "standard_error": p["standard_error"], "unit": p["unit"]}
-        for p in found["parameters"]
+    loop = found["open_loop"]
+    named = [
+        ("crossover", "rad/s", loop["crossover_rad_s"]),
+        ("phase_margin", "deg", loop["phase_margin_deg"]),
+        *((p["name"], p["unit"], p) for p in found["parameters"]),
     ]
+    return [
+        {
+            "quantity": name,
+            "value": _number(one["value"]),
+            "standard_error": _number(one["standard_error"]),
+            "unit": unit,
+        }
+        for name, unit, one in named
+    ]
+
+
+def _number(value: float | None) -> float:
+    # JSON has no infinite number, as the T_I of an integration.
+    return float("nan") if value is None else value
 
 
 def design(
@@ -240,7 +264,9 @@ def design(
     >>> designed = pyhoid.design(controlled_element="4/s", wanted={"tau_e": 0.05})
     >>> print(designed)
     """
-    element = None if controlled_element is None else _options.controlled_element(controlled_element)
+    element = (
+        None if controlled_element is None else _options.controlled_element(controlled_element)
+    )
     text = _pyhoid.design(
         fspath(people),
         condition=condition,

@@ -183,13 +183,14 @@ const HELP: [Help; 19] = [
     Help {
         command: "design",
         examples: &[
-            "hoid design --people person.toml --for tau_e=5%,crossover=3%",
-            "hoid design --people fit.json --controlled-element '1/(s(s+1))' --against reference --out design",
+            "hoid design --controlled-element '4/s' --for tau_e=5%,crossover=3%",
+            "hoid design --people results --difference crossover=.5 --against reference --out design",
         ],
         shown: &[
             "people",
             "controlled_element",
             "wanted",
+            "difference",
             "disturbance",
             "length",
             "runs",

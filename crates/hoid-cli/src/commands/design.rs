@@ -5,7 +5,7 @@ use std::path::Path;
 use hoid::design::experiment::{
     DesignRequest, Designing, DifferencePlan, DifferenceRequest, Enters, Expected, ExperimentDesign, Remnant,
 };
-use hoid::model::uncertainty::Estimate;
+use hoid::model::{numbers::DASH, uncertainty::Estimate};
 use hoid::report::{PaperTable, design_figure, runs_figure};
 use serde_json::Value;
 
@@ -169,7 +169,7 @@ fn errors(found: &ExperimentDesign) -> Rows {
             label,
             text::significant(estimate.value),
             text::significant(error),
-            format!("{:.1} %", 100.0 * error / estimate.value.abs()),
+            relative(error / estimate.value.abs()),
         ];
         cells.extend(others.iter().map(|(_, e)| {
             let error = e.estimate(name).and_then(|e| e.standard_error);
@@ -178,6 +178,14 @@ fn errors(found: &ExperimentDesign) -> Rows {
         rows.add_row(cells);
     }
     rows
+}
+
+fn relative(error: f64) -> String {
+    if error.is_finite() {
+        format!("{:.1} %", 100.0 * error)
+    } else {
+        DASH.to_owned()
+    }
 }
 
 fn sizes(found: &ExperimentDesign) -> String {
@@ -227,7 +235,7 @@ fn difference(plan: &DifferencePlan) -> String {
         }
         None => String::new(),
     };
-    let people: Vec<String> = plan.people.iter().map(|n| format!("{n} people")).collect();
+    let people: Vec<String> = plan.people.iter().map(|n| format!("n = {n}")).collect();
     let mut header = vec!["runs", "needed"];
     header.extend(people.iter().map(String::as_str));
     let mut rows = text::table(&header);
@@ -239,7 +247,7 @@ fn difference(plan: &DifferencePlan) -> String {
     }
     format!(
         "\nA difference in {size} between two conditions takes {answer} (power {}, alpha {}).\n{rows}\n\
-         Power of the paired t test. A person's difference: {} between people, {} from run to run, {} expected error of a run.\n",
+         Power of the paired t test of n people. A person's difference: {} between people, {} from run to run, {} expected error of a run.\n",
         plan.request.power,
         plan.request.alpha,
         text::significant(plan.between_people),

@@ -1,14 +1,14 @@
 //! People of a group: from the directory that `hoid group --out` wrote, from its JSON, or from `population.json` of
 //! `hoid group --pool`.
 //!
-//! The typical person has the form that most people have, and the geometric mean of each of their parameters
-//! (arithmetic if one is not positive); of a pooled population its medians. With a pooled population a person has the
-//! estimates from all people, if the population has every parameter of the form.
+//! The typical person has the form that most people have, and the median of each of their parameters. Where a parameter
+//! was pooled, the typical person has the median of the population, and each person the estimate from all people.
+//! Parameters that the data of too few people determine are not pooled.
 
 use std::path::Path;
 
 use hoid_model::{ContinuousTransferFunction, FamilyOperator, FamilyState, Finding, Form, VerdictLevel};
-use hoid_numerics::statistics::mean;
+use hoid_numerics::statistics::upper_median;
 use hoid_study::group::{GroupSummary, MANIFEST, Manifest};
 use serde_json::Value;
 
@@ -56,11 +56,7 @@ pub(super) fn of_directory(directory: &Path, given: &Given<'_>) -> Result<Chosen
     };
     let pooled = read_pooled(directory, &condition)?;
     let rows = rows.into_iter().filter(|row| row.condition == condition).collect();
-    match pooled.map(|pooled| of_pooled(&pooled, directory, &element)) {
-        Some(Ok(chosen)) => Ok(chosen),
-        // A population without all parameters of a form: each person by themselves.
-        _ => of_rows(rows, directory, &element),
-    }
+    of_rows(rows, pooled.as_ref(), directory, &element)
 }
 
 pub(super) fn of_json(object: &Value, path: &Path, given: &Given<'_>) -> Result<Chosen, DesignError> {
@@ -72,9 +68,10 @@ pub(super) fn of_json(object: &Value, path: &Path, given: &Given<'_>) -> Result<
         condition: text(p, "condition"),
         form: text(p, "form"),
         parameters: match p["parameters"].as_object() {
+            // JSON has no infinite number.
             Some(all) => all
                 .iter()
-                .filter_map(|(name, q)| Some((name.clone(), q["value"].as_f64()?)))
+                .map(|(name, q)| (name.clone(), q["value"].as_f64().unwrap_or(f64::NAN)))
                 .collect(),
             None => Vec::new(),
         },
@@ -83,11 +80,23 @@ pub(super) fn of_json(object: &Value, path: &Path, given: &Given<'_>) -> Result<
     let condition = condition_of(&rows, path, given)?;
     let element = given.element(&path.display().to_string())?;
     let rows = rows.into_iter().filter(|row| row.condition == condition).collect();
-    of_rows(rows, path, &element)
+    of_rows(rows, None, path, &element)
 }
 
 pub(super) fn of_population(object: &Value, path: &Path, given: &Given<'_>) -> Result<Chosen, DesignError> {
     let element = given.element(&path.display().to_string())?;
+    let missing: Vec<&str> = object["left_out"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter_map(|entry| entry[0].as_str())
+        .collect();
+    if !missing.is_empty() {
+        let names = missing.join(", ");
+        let reason =
+            format!("{names} could not be pooled; name the directory of the group, which has those of each person");
+        return Err(none(path, reason));
+    }
     of_pooled(&pooled(object), path, &element)
 }
 
@@ -188,7 +197,29 @@ fn of_pooled(pooled: &Pooled, place: &Path, element: &ContinuousTransferFunction
     Ok(with_others(NamedState { name, state }, &pooled.people, element))
 }
 
-fn of_rows(rows: Vec<Row>, place: &Path, element: &ContinuousTransferFunction) -> Result<Chosen, DesignError> {
+impl Row {
+    /// The same with the pooled values of another row, where it has them.
+    fn with(mut self, pooled: &Self) -> Self {
+        for (name, value) in &mut self.parameters {
+            if let Some((_, better)) = pooled.parameters.iter().find(|(n, _)| n == name) {
+                *value = *better;
+            }
+        }
+        self
+    }
+}
+
+fn of_rows(
+    rows: Vec<Row>,
+    pooled: Option<&Pooled>,
+    place: &Path,
+    element: &ContinuousTransferFunction,
+) -> Result<Chosen, DesignError> {
+    let with_pooled = |row: Row| match pooled.and_then(|p| p.people.iter().find(|q| q.subject == row.subject)) {
+        Some(own) => row.with(own),
+        None => row,
+    };
+    let rows: Vec<Row> = rows.into_iter().map(with_pooled).collect();
     let count = |form: &str| rows.iter().filter(|row| row.form == form).count();
     // Of two forms with as many people, the first.
     let first = rows.iter().rev().max_by_key(|row| count(&row.form));
@@ -196,20 +227,24 @@ fn of_rows(rows: Vec<Row>, place: &Path, element: &ContinuousTransferFunction) -
     let alike: Vec<&Row> = rows.iter().filter(|row| row.form == form).collect();
     let centre = |name: &String| {
         let of = |row: &&Row| row.parameters.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
-        let values: Vec<f64> = alike.iter().filter_map(of).filter(|v| v.is_finite()).collect();
-        let positive = values.iter().all(|v| *v > 0.0);
-        let middle = match positive {
-            true => mean(&values.iter().map(|v| v.ln()).collect::<Vec<_>>()).exp(),
-            false => mean(&values),
-        };
-        (!values.is_empty()).then_some((name.clone(), middle))
+        let mut values: Vec<f64> = alike.iter().filter_map(of).collect();
+        // An infinite T_I is written as no number in JSON.
+        values
+            .iter_mut()
+            .filter(|v| v.is_nan())
+            .for_each(|v| *v = f64::INFINITY);
+        (name.clone(), upper_median(&mut values).unwrap_or(f64::NAN))
     };
     let names = alike.first().map(|row| row.parameters.iter().map(|(name, _)| name));
     let typical = Row {
         subject: "typical".to_owned(),
         condition: String::new(),
-        parameters: names.into_iter().flatten().filter_map(centre).collect(),
+        parameters: names.into_iter().flatten().map(centre).collect(),
         form,
+    };
+    let typical = match pooled {
+        Some(pooled) => typical.with(&pooled.centre),
+        None => typical,
     };
     let state = state_of(&typical, element).map_err(|reason| none(place, reason))?;
     let name = match alike.len() == rows.len() {
@@ -256,7 +291,7 @@ fn state_of(row: &Row, element: &ContinuousTransferFunction) -> Result<FamilySta
     let pair = |name: &str| match value(name) {
         Some(v) if v.is_finite() => Ok((name.to_owned(), v)),
         // The lag of an integration.
-        _ if name == "T_I" => Ok((name.to_owned(), f64::INFINITY)),
+        Some(_) if name == "T_I" => Ok((name.to_owned(), f64::INFINITY)),
         _ => Err(format!("{name} of the form {form} is not known")),
     };
     let names = form.parameters(neuromuscular);

@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | `population` | of the crossover model (`adapted`) | one spread to each side of each parameter of the prior |
 //! | scenario, fit | that one | none |
-//! | result of a group, `population.json` | mean or median over people (`group_people`) | each person |
+//! | result of a group, `population.json` | medians over people (`group_people`) | each person |
 
 use std::{
     convert::Infallible,

@@ -238,3 +238,70 @@ fn worst<'a>(people: &'a [PersonExpected], wanted: &[Wanted]) -> Option<&'a Pers
     };
     people.iter().max_by(|a, b| of(a).total_cmp(&of(b)))
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn request() -> DesignRequest {
+        DesignRequest {
+            controlled_element: Some("4/s".parse().unwrap()),
+            designing: Designing {
+                wanted: vec!["tau_e=3%".parse().unwrap(), "crossover=1%".parse().unwrap()],
+                ..Designing::default()
+            },
+            ..DesignRequest::default()
+        }
+    }
+
+    #[test]
+    fn a_design_comes_back_from_its_json() {
+        let design = DesignRequest {
+            against: Some(Against::Reference),
+            difference: Some(DifferenceRequest::new("crossover=0.4".parse().unwrap())),
+            ..request()
+        }
+        .run()
+        .unwrap();
+        assert_eq!(ExperimentDesign::from_json(&design.to_json()).unwrap(), design);
+        assert!(ExperimentDesign::from_json("{\"kind\": \"comparison\"}").is_err());
+        let given = |name: &str| design.settings.iter().find(|s| s.name == name).unwrap().given;
+        assert!(given("for") && given("difference") && !given("people") && !given("power"));
+    }
+
+    #[test]
+    fn the_worst_person_needs_most_runs() {
+        let design = request().run().unwrap();
+        let worst = design.worst.unwrap();
+        assert!(design.people.iter().all(|p| p.runs_needed <= worst.runs_needed));
+        assert!(design.runs == design.runs_needed && worst.runs_needed > design.runs);
+        // With the accepted errors in so many runs.
+        let error = |name: &str| design.expected.relative_error(name).unwrap();
+        assert!(error("tau_e") <= 0.03 && error("crossover") <= 0.01);
+    }
+
+    #[test]
+    fn a_seen_target_is_refused_and_a_disturbance_is_not() {
+        let pursuit = DesignRequest {
+            display: Display::Pursuit,
+            ..request()
+        };
+        assert!(matches!(pursuit.run(), Err(DesignError::SeenTarget { .. })));
+        let design = DesignRequest {
+            enters: Enters::Disturbance,
+            ..pursuit
+        };
+        let lab = design.run().unwrap().lab("scenario.toml").unwrap();
+        assert!(lab.contains("display = \"pursuit\""));
+        let odd = Designing {
+            period_s: 80.123,
+            ..Designing::default()
+        };
+        let odd = DesignRequest {
+            designing: odd,
+            ..request()
+        };
+        assert_eq!(odd.run().unwrap().lab("scenario.toml"), None);
+    }
+}
