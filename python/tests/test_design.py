@@ -67,5 +67,5 @@ def test_mistakes_are_told(tmp_path: Path) -> None:
         pyhoid.design(controlled_element="4/s", display="pursuit")
     with pytest.raises(pyhoid.FileMissingError):
         pyhoid.design(tmp_path / "nothing.toml")
-    with pytest.raises(pyhoid.FormatError, match="nobody"):
+    with pytest.raises(pyhoid.FormatError, match="no people"):
         pyhoid.design(tmp_path)

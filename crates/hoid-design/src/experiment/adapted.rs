@@ -75,7 +75,7 @@ pub(super) fn population(
         for sign in [-1.0, 1.0] {
             let value = entry.centre * (sign * entry.spread).exp();
             let name = format!("{} = {value:.2}", entry.parameter);
-            // A delay with which nobody could control this element is no person of the population.
+            // A delay with which no one could control this element is no person of the population.
             others.extend(named(name, Muscles::with(Some((&entry.parameter, value)))).ok());
         }
     }

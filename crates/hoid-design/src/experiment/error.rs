@@ -92,7 +92,7 @@ pub enum DesignError {
     },
     /// A source without people.
     #[error(
-        "{place} holds nobody to design for ({reason}); expected population, a scenario, a fit (identify --json), a directory that `hoid group DIR --out` wrote, or its population.json"
+        "{place} holds no people to design for ({reason}); expected population, a scenario, a fit (identify --json), a directory that `hoid group DIR --out` wrote, or its population.json"
     )]
     NoPeople {
         /// The source.

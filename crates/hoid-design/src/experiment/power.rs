@@ -60,7 +60,7 @@ pub fn power(effect: f64, people: usize, alpha: f64) -> Option<f64> {
     Some(1.0 - noncentral_t_cdf(critical, degrees, delta) + noncentral_t_cdf(-critical, degrees, delta))
 }
 
-/// Largest number of people that is sought.
+/// Largest number of people that is searched.
 pub const MOST_PEOPLE: usize = 1000;
 
 /// Least number of people with this power; `None` above [`MOST_PEOPLE`].
