@@ -31,7 +31,7 @@
 //! | [`reproduction`] | tables, figures and claims in a directory, from the results of the studies |
 //! | [`comparators`] | the survey's other methods, to be compared with |
 //! | [`survey`] | all methods of the survey on the same runs |
-//! | [`experiment`] | the experiment of the text with virtual people |
+//! | [`experiment`] | the experiment of the text with virtual or recorded people |
 //! | [`claims`] | statements of the text, tested by the results of the named plans |
 //!
 //! Studies and reports do not depend on this crate.

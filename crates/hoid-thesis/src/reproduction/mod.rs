@@ -9,7 +9,7 @@
 //! | `starts` | Figs. F.1 to F.8: other starts against the base | `initial-conditions` |
 //! | `traces` | Figs. 11, 12, G.1 to G.8, H.1 to H.12: recursive estimates | `recursive`, `recursive-arx` |
 //! | `averages` | Figs. H.1 to H.12 as the text draws them: averages, with medians next to | `recursive` |
-//! | `experiment` | Table 3, Figs. 13, 14, I.1 to I.18 with virtual people | its own |
+//! | `experiment` | Table 3, Figs. 13, 14, I.1 to I.18 with virtual or recorded people | its own |
 //! | `further` | what the text leaves for later | the other plans |
 //! | `catalogue` | all of them in the order of the text | |
 //! | `item`, `table_builder`, `axes` | what they are made of | |
