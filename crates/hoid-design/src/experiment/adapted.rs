@@ -17,7 +17,7 @@ use hoid_model::{
     ContinuousTransferFunction, FamilyOperator, FamilyState, Form, ModelError, operator_family::Coordinate,
 };
 
-use super::{DesignError, people::NamedState};
+use super::{DesignError, chosen::NamedState};
 
 /// Frequency at which slopes are compared, rad/s.
 const NEAR_CROSSOVER_RAD_S: f64 = 3.0;

@@ -7,14 +7,14 @@
 
 use std::path::Path;
 
-use hoid_model::{ContinuousTransferFunction, FamilyOperator, FamilyState, Finding, Form, VerdictLevel};
+use hoid_model::{ContinuousTransferFunction, FamilyOperator, FamilyState, Form, VerdictLevel};
 use hoid_numerics::statistics::upper_median;
 use hoid_study::group::{GroupSummary, MANIFEST, Manifest};
 use serde_json::Value;
 
 use super::{
     DesignError,
-    people::{Chosen, Given, NamedState},
+    chosen::{Chosen, Given, NamedState, left_out},
 };
 
 /// A person in a condition: parameters by name.
@@ -270,11 +270,6 @@ fn with_others(typical: NamedState, rows: &[Row], element: &ContinuousTransferFu
         others,
         findings,
     }
-}
-
-/// The finding that a person is left out.
-pub(super) fn left_out(name: &str, reason: &str) -> Finding {
-    Finding::doubt("person-left-out", format!("{name} is left out: {reason}"))
 }
 
 /// The loop of a person, or the reason why there is none.

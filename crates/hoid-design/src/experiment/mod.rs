@@ -14,6 +14,7 @@
 mod adapted;
 mod against;
 mod answer;
+mod chosen;
 mod designing;
 mod difference;
 mod error;

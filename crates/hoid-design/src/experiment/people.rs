@@ -12,10 +12,15 @@ use std::{
     str::FromStr,
 };
 
-use hoid_model::{ContinuousTransferFunction, FamilyState, Finding, Form};
+use hoid_model::FamilyState;
 use serde_json::Value;
 
-use super::{DesignError, adapted, against::family, group_people};
+use super::{
+    DesignError, adapted,
+    against::family,
+    chosen::{Chosen, Given, NamedState},
+    group_people,
+};
 
 /// The people for whom an experiment is designed.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -54,39 +59,6 @@ impl std::fmt::Display for People {
             Self::Population => f.write_str(POPULATION),
             Self::File(path) => write!(f, "{}", path.display()),
         }
-    }
-}
-
-/// A person with a name.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct NamedState {
-    pub name: String,
-    pub state: FamilyState,
-}
-
-/// The people of a design.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Chosen {
-    pub typical: NamedState,
-    pub others: Vec<NamedState>,
-    pub findings: Vec<Finding>,
-}
-
-/// What is given next to the people.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Given<'a> {
-    pub controlled_element: Option<&'a ContinuousTransferFunction>,
-    pub form: Option<Form>,
-    pub condition: Option<&'a str>,
-}
-
-impl Given<'_> {
-    /// The controlled element, which these people do not state.
-    pub fn element(&self, people: &str) -> Result<ContinuousTransferFunction, DesignError> {
-        let missing = || DesignError::NoElement {
-            people: people.to_owned(),
-        };
-        self.controlled_element.cloned().ok_or_else(missing)
     }
 }
 

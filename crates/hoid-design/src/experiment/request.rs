@@ -7,10 +7,10 @@ use hoid_model::{
 
 use super::{
     Against, Compared, DesignError, DesignedLine, Designing, DifferenceRequest, Enters, Expected, ExperimentDesign,
-    People, PersonExpected, Remnant, Task, Wanted, expected,
-    group_people::left_out,
+    People, PersonExpected, Remnant, Task, Wanted,
+    chosen::{Chosen, Given, NamedState, left_out},
+    expected,
     information::Loop,
-    people::{Chosen, Given, NamedState},
     periods,
 };
 

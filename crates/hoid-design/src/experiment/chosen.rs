@@ -1,0 +1,43 @@
+//! The people of a design: the typical one, for whom the forcing function is, and the others.
+
+use hoid_model::{ContinuousTransferFunction, FamilyState, Finding, Form};
+
+use super::DesignError;
+
+/// A person with a name.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct NamedState {
+    pub name: String,
+    pub state: FamilyState,
+}
+
+/// The people of a design.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Chosen {
+    pub typical: NamedState,
+    pub others: Vec<NamedState>,
+    pub findings: Vec<Finding>,
+}
+
+/// What is given next to the people.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Given<'a> {
+    pub controlled_element: Option<&'a ContinuousTransferFunction>,
+    pub form: Option<Form>,
+    pub condition: Option<&'a str>,
+}
+
+impl Given<'_> {
+    /// The controlled element, which these people do not state.
+    pub fn element(&self, people: &str) -> Result<ContinuousTransferFunction, DesignError> {
+        let missing = || DesignError::NoElement {
+            people: people.to_owned(),
+        };
+        self.controlled_element.cloned().ok_or_else(missing)
+    }
+}
+
+/// The finding that a person is left out.
+pub(super) fn left_out(name: &str, reason: &str) -> Finding {
+    Finding::doubt("person-left-out", format!("{name} is left out: {reason}"))
+}
