@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pickle
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -50,12 +51,21 @@ def test_a_design_is_read_again() -> None:
 
 
 def test_a_group_is_designed_for(group_results: Path) -> None:
-    designed = pyhoid.design(
-        group_results, condition="fo", controlled_element="1/s", disturbance=True
-    )
-    assert len(designed.people) >= 3
-    with pytest.raises(pyhoid.OptionError, match="several conditions"):
-        pyhoid.design(group_results)
+    wanted: dict[str, Any] = {"condition": "fo", "controlled_element": "1/s", "disturbance": True}
+    # The delay alone is not an operator.
+    with pytest.raises(pyhoid.FormatError, match="K_e of the form lead is not known"):
+        pyhoid.design(group_results, **wanted)
+    results = json.loads(group_results.read_text())
+    for person in results["people"]:
+        gain = 0.9 * person["open_loop"]["crossover_rad_s"]["value"]
+        others = {"K_e": gain, "T_L": 0.1, "omega_nm": 12, "zeta_nm": 0.3}
+        person["parameters"] |= {name: {"value": value} for name, value in others.items()}
+    group_results.write_text(json.dumps(results))
+    designed = pyhoid.design(group_results, **wanted)
+    assert len(designed.people) >= 3 and designed.form == "lead"
+    assert 1.5 < designed.to_dataframe()["value"][0] < 4
+    with pytest.raises(pyhoid.OptionError, match="condition"):
+        pyhoid.design(group_results, controlled_element="1/s")
 
 
 def test_mistakes_are_told(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@
 //! let e: Vec<f64> = (0..400).map(|t| (0.3 * f64::from(t)).sin() + (0.7 * f64::from(t * t)).cos()).collect();
 //! let r: Vec<f64> = (0..400).map(|t| (0.9 * f64::from(t * t)).sin()).collect();
 //! let mut u = vec![0.0; 400];
-//! for t in 3..400 {
+//! for t in 2..400 {
 //!     u[t] = 0.8 * u[t - 1] + 0.5 * e[t - 2] + 0.2 * r[t - 1] - 0.1 * r[t - 2];
 //! }
 //! let record = Record::new(SampleTime::HUNDREDTH, Channel::new("e", "", e), Channel::new("u", "", u))?

@@ -273,7 +273,7 @@ pub enum IoError {
     },
     /// Values missing at many places, as in a topic of another rate.
     #[error(
-        "{file}, {place}, column {column}: the value is missing, as are {count} of {rows} in this column; where it was logged at instants of its own, read it with {} (or linear, drop); else bridge them linearly with --fill, or leave them out with --from and --to",
+        "{file}, {place}, column {column}: the value is missing ({found}), as are {count} of {rows} in this column; where it was logged at instants of its own, read it with {} (or linear, drop); else bridge them linearly with --fill, or leave them out with --from and --to",
         sparse_option(column)
     )]
     Sparse {
@@ -283,6 +283,8 @@ pub enum IoError {
         place: String,
         /// The column.
         column: String,
+        /// The cell.
+        found: String,
         /// Number of missing values.
         count: usize,
         /// Number of rows examined.

@@ -231,7 +231,11 @@ fn two_topics_in_one_table_are_read_where_both_have_values() {
     }
     assert_eq!(
         read.notes,
-        ["1 rows at the start and 0 at the end are left out: e and u have not all a value there to bridge to"]
+        [
+            "1 rows at the start and 0 at the end are left out: e and u have not all a value there to bridge to",
+            "column e lacks values at many places, as if logged at instants of its own: --fill draws straight lines, \
+             --sparse e=hold holds the last value"
+        ]
     );
     // On separate clocks, 50 and 40 Hz, without a common time stamp: the grid is that of the faster one.
     let mut rows: Vec<(f64, bool)> = (0..50).map(|k| (0.02 * f64::from(k), true)).collect();

@@ -148,11 +148,13 @@ impl Table<'_> {
         let source = &self.columns[at];
         let count = rows.clone().filter(|row| source.is_missing(*row)).count();
         let examined = rows.len();
+        let found = if found.is_empty() { String::from("empty") } else { found };
         if source.is_sparse(rows) {
             return IoError::Sparse {
                 file,
                 place,
                 column,
+                found,
                 count,
                 rows: examined,
             };
@@ -161,7 +163,7 @@ impl Table<'_> {
             file,
             place,
             column,
-            found: if found.is_empty() { String::from("empty") } else { found },
+            found,
             count,
             rows: examined,
         }
