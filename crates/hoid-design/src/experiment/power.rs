@@ -63,7 +63,7 @@ pub fn power(effect: f64, people: usize, alpha: f64) -> Option<f64> {
 /// Largest number of people that is searched.
 pub const MOST_PEOPLE: usize = 1000;
 
-/// Least number of people with this power; `None` above [`MOST_PEOPLE`].
+/// Least number of people with this power; `None` above a thousand.
 pub fn people_needed(effect: f64, wanted: f64, alpha: f64) -> Option<usize> {
     let suffices = |people: usize| power(effect, people, alpha).is_some_and(|found| found >= wanted);
     if !suffices(MOST_PEOPLE) {
