@@ -7,21 +7,10 @@ use serde_json::{Map, Value, json};
 
 use super::{DesignedLine, DifferencePlan, Expected, ExpectedResponse, Task, Wanted};
 
-/// A person with the errors to be expected of them.
+/// Expected errors with a name: of another person, or with another forcing function over the same time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PersonExpected {
-    /// Name of the person.
-    pub name: String,
-    /// Errors of all runs.
-    pub expected: Expected,
-    /// Number of runs until every requested quantity has its accepted error.
-    pub runs_needed: usize,
-}
-
-/// Another forcing function, judged over the same time.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Compared {
-    /// Its name.
+pub struct NamedExpected {
+    /// Name of the person or of the forcing function.
     pub name: String,
     /// Errors of all runs.
     pub expected: Expected,
@@ -55,11 +44,11 @@ pub struct ExperimentDesign {
     /// Errors of all runs of the typical person.
     pub expected: Expected,
     /// The other people, with the same forcing function.
-    pub people: Vec<PersonExpected>,
+    pub people: Vec<NamedExpected>,
     /// The person with the greatest errors; `None` for one person.
-    pub worst: Option<PersonExpected>,
+    pub worst: Option<NamedExpected>,
     /// Another forcing function.
-    pub against: Option<Compared>,
+    pub against: Option<NamedExpected>,
     /// People and runs to find a difference.
     pub difference: Option<DifferencePlan>,
     /// The settings.
@@ -92,14 +81,9 @@ impl ExperimentDesign {
         }
         set("lines", self.lines.iter().map(of_line).collect());
         set("response", self.response.iter().map(of_response).collect());
-        set("people", self.people.iter().map(of_person).collect());
-        set("worst", self.worst.as_ref().map_or(Value::Null, of_person));
-        set(
-            "against",
-            self.against.as_ref().map_or(Value::Null, |other| {
-                of_named(&other.name, &other.expected, other.runs_needed)
-            }),
-        );
+        set("people", self.people.iter().map(of_named).collect());
+        set("worst", self.worst.as_ref().map_or(Value::Null, of_named));
+        set("against", self.against.as_ref().map_or(Value::Null, of_named));
         set(
             "difference",
             self.difference.as_ref().map_or(Value::Null, DifferencePlan::json),
@@ -141,15 +125,11 @@ fn of_response(r: &ExpectedResponse) -> Value {
     })
 }
 
-fn of_person(person: &PersonExpected) -> Value {
-    of_named(&person.name, &person.expected, person.runs_needed)
-}
-
-fn of_named(name: &str, expected: &Expected, runs_needed: usize) -> Value {
+fn of_named(one: &NamedExpected) -> Value {
     let mut map = Map::new();
-    map.insert("name".to_owned(), json!(name));
-    map.insert("runs_needed".to_owned(), json!(runs_needed));
-    map.extend(of_expected(expected));
+    map.insert("name".to_owned(), json!(one.name));
+    map.insert("runs_needed".to_owned(), json!(one.runs_needed));
+    map.extend(of_expected(&one.expected));
     Value::Object(map)
 }
 

@@ -30,7 +30,7 @@ mod response;
 mod wanted;
 
 pub use against::Against;
-pub use answer::{Compared, ExperimentDesign, PersonExpected};
+pub use answer::{ExperimentDesign, NamedExpected};
 pub use designing::{Designed, Designing};
 pub use difference::{
     ALPHA, BETWEEN_PEOPLE, DifferencePlan, DifferenceRequest, POWER, RUN_TO_RUN, RunsAndPeople, Sought,

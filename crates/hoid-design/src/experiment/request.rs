@@ -6,8 +6,8 @@ use hoid_model::{
 };
 
 use super::{
-    Against, Compared, DesignError, DesignedLine, Designing, DifferenceRequest, Enters, Expected, ExperimentDesign,
-    People, PersonExpected, Remnant, Task, Wanted,
+    Against, DesignError, DesignedLine, Designing, DifferenceRequest, Enters, Expected, ExperimentDesign,
+    NamedExpected, People, Remnant, Task, Wanted,
     chosen::{Chosen, Given, NamedState, left_out},
     expected,
     information::Loop,
@@ -119,11 +119,11 @@ impl DesignRequest {
         forcing: &ForcingFunction,
         runs: usize,
         findings: &mut Vec<Finding>,
-    ) -> Vec<PersonExpected> {
+    ) -> Vec<NamedExpected> {
         let mut all = Vec::new();
         for person in others {
             match expected(&self.task(person), forcing, self.designing.period_s * runs as f64) {
-                Ok(found) => all.push(PersonExpected {
+                Ok(found) => all.push(NamedExpected {
                     name: person.name.clone(),
                     runs_needed: self.runs_needed(&found, runs),
                     expected: found,
@@ -134,10 +134,10 @@ impl DesignRequest {
         all
     }
 
-    fn compared(&self, other: &Against, task: &Task, runs: usize) -> Result<Compared, DesignError> {
+    fn compared(&self, other: &Against, task: &Task, runs: usize) -> Result<NamedExpected, DesignError> {
         let forcing = other.forcing(self.enters)?;
         let found = expected(task, &forcing, self.designing.period_s * runs as f64)?;
-        Ok(Compared {
+        Ok(NamedExpected {
             name: other.name(),
             runs_needed: self.runs_needed(&found, runs),
             expected: found,
@@ -226,8 +226,8 @@ fn drowned(lines: &[DesignedLine]) -> Option<Finding> {
 const LEAST_TO_REMNANT: f64 = 10.0;
 
 /// The person with the greatest errors, relative to the accepted ones; without these, relative to the parameters.
-fn worst<'a>(people: &'a [PersonExpected], wanted: &[Wanted]) -> Option<&'a PersonExpected> {
-    let of = |person: &PersonExpected| -> f64 {
+fn worst<'a>(people: &'a [NamedExpected], wanted: &[Wanted]) -> Option<&'a NamedExpected> {
+    let of = |person: &NamedExpected| -> f64 {
         let e = &person.expected;
         if wanted.is_empty() {
             let relative = e.parameters.iter().filter_map(|p| e.relative_error(p.name));
