@@ -5,7 +5,7 @@
 //! linear regression, and its response replaces the describing function if no periodic excitation was recorded: for the
 //! starts of all forms.
 
-use hoid_model::{Complex64, Record, Structure};
+use hoid_model::{Complex64, Record, SampleTime, Structure};
 
 use super::{prediction::NONE, response_fit::MeasuredResponse};
 use crate::{Estimator, Fit, IdentError, ResponsePoint};
@@ -15,7 +15,7 @@ const POLES: usize = 16;
 /// Number of coefficients of A or B below which no other model is tried.
 const FEWEST: usize = 4;
 /// Most coefficients of B.
-const MOST_GAINS: usize = 60;
+pub(super) const MOST_GAINS: usize = 60;
 /// Largest number of coefficients of B if u is predicted so well that there may be no noise, and the threshold for
 /// this: at high rates a long delay takes more samples than the default number.
 const MOST_WITHOUT_NOISE: usize = 200;
@@ -62,15 +62,31 @@ impl ArxResponse {
         let ts = records[0].sample_time();
         let squares: f64 = records.iter().flat_map(Record::output).map(|u| u * u).sum();
         let samples: usize = records.iter().map(Record::len).sum();
-        let highest = BAND_RAD_S.1.min(0.8 * ts.nyquist_rad_s());
-        let omega: Vec<f64> = (0..POINTS)
-            .map(|i| BAND_RAD_S.0 * (highest / BAND_RAD_S.0).powf(i as f64 / (POINTS as f64 - 1.0)))
-            .collect();
         Self {
-            points: fit.frequency_response(&omega).iter().map(measured).collect(),
+            points: fit.frequency_response(&frequencies(ts)).iter().map(measured).collect(),
             innovations: fit.innovation_variance() * samples as f64 / squares,
         }
     }
+}
+
+/// Frequencies of a response without a form.
+pub(super) fn frequencies(ts: SampleTime) -> Vec<f64> {
+    let highest = BAND_RAD_S.1.min(0.8 * ts.nyquist_rad_s());
+    (0..POINTS)
+        .map(|i| BAND_RAD_S.0 * (highest / BAND_RAD_S.0).powf(i as f64 / (POINTS as f64 - 1.0)))
+        .collect()
+}
+
+/// Returns (na, nb) of the first regression, with nb for each of this number of inputs.
+pub(super) fn first_orders(records: &[Record], inputs: usize, most_gains: usize) -> (usize, usize) {
+    let shortest = records.iter().map(Record::len).min().unwrap_or(0);
+    let nb = gains(records).clamp(FEWEST, most_gains).min(shortest / (8 * inputs));
+    (POLES.min(shortest / 12).max(2), nb.max(2))
+}
+
+/// Returns half as many coefficients; `None` below the fewest.
+pub(super) fn halved((na, nb): (usize, usize)) -> Option<(usize, usize)> {
+    (na.max(nb) > FEWEST).then(|| (na.div_ceil(2).max(2), nb.div_ceil(2).max(2)))
 }
 
 /// Number of coefficients of B that cover a response.
@@ -80,10 +96,8 @@ fn gains(records: &[Record]) -> usize {
 
 /// Repeats the regression with half as many coefficients, of A only or of both, until the records determine them.
 fn regressed(records: &[Record], of_a_alone: bool, most_gains: usize) -> Result<ArxResponse, IdentError> {
-    let shortest = records.iter().map(Record::len).min().unwrap_or(0);
     let mut orders = Structure::Arx.operator_orders(1);
-    orders.na = POLES.min(shortest / 12).max(2);
-    orders.nb = gains(records).clamp(4, most_gains).min(shortest / 8).max(2);
+    (orders.na, orders.nb) = first_orders(records, 1, most_gains);
     loop {
         // Without noise, the removed means have a visible effect.
         let estimator = Estimator {
@@ -91,22 +105,20 @@ fn regressed(records: &[Record], of_a_alone: bool, most_gains: usize) -> Result<
             ..Estimator::new(Structure::Arx, orders)
         };
         let found = estimator.fit(records);
-        let has_more = if of_a_alone {
-            orders.na > 2
+        let fewer = if of_a_alone {
+            (orders.na > 2).then(|| (orders.na.div_ceil(2).max(2), orders.nb))
         } else {
-            orders.na.max(orders.nb) > FEWEST
+            halved((orders.na, orders.nb))
         };
-        if found.is_ok() || !has_more {
-            return found.map(|fit| ArxResponse::of_fit(records, &fit));
-        }
-        orders.na = orders.na.div_ceil(2).max(2);
-        if !of_a_alone {
-            orders.nb = orders.nb.div_ceil(2).max(2);
+        match fewer {
+            Some(fewer) if found.is_err() => (orders.na, orders.nb) = fewer,
+            _ => return found.map(|fit| ArxResponse::of_fit(records, &fit)),
         }
     }
 }
 
-fn measured(point: &ResponsePoint) -> MeasuredResponse {
+/// Converts a point of a fit.
+pub(super) fn measured(point: &ResponsePoint) -> MeasuredResponse {
     let gain = 10f64.powf(point.magnitude_db.value / 20.0);
     let error = |e: Option<f64>| e.unwrap_or(0.0);
     let relative = error(point.magnitude_db.standard_error) * std::f64::consts::LN_10 / 20.0;

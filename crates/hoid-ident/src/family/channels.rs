@@ -21,10 +21,11 @@
 use std::sync::Arc;
 
 use hoid_core::filter::{divide_in_place, fir};
-use hoid_model::{Complex64, Detrend, Form, Record, SampleTime, operator_family::Coordinate};
+use hoid_model::{Complex64, Detrend, Form, Record, SampleTime, Structure, operator_family::Coordinate};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
+    arx_response::{MOST_GAINS, first_orders, frequencies, halved, measured},
     channel::{Channel, ChannelFit, ChannelForm, ChannelResponse, SeenChannel, lead},
     channel_lines::{AtChannelLines, ChannelLines, ChannelMinimum, InForm, own_places},
     coordinates::{self, Grid},
@@ -45,8 +46,8 @@ use crate::{
         further_input::{FurtherInput, InputOrders},
     },
     grey_box::parametrisation::Parametrisation,
-    linalg::least_squares::{add_scaled, dot, solve_symmetric},
-    optimize::Objective,
+    linalg::least_squares::{add_scaled, dot},
+    several_inputs::SeveralInputs,
 };
 
 /// Probability of a response where there is none.
@@ -55,17 +56,8 @@ const BY_CHANCE: f64 = 0.01;
 const EACH_MORE: f64 = 4.0;
 /// Least part of an input that the others must not explain.
 const LEAST_OWN_PART: f64 = 1e-9;
-/// Order of A of the regression, and the least number of coefficients before it is abandoned.
-const POLES: usize = 16;
-const FEWEST: usize = 4;
-/// Largest number of coefficients of a B, and the time that it covers in s.
-const MOST_GAINS: usize = 60;
-const RESPONSE_S: f64 = 0.7;
 /// Part of its diagonal that is added to the normal matrix.
 const RIDGE: f64 = 1e-7;
-/// Frequencies of the responses, rad/s, evenly over their logarithm.
-const BAND_RAD_S: (f64, f64) = (0.5, 20.0);
-const POINTS: usize = 24;
 /// Longest delay of a channel relative to the end of the preview, s.
 const LONGEST_DELAY_S: f64 = 0.8;
 
@@ -381,27 +373,18 @@ impl<'s> Seen<'s> {
     /// # Errors
     /// [`IdentError::SingularRegressors`] if the records do not distinguish the inputs.
     pub fn responses(&self, records: &[Record]) -> Result<Vec<Vec<MeasuredResponse>>, IdentError> {
-        let ts = records[0].sample_time().s();
-        let shortest = records.iter().map(Record::len).min().unwrap_or(0);
-        let inputs = self.all.len() + 1;
-        let mut na = POLES.min(shortest / 12).max(2);
-        let mut nb = (RESPONSE_S / ts).ceil() as usize;
-        nb = nb.clamp(FEWEST, MOST_GAINS).min(shortest / (8 * inputs)).max(2);
+        let mut orders = first_orders(records, self.all.len() + 1, MOST_GAINS);
         loop {
-            if let Some(found) = self.regressed(records, na, nb) {
+            if let Some(found) = self.regressed(records, orders) {
                 return Ok(found);
             }
-            if na.max(nb) <= FEWEST {
-                let names = self.all.iter().map(|c| c.name.clone()).collect::<Vec<_>>().join(", ");
-                return Err(IdentError::SingularRegressors {
-                    columns: format!("e, {names} and their pasts"),
-                });
-            }
-            (na, nb) = (na.div_ceil(2).max(2), nb.div_ceil(2).max(2));
+            orders = halved(orders).ok_or_else(|| IdentError::SingularRegressors {
+                columns: format!("e, {} and their pasts", self.names().join(", ")),
+            })?;
         }
     }
 
-    fn regressed(&self, records: &[Record], na: usize, nb: usize) -> Option<Vec<Vec<MeasuredResponse>>> {
+    fn regressed(&self, records: &[Record], (na, nb): (usize, usize)) -> Option<Vec<Vec<MeasuredResponse>>> {
         let sample_time = records[0].sample_time();
         let orders = hoid_model::Orders {
             na,
@@ -409,24 +392,30 @@ impl<'s> Seen<'s> {
             nk: 1,
             ..hoid_model::Orders::default()
         };
-        let mut further = Vec::with_capacity(self.values.len());
-        for (values, lead) in self.values.iter().zip(&self.leads) {
-            further.push(FurtherInput {
-                orders: InputOrders {
-                    // The delay relative to the end of the preview is longer by the preview.
-                    nb: (nb + lead).min(2 * MOST_GAINS),
-                    nf: 0,
-                    nk: 0,
-                },
+        // The delay relative to the end of the preview is longer by the preview.
+        let own = |lead: &usize| InputOrders {
+            nb: (nb + lead).min(2 * MOST_GAINS),
+            nf: 0,
+            nk: 0,
+        };
+        let further: Vec<FurtherInput<'_>> = (self.values.iter().zip(&self.leads))
+            .map(|(values, lead)| FurtherInput {
+                orders: own(lead),
                 values: values.iter().map(Vec::as_slice).collect(),
-            });
-        }
+            })
+            .collect();
         let late = further.iter().map(|f| f.orders.first_regressed_sample()).max();
         let first = orders.first_regressed_sample().max(late.unwrap_or(0));
         if records.iter().any(|record| record.len() <= first) {
             return None;
         }
-        let counts: Vec<usize> = std::iter::once(nb).chain(further.iter().map(|f| f.orders.nb)).collect();
+        let error = InputOrders { nb, nf: 0, nk: 1 };
+        let inputs = self.names().into_iter().zip(self.leads.iter().map(own));
+        let model = SeveralInputs {
+            na,
+            inputs: std::iter::once(("e".to_owned(), error)).chain(inputs).collect(),
+            ..SeveralInputs::new(Structure::Arx)
+        };
         let criterion = Criterion {
             orders,
             data: Data::of(records),
@@ -435,60 +424,14 @@ impl<'s> Seen<'s> {
             weights: None,
             further,
         };
-        let p = na + counts.iter().sum::<usize>();
-        let n = criterion.residuals();
-        if n <= 2 * p {
+        if criterion.residuals() <= 2 * criterion.parameters() {
             return None;
         }
-        let mut at = criterion.linearise(&vec![0.0; p], &mut Workspace::of_thread());
         // A sum of few sines determines as few combinations of its past: the response at its lines, and no more.
-        (0..p).for_each(|i| at.gram[i * p + i] *= 1.0 + RIDGE);
-        let theta = solve_symmetric(&at.gram, &at.descent)?;
-        let squares = (at.sum_of_squares - dot(&theta, &at.descent)).max(0.0);
-        // The variance is at least that of the rounding error of such a regression.
-        let variance = squares.max(1e-12 * at.sum_of_squares) / (n - p) as f64;
-        let mut inverse = vec![0.0; p * p];
-        for i in 0..p {
-            let mut unit = vec![0.0; p];
-            unit[i] = 1.0;
-            inverse[i * p..(i + 1) * p].copy_from_slice(&solve_symmetric(&at.gram, &unit)?);
-        }
-        let highest = BAND_RAD_S.1.min(0.8 * sample_time.nyquist_rad_s());
-        let mut at = na;
-        let mut all = Vec::with_capacity(counts.len());
-        for (input, count) in counts.into_iter().enumerate() {
-            let (places, nk) = (at..at + count, usize::from(input == 0));
-            at += count;
-            let point = |i: usize| {
-                let omega = BAND_RAD_S.0 * (highest / BAND_RAD_S.0).powf(i as f64 / (POINTS as f64 - 1.0));
-                let back = |k: usize| Complex64::from_polar(1.0, -omega * sample_time.s() * k as f64);
-                let a = (1..=na).fold(Complex64::new(1.0, 0.0), |sum, k| sum + theta[k - 1] * back(k));
-                let b: Complex64 = places.clone().map(|k| theta[k] * back(k - places.start + nk)).sum();
-                let response = b / a;
-                let slope = |k: usize| {
-                    if k < na {
-                        -response * back(k + 1) / a
-                    } else if places.contains(&k) {
-                        back(k - places.start + nk) / a
-                    } else {
-                        Complex64::new(0.0, 0.0)
-                    }
-                };
-                let slopes: Vec<Complex64> = (0..p).map(slope).collect();
-                let along = |part: fn(&Complex64) -> f64| {
-                    let gradient: Vec<f64> = slopes.iter().map(part).collect();
-                    variance * hoid_model::uncertainty::variance_along(&gradient, &inverse)
-                };
-                let found = along(|z| z.re) + along(|z| z.im);
-                MeasuredResponse {
-                    omega_rad_s: omega,
-                    response,
-                    variance: found.max(1e-6 * response.norm_sqr()),
-                }
-            };
-            all.push((0..POINTS).map(point).collect());
-        }
-        Some(all)
+        let fit = model.ridge(&criterion, RIDGE, sample_time)?;
+        let omega = frequencies(sample_time);
+        let of = |input| fit.frequency_response(input, &omega).iter().map(measured).collect();
+        Some((0..model.inputs.len()).map(of).collect())
     }
 
     /// Returns each channel with the form that is nearest to its response.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use hoid_model::Complex64;
 
 use super::termination::Termination;
-use crate::criterion::Workspace;
+use crate::{criterion::Workspace, linalg::least_squares::solve_symmetric};
 
 /// Sum of squares, `psi' eps` and the projected `psi' psi` (by rows).
 #[derive(Debug, Clone, Default)]
@@ -35,6 +35,25 @@ impl Linearisation {
                 self.gram[i * p + j] += weight * (slopes[i].conj() * slopes[j]).re;
             }
         }
+    }
+
+    /// Adds this part of its diagonal to `psi' psi` and solves the normal equations; `None` if they are singular.
+    pub fn solution(&mut self, ridge: f64) -> Option<Vec<f64>> {
+        let p = self.descent.len();
+        (0..p).for_each(|i| self.gram[i * p + i] *= 1.0 + ridge);
+        solve_symmetric(&self.gram, &self.descent)
+    }
+
+    /// Returns `variance (psi' psi)^-1` by rows; `None` if it is singular.
+    pub fn covariance(&self, variance: f64) -> Option<Vec<f64>> {
+        let p = self.descent.len();
+        let mut all = Vec::with_capacity(p * p);
+        for i in 0..p {
+            let mut unit = vec![0.0; p];
+            unit[i] = variance;
+            all.extend(solve_symmetric(&self.gram, &unit)?);
+        }
+        Some(all)
     }
 }
 
