@@ -10,30 +10,28 @@
 //! (L. Ljung, *System Identification*, 1999, sections 13.4 and 13.5). Each form is fitted to its responses; searches from
 //! elsewhere end in other minima.
 //!
-//! **Forms** of a channel are compared at the lines of the excitations of the loop ([`super::channel_lines`]), if there
-//! are lines, otherwise by prediction errors, in units of the inflation kappa. No response at all is one of the
-//! candidates: it is rejected if the likelihood ratio of the best form exceeds the value that chance gives in one of a
-//! hundred records without a response, divided by the number of forms that were tried (Bonferroni).
+//! **Forms** of a channel are compared in [`choice`].
 //!
 //! **A preview** makes delays negative: x is advanced by the samples of the preview, and the fitted delay is relative
 //! to that.
+
+pub(super) mod choice;
 
 use std::sync::Arc;
 
 use hoid_core::filter::{divide_in_place, fir};
 use hoid_model::{Complex64, Detrend, Form, Record, SampleTime, Structure, operator_family::Coordinate};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
     arx_response::{MOST_GAINS, first_orders, frequencies, halved, measured},
-    channel::{Channel, ChannelFit, ChannelForm, ChannelResponse, SeenChannel, lead},
-    channel_lines::{AtChannelLines, ChannelLines, ChannelMinimum, InForm, own_places},
+    channel::{Channel, ChannelFit, ChannelResponse, SeenChannel, lead},
+    channel_lines::{AtChannelLines, ChannelLines, InForm, own_places},
     coordinates::{self, Grid},
     covariances::Covariances,
     estimated::Errors,
     intersample::Intersample,
     parameter::{CoordinateEstimate, Parameter},
-    prediction::{NoiseOrders, Prediction},
+    prediction::Prediction,
     prediction_fit::PredictionFit,
     prior::OperatorPrior,
     response_fit::{MeasuredResponse, ResponseCriterion},
@@ -42,7 +40,7 @@ use super::{
 use crate::{
     IdentError, InitialState, SearchOptions,
     criterion::{
-        Criterion, Data, Workspace,
+        Criterion, Data,
         further_input::{FurtherInput, InputOrders},
     },
     grey_box::parametrisation::Parametrisation,
@@ -50,23 +48,12 @@ use crate::{
     several_inputs::SeveralInputs,
 };
 
-/// Probability of a response where there is none.
-const BY_CHANCE: f64 = 0.01;
-/// Cost of a parameter of a form, in units of chi^2.
-const EACH_MORE: f64 = 4.0;
 /// Least part of an input that the others must not explain.
 const LEAST_OWN_PART: f64 = 1e-9;
 /// Part of its diagonal that is added to the normal matrix.
 const RIDGE: f64 = 1e-7;
 /// Longest delay of a channel relative to the end of the preview, s.
 const LONGEST_DELAY_S: f64 = 0.8;
-
-/// Probability of a likelihood ratio at least as large for this number of additional parameters, in the best of this
-/// number of forms.
-fn by_chance(ratio: f64, more: usize, forms: usize) -> f64 {
-    let chance = ChiSquared::new(more as f64).map_or(1.0, |chi| chi.sf(ratio.max(0.0)));
-    (chance * forms as f64).min(1.0)
-}
 
 /// The channels of the records, with the trend removed as from e and u.
 #[derive(Debug)]
@@ -77,16 +64,6 @@ pub(super) struct Seen<'s> {
     leads: Vec<usize>,
     /// The original records of whole periods, with the trend that was removed from e and u.
     whole: Vec<Record>,
-}
-
-/// The forms of the further inputs at the lines.
-pub(super) struct Compared<'a> {
-    /// The forms that were compared.
-    pub fits: Vec<ChannelFit>,
-    /// The inputs with a response, with starts for the search.
-    pub channels: Vec<Channel<'a>>,
-    /// The same as fits at the lines have them.
-    pub in_form: Vec<InForm>,
 }
 
 impl<'s> Seen<'s> {
@@ -283,91 +260,6 @@ impl<'s> Seen<'s> {
         })
     }
 
-    /// Chooses the forms of the channels at the lines, for any of these forms of the operator: the comparison, and the
-    /// channels with a response in their forms.
-    ///
-    /// # Errors
-    /// [`IdentError::NoFiniteLoss`] if nothing could be fitted.
-    pub fn choose_at_lines<'a>(
-        &self,
-        at: &AtChannelLines<'_>,
-        operators: &[Form],
-        begun: Vec<Vec<Channel<'a>>>,
-    ) -> Result<Compared<'a>, IdentError> {
-        let best_of = |channels: &[InForm]| {
-            let fits = operators
-                .iter()
-                .filter_map(|&form| Some((form, at.fit(form, channels)?)));
-            fits.min_by(|a, b| a.1.criterion().total_cmp(&b.1.criterion()))
-        };
-        let mut in_use: Vec<InForm> = (begun.iter().enumerate())
-            .filter_map(|(k, forms)| Some(self.in_form(k, forms.first()?.form, at.sampling)))
-            .collect();
-        let mut compared = Vec::with_capacity(begun.len());
-        let mut best = None;
-        for (k, asked) in self.all.iter().enumerate() {
-            let others: Vec<InForm> = in_use.iter().filter(|c| c.index != k).copied().collect();
-            let with = |form: Form| {
-                let mut all = others.clone();
-                all.push(self.in_form(k, form, at.sampling));
-                all.sort_by_key(|channel| channel.index);
-                all
-            };
-            let without = best_of(&others);
-            let fits: Vec<(Form, Option<(Form, ChannelMinimum)>)> =
-                begun[k].iter().map(|c| (c.form, best_of(&with(c.form)))).collect();
-            let found = fits.iter().filter_map(|(form, fit)| Some((*form, fit.as_ref()?)));
-            // An additional parameter has to explain more than chance does in one of twenty records.
-            let excess =
-                (fits.iter().filter_map(|(_, fit)| Some(fit.as_ref()?.1.excess()))).fold(f64::INFINITY, f64::min);
-            let cost = |fit: &ChannelMinimum| fit.chi_squared / excess + EACH_MORE * fit.coordinates.len() as f64;
-            let found = found.min_by(|a, b| cost(&a.1.1).total_cmp(&cost(&b.1.1)));
-            let (form, fit) = found.ok_or(IdentError::NoFiniteLoss)?;
-            let p_value = without.as_ref().map_or(0.0, |(_, without)| {
-                let ratio = (without.chi_squared - fit.1.chi_squared) / fit.1.excess();
-                let more = fit.1.coordinates.len().saturating_sub(without.coordinates.len()).max(1);
-                by_chance(ratio, more, fits.len())
-            });
-            let least = (without.iter().chain([fit]))
-                .map(|(_, fit)| fit.criterion())
-                .fold(f64::INFINITY, f64::min);
-            let row = |form: Option<Form>, fit: Option<&(Form, ChannelMinimum)>| ChannelForm {
-                form,
-                loss: None,
-                criterion: fit.map(|(_, fit)| fit.criterion() - least),
-            };
-            let mut rows = vec![row(None, without.as_ref())];
-            rows.extend(fits.iter().map(|(form, fit)| row(Some(*form), fit.as_ref())));
-            compared.push(ChannelFit::compared(asked, rows, p_value));
-            if p_value < BY_CHANCE || asked.forms.len() == 1 {
-                in_use = with(form);
-                best = Some(fit.1.clone());
-            } else {
-                in_use = others;
-                best = without.map(|(_, fit)| fit);
-            }
-        }
-        let mut start = best.map(|fit| fit.coordinates).unwrap_or_default();
-        let own = |channel: &InForm| own_places(channel.form, at.neuromuscular).len();
-        let of_channels: usize = in_use.iter().map(own).sum();
-        start.drain(..start.len().saturating_sub(of_channels));
-        let mut channels = Vec::with_capacity(in_use.len());
-        for channel in &in_use {
-            let begun = begun[channel.index].iter().find(|c| c.form == channel.form);
-            let begun = begun.ok_or(IdentError::NoFiniteLoss)?;
-            let rest = start.split_off(own(channel).min(start.len()));
-            channels.push(Channel {
-                start: std::mem::replace(&mut start, rest),
-                ..begun.clone()
-            });
-        }
-        Ok(Compared {
-            fits: compared,
-            channels,
-            in_form: in_use,
-        })
-    }
-
     /// Estimates the responses to e and to each channel by one regression, without a form.
     ///
     /// # Errors
@@ -478,80 +370,6 @@ impl<'s> Seen<'s> {
             all.push(forms.into_iter().map(|(_, channel)| channel).collect());
         }
         Ok(all)
-    }
-
-    /// Chooses the forms of the channels by prediction error, for this form of the operator from these coordinates:
-    /// only those with a response remain in the prediction. Returns the comparison.
-    ///
-    /// # Errors
-    /// [`IdentError::NoFiniteLoss`] if nothing could be fitted.
-    pub fn choose<'a>(
-        &self,
-        prediction: &mut Prediction<'a>,
-        begun: Vec<Vec<Channel<'a>>>,
-        (form, starts): ((Form, bool), &[Vec<f64>]),
-        noise: NoiseOrders,
-        workspace: &mut Workspace,
-    ) -> Result<Vec<ChannelFit>, IdentError> {
-        let mut compared = Vec::with_capacity(begun.len());
-        for (k, forms) in begun.into_iter().enumerate() {
-            let asked = &self.all[k];
-            let others: Vec<Channel<'a>> = prediction.channels.iter().filter(|c| c.index != k).cloned().collect();
-            let mut best_of = |channel: Option<&Channel<'a>>| -> Option<PredictionFit<'a>> {
-                let tried = Prediction {
-                    channels: others.iter().chain(channel).cloned().collect(),
-                    ..prediction.clone()
-                };
-                let fits = starts
-                    .iter()
-                    .filter_map(|start| tried.fit(form, noise, start, workspace).ok());
-                fits.min_by(|a, b| a.objective().total_cmp(&b.objective()))
-            };
-            let without = best_of(None);
-            let fits: Vec<(Channel<'a>, Option<PredictionFit<'a>>)> = (forms.into_iter())
-                .map(|channel| {
-                    let fit = best_of(Some(&channel));
-                    (channel, fit)
-                })
-                .collect();
-            let inflation = fits.iter().filter_map(|(_, fit)| Some(fit.as_ref()?.inflation));
-            let inflation = inflation.fold(f64::NAN, f64::min);
-            let value = |fit: &PredictionFit<'a>| {
-                fit.residuals as f64 * fit.loss.ln() / inflation + 2.0 * fit.parameters() as f64
-            };
-            let cost = |fit: &PredictionFit<'a>| value(fit) + (EACH_MORE - 2.0) * fit.parameters() as f64;
-            let best = (fits.iter())
-                .filter_map(|(channel, fit)| Some((channel, fit.as_ref()?)))
-                .min_by(|a, b| cost(a.1).total_cmp(&cost(b.1)));
-            let (best, fit) = best.ok_or(IdentError::NoFiniteLoss)?;
-            let p_value = without.as_ref().map_or(0.0, |without| {
-                let ratio = fit.residuals as f64 * (without.loss / fit.loss).ln() / inflation;
-                let more = fit.parameters().saturating_sub(without.parameters()).max(1);
-                by_chance(ratio, more, fits.len())
-            });
-            let least = std::iter::once(value(fit))
-                .chain(without.as_ref().map(value))
-                .fold(f64::INFINITY, f64::min);
-            let row = |form: Option<Form>, fit: Option<&PredictionFit<'a>>| ChannelForm {
-                form,
-                loss: fit.map(|fit| fit.loss),
-                criterion: fit.map(|fit| value(fit) - least),
-            };
-            let mut rows = vec![row(None, without.as_ref())];
-            rows.extend(fits.iter().map(|(channel, fit)| row(Some(channel.form), fit.as_ref())));
-            compared.push(ChannelFit::compared(asked, rows, p_value));
-            let has_response = p_value < BY_CHANCE || asked.forms.len() == 1;
-            let chosen = has_response.then(|| {
-                let own = &fit.layout().channels[others.len()];
-                Channel {
-                    start: fit.eta()[own.place..own.place + own.limits.len()].to_vec(),
-                    ..best.clone()
-                }
-            });
-            prediction.channels = others.into_iter().chain(chosen).collect();
-            prediction.channels.sort_by_key(|channel| channel.index);
-        }
-        Ok(compared)
     }
 }
 

@@ -10,7 +10,7 @@ use super::{
     assembly::{AtLines, Chosen, OtherForm},
     channel::{ChannelFit, SeenChannel},
     channel_lines::{AtChannelLines, ChannelLines, InForm, tells_apart},
-    channels::{Compared, Seen},
+    channels::{Seen, choice::Compared},
     comparison::{Comparison, Tried},
     coordinates::Grid,
     intersample::Intersample,

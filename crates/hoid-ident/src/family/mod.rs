@@ -22,7 +22,7 @@
 //! | `options` | [`FamilyEstimator`]: the options, by fields and by names |
 //! | `estimator` | the searches of all forms |
 //! | `channel` | a further input: the request, its form, the results |
-//! | `channels` | further inputs of a person in addition to the error |
+//! | `channels` | further inputs of a person in addition to the error; `choice`: their forms |
 //! | `channel_lines` | the responses to all inputs at the lines |
 //! | `comparison` | comparison of the forms |
 //! | `assembly` | from the searches of the forms that count to the result |

@@ -6,7 +6,7 @@ use rand_chacha::{
     rand_core::{Rng, SeedableRng},
 };
 
-use super::*;
+use super::{choice::BY_CHANCE, *};
 use crate::{
     diagnostics::other_inputs,
     family::{ChannelRole, FamilyEstimator},
