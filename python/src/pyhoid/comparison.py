@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import _pyhoid
-from .verdict import Verdict
+from ._written import Written
 
 if TYPE_CHECKING:
     from typing import Literal
@@ -22,7 +21,7 @@ __all__ = ["Comparison", "compare"]
 Factor = str | Mapping[str, Mapping[str, Sequence[str]]]
 
 
-class Comparison:
+class Comparison(Written):
     """Differences between conditions and people. `compare` makes it.
 
     Examples
@@ -31,11 +30,8 @@ class Comparison:
     >>> found.to_dataframe()[["quantity", "value", "low", "high", "p_adjusted"]]
     """
 
-    def __init__(self, text: str) -> None:
-        self._text = text
-        found = json.loads(text)
-        #: Level, reasons and notes.
-        self.verdict = Verdict(*(found["verdict"][key] for key in ("level", "reasons", "notes")))
+    def _read(self, found: dict[str, Any]) -> None:
+        super()._read(found)
         #: Each difference: quantity, unit, factor, from, to, value, standard_error, interval, t, p, p_adjusted ...
         self.differences: list[dict[str, Any]] = found["differences"]
         #: The mean over people of each quantity in each condition.
@@ -46,8 +42,6 @@ class Comparison:
         self.learning: list[dict[str, Any]] = found["learning"]
         #: Who is missing where, and why.
         self.left_out: list[dict[str, Any]] = found["left_out"]
-        #: The settings that were used.
-        self.settings: dict[str, str] = {s["name"]: s["value"] for s in found["settings"]}
 
     @property
     def sentences(self) -> list[str]:
@@ -95,14 +89,6 @@ class Comparison:
         """
         _pyhoid.comparison_figure_of(text)
         return cls(text)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Comparison):
-            return NotImplemented
-        return bool(json.loads(self._text) == json.loads(other._text))
-
-    def __hash__(self) -> int:
-        return hash(json.dumps(json.loads(self._text)))
 
     def __repr__(self) -> str:
         return "\n".join([repr(self.verdict), *self.sentences])

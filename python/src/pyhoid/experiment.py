@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import _options, _pyhoid
-from .verdict import Verdict
+from ._written import Written
 
 if TYPE_CHECKING:
     from typing import Literal
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["ExperimentDesign", "design"]
 
 
-class ExperimentDesign:
+class ExperimentDesign(Written):
     """A forcing function and the errors to be expected. `design` makes it.
 
     Examples
@@ -28,11 +27,8 @@ class ExperimentDesign:
     >>> designed.runs_needed, designed.errors["tau_e"]
     """
 
-    def __init__(self, text: str) -> None:
-        self._text = text
-        found = json.loads(text)
-        #: Level, reasons and notes.
-        self.verdict = Verdict(*(found["verdict"][key] for key in ("level", "reasons", "notes")))
+    def _read(self, found: dict[str, Any]) -> None:
+        super()._read(found)
         #: Form of the typical person's operator.
         self.form: str = found["form"]
         #: Number of runs, and length of one in s.
@@ -54,8 +50,6 @@ class ExperimentDesign:
         self.against: dict[str, Any] | None = found["against"]
         #: People and runs to find a difference, with ``difference``.
         self.difference: dict[str, Any] | None = found["difference"]
-        #: The settings that were used.
-        self.settings: dict[str, str] = {s["name"]: s["value"] for s in found["settings"]}
         self._parameters: list[dict[str, Any]] = _rows(found)
 
     @property
@@ -141,14 +135,6 @@ class ExperimentDesign:
         """
         _pyhoid.design_files_of(text, "scenario.toml")
         return cls(text)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, ExperimentDesign):
-            return NotImplemented
-        return bool(json.loads(self._text) == json.loads(other._text))
-
-    def __hash__(self) -> int:
-        return hash(json.dumps(json.loads(self._text)))
 
     def __repr__(self) -> str:
         runs = f"{self.runs} run{'s' if self.runs != 1 else ''} of {self.length:g} s"
