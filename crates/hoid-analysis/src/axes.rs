@@ -91,8 +91,12 @@ pub fn axes(identification: &Identification, mut all: Vec<(AxisPair, Recordings)
     check_axes(identification, &pairs)?;
     for x in 0..all.len() {
         for y in (0..all.len()).filter(|y| *y != x) {
-            let other = all[y].1.records.clone();
-            with_error(&mut all[x].1.records, &pairs[y].input, &other)?;
+            let name = &pairs[y].input;
+            // An expression as r-y is not a column of the records.
+            if all[x].1.records.iter().any(|record| record.channel(name).is_none()) {
+                let other = all[y].1.records.clone();
+                with_error(&mut all[x].1.records, name, &other)?;
+            }
         }
     }
     let tests = pairs.len() * (pairs.len() - 1);
@@ -143,7 +147,7 @@ pub fn check_axes(identification: &Identification, pairs: &[AxisPair]) -> Result
     Ok(())
 }
 
-/// Adds the error of another axis to the records where it is not a column of its own, as r-y.
+/// Adds the error of another axis to the records that lack it.
 fn with_error(records: &mut [Record], name: &str, other: &[Record]) -> Result<(), AnalysisError> {
     for (record, of) in records.iter_mut().zip(other) {
         if record.channel(name).is_none() && record.len() == of.len() {
@@ -162,7 +166,7 @@ fn coupling(
     tests: usize,
 ) -> Coupling {
     let records = &identified.data.records;
-    let tested = separate(records, pair, other).and_then(|()| {
+    let tested = separate(records, pair, other, asked.period_s).and_then(|()| {
         let channel = SeenChannel::new(other.input.clone(), ChannelRole::Output);
         response_to(&asked.estimator, &identified.fit, records, channel)
             .map(|(found, _)| found.p_value)
@@ -181,13 +185,17 @@ fn coupling(
 }
 
 /// Returns the reason why the excitations of two axes do not tell their errors apart.
-fn separate(records: &[Record], pair: &AxisPair, other: &AxisPair) -> Result<(), String> {
+fn separate(records: &[Record], pair: &AxisPair, other: &AxisPair, period_s: Option<f64>) -> Result<(), String> {
     let (Some(own), Some(of_other)) = (&pair.excitation, &other.excitation) else {
         return Err("the excitations of both axes are not given, as ex,ux,rx".to_owned());
     };
+    let search = LineSearch {
+        period_s,
+        ..LineSearch::default()
+    };
     for record in records {
         let lines = |name: &String| {
-            let found = Lines::found_in(record, name, &LineSearch::default()).map_err(|error| error.to_string())?;
+            let found = Lines::found_in(record, name, &search).map_err(|error| error.to_string())?;
             Ok::<_, String>(found.omega_rad_s())
         };
         let (here, there) = (lines(own)?, lines(of_other)?);
