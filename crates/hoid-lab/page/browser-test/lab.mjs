@@ -14,9 +14,18 @@ export function browserOrEnd() {
   return found;
 }
 
+const children = new Set();
+
+/** Ends every server that still runs, as after a failed test. */
+export function endAll() {
+  for (const child of children) child.kill("SIGKILL");
+}
+
 /** `hoid lab` with arguments; its address. */
 export async function lab(program, ...args) {
   const child = spawn(program, ["lab", ...args], { stdio: ["ignore", "pipe", "inherit"] });
+  children.add(child);
+  child.on("exit", () => children.delete(child));
   const address = await new Promise((resolve, reject) => {
     let text = "";
     child.stdout.on("data", (data) => {
