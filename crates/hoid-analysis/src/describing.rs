@@ -56,7 +56,9 @@ impl Describing {
             ..self.options.clone()
         };
         let mut found = describe_runs(&data.records, &options)?;
-        found.verdict = data.judged(found.verdict);
+        let (element, channel) = (options.controlled_element.as_ref(), options.excitation.as_deref());
+        let verdict = data.judged(found.verdict);
+        found.verdict = verdict.append(data.element_finding(element, channel));
         let settings = self.settings(&data, late, &found);
         Ok(Described { found, data, settings })
     }

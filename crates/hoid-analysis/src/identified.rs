@@ -71,6 +71,8 @@ impl<E: BatchEstimator> Identification<E> {
         let mut data = recordings
             .repaired(self.faults, E::OF)?
             .at_rate(self.rate, counts_samples)?;
+        // Before the fit, which takes the response to further inputs out of u.
+        let element = data.element_finding(self.controlled_element.as_ref(), self.excitation.named());
         let Fitted {
             mut fit,
             verdict,
@@ -82,6 +84,7 @@ impl<E: BatchEstimator> Identification<E> {
         let verdict = data.judged(verdict);
         let response = (E::OF == Of::Person).then(|| response(&data.records)).flatten();
         let verdict = verdict.prepend(response.and_then(|found| found.finding()));
+        let verdict = verdict.append(element);
         let verdict = answers::judged(verdict, &fit.answers(self.controlled_element.as_ref()), &self.answers);
         E::judged(&mut fit, &verdict);
         let reading = data.source.as_ref().map(|source| &source.reading);

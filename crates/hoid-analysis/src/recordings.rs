@@ -1,7 +1,8 @@
 //! Recordings on their way to an estimator, with the account of their processing.
 
+use hoid_ident::diagnostics::recorded_element;
 use hoid_io::{QualityIssue, Step, quality_of_record};
-use hoid_model::{Fault, Finding, Record, Verdict, uncertainty::Estimate};
+use hoid_model::{ContinuousTransferFunction, Fault, Finding, Record, Verdict, uncertainty::Estimate};
 
 use crate::reading::Source;
 
@@ -107,6 +108,17 @@ impl Recordings {
             }
         }
         all
+    }
+
+    /// Returns a doubt if the recorded loop does not have the given controlled element. `excitation` is the channel of
+    /// a target or a disturbance.
+    pub(crate) fn element_finding(
+        &self,
+        given: Option<&ContinuousTransferFunction>,
+        excitation: Option<&str>,
+    ) -> Option<Finding> {
+        let given = given?;
+        recorded_element(&self.records, given, excitation)?.finding(given)
     }
 
     /// Adds the findings of the recordings to a verdict: first, since a faulty recording explains a wrong result.

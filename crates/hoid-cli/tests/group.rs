@@ -214,7 +214,7 @@ fn init_looks_at_the_files_and_says_what_it_saw() {
     for (evidence, line) in [
         ("# the tracking error, by its name", "input = "),
         ("# d has", "excitation = "),
-        ("# at the lines y follows the controlled element", "offset_samples = "),
+        ("# e returns from u by the controlled element", "offset_samples = "),
         ("# of the first run BIC chooses nd", "nd = "),
         ("# of the first run alone the form is", "form = "),
     ] {

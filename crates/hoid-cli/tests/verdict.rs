@@ -206,3 +206,42 @@ fn each_line_of_a_stream_has_a_level_and_one_without_an_estimate_ends_with_one()
     assert_eq!(code, Some(1));
     assert!(lines.iter().all(|line| line["level"] == "not determined"));
 }
+
+#[test]
+fn a_controlled_element_that_the_recording_refutes_is_a_doubt_in_every_command() {
+    let directory = simulated("C1");
+    let d = directory.path();
+    let commands: [&[&str]; 4] = [
+        &["identify", "c.csv"],
+        &[
+            "identify",
+            "c.csv",
+            "--structure",
+            "bj",
+            "--nk",
+            "29",
+            "--orders",
+            "nd=1",
+        ],
+        &["describe", "c.csv", "--excitation", "f_t"],
+        &["track", "c.csv"],
+    ];
+    let found = |command: &[&str], element: &str| -> Vec<String> {
+        let printed = json(d, &[command, &["--controlled-element", element, "--json"]].concat());
+        let findings = printed["verdict"]["findings"].as_array().unwrap();
+        let of_element = findings
+            .iter()
+            .filter(|finding| finding["kind"] == "controlled-element");
+        of_element
+            .map(|finding| finding["message"].as_str().unwrap().to_owned())
+            .collect()
+    };
+    for command in commands {
+        assert_eq!(found(command, "90/(s(s+6))"), [""; 0], "{command:?}");
+        let [message] = found(command, "45/(s(s+6))").try_into().unwrap();
+        assert!(
+            message.starts_with("e returns from u by 90/(s^2 + 6s), not by 45/(s^2 + 6s)"),
+            "{command:?}: {message}"
+        );
+    }
+}

@@ -96,9 +96,11 @@ fn seen(path: &Path, roles: &Roles, known: &LookOptions) -> Result<RecordSummary
         read => read?.record,
     };
     let periods = periods::search(&record, known);
-    let lag = match (known.offset_samples, &periods, &known.controlled_element) {
-        (None, Ok(found), Some((_, element))) => Some(lag::of_control(&record, found, element)),
-        (None, Err(_), Some(_)) => Some(Err("no excitation was found by whose lines it could be seen".to_owned())),
+    let lag = match (known.offset_samples, &known.controlled_element) {
+        (None, Some((_, element))) => {
+            let excitation = periods.as_ref().ok().map(|found| found.channel.as_str());
+            Some(lag::of_control(&record, excitation, element))
+        }
         _ => None,
     };
     Ok(RecordSummary { record, periods, lag })

@@ -139,6 +139,7 @@ impl Tracking {
         let trace: Trace = trace.moving_average(rows);
         let verdict = trace.verdict(record, choice.as_ref())?;
         let verdict = verdict.prepend(findings_of_quality(account, record, Of::Person));
+        let verdict = verdict.append(data.element_finding(used.controlled_element.as_ref(), None));
         let mut settings = settings_of_recursion(&self.recursion, &plan, &used, choice.as_ref());
         let own = OwnSettings {
             trace: &trace,

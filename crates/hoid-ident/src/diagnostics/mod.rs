@@ -15,6 +15,7 @@
 //! | `residuals-not-white`, `structure`, `leverage` | properties of the residuals |
 //! | `no-response` | no response beyond chance |
 //! | `other-input`, `inputs-together` | inputs in addition to the error |
+//! | `controlled-element` | the given controlled element, and that of the recorded loop |
 //! | `exact-fit`, `no-change`, `change-point` | information; the result remains valid |
 //!
 //! | file | contents |
@@ -28,6 +29,7 @@
 //! | `operator_step` | evidence of a stretch of data against an operator |
 //! | `second_opinion` | fits to records in which no single sample can dominate |
 //! | `other_inputs` | test of whether u responds to a recorded target in addition to e |
+//! | `recorded_element` | test of whether the recorded loop has the given controlled element |
 //! | `whitened` | least squares after an autoregression, for the tests that need it |
 //! | `fit`, `grey_box`, `sigmoid` | the verdict of each kind of fit |
 
@@ -39,6 +41,7 @@ mod no_response;
 mod operator;
 mod operator_step;
 pub mod other_inputs;
+mod recorded_element;
 mod residual_response;
 pub(crate) mod residuals;
 pub mod second_opinion;
@@ -50,4 +53,5 @@ pub use loop_response::{LoopResponse, answer};
 pub use no_response::{Response, response};
 pub use operator::{gain_findings, is_open, leads_backwards, neuromuscular_finding, pole_findings};
 pub use operator_step::{OperatorStep, operator_step};
+pub use recorded_element::{RecordedElement, recorded_element};
 pub use residual_response::{ResidualResponse, residual_response};

@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// Names of channels that may hold a displayed target.
-const TARGETS: [&str; 4] = ["r", "f_t", "target", "reference"];
+pub(super) const TARGETS: [&str; 4] = ["r", "f_t", "target", "reference"];
 /// Probability of the response by chance: if target and disturbance have their own lines, and if only the target
 /// excites the loop, so that an error of the form of the fit looks like a response to the target.
 const BY_CHANCE: [f64; 2] = [1e-2, 1e-7];
