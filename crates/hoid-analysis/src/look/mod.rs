@@ -9,7 +9,7 @@
 //! | `options` | what is known already |
 //! | `columns` | error and control by the names that people give them |
 //! | `periods` | the excitation, its period and lines, and the longest span of whole periods |
-//! | `lag` | by how many samples the control was recorded later than the output of the controlled element |
+//! | `lag` | by how many samples the control was recorded later than the error, from the controlled element |
 //! | `file` | all of this of a file: [`Look`] |
 //! | `other_columns` | error message for a file without the columns that were requested |
 //! | `advice` | how the file is to be read, and the command to type |

@@ -88,10 +88,10 @@ impl RecordedElement {
             (true, true) => return None,
             (true, false) => format!("e returns from u by {given}{beyond}: {loop_lost}"),
             (false, _) => format!(
-                "e returns from u by {}{beyond}, not by {given}: at {omega} rad/s {:.2} times its gain and {:+.0} deg; \
+                "e returns from u by {}{beyond}, not by {given}: at {omega} rad/s {} times its gain and {:+.0} deg; \
                  {loop_lost}",
                 self.element,
-                ratio.norm(),
+                three_digits(ratio.norm()),
                 ratio.arg().to_degrees()
             ),
         };
