@@ -27,7 +27,6 @@ const FOUND: [u64; 2] = [6025, 66_758];
 #[test]
 fn what_nobody_says_or_saved_ends_nothing() {
     let mut hostile = Hostile::new();
-    assert!(hostile.texts_are_good());
     (0..CASES).for_each(|number| hostile.case(5, number));
     FOUND.into_iter().for_each(|number| hostile.case(2026, number));
 }

@@ -116,23 +116,23 @@ impl Hostile {
         let record = Simulator::new(&Scenario::condition(OfText::C4)).unwrap();
         let record = record.run(RunSeed::default(), false).unwrap();
         let (trackers, warm_up) = saved(&record);
+        let texts = texts::all(&record);
+        assert!(
+            texts
+                .iter()
+                .all(|text| text.is_good(&directory.path().join("good.toml")))
+        );
         Self {
             files: file_names(&session).unwrap(),
             session,
             person: Person::begin(&directory.path().join("lab-0"), config()),
             directory,
             said: 0,
-            texts: texts::all(&record),
+            texts,
             record,
             trackers,
             warm_up,
         }
-    }
-
-    /// True if each text is accepted before it is changed.
-    pub fn texts_are_good(&self) -> bool {
-        let path = self.directory.path().join("good.toml");
-        self.texts.iter().all(|text| text.is_good(&path))
     }
 
     /// Runs a case: of four one a tracker, one messages, one files of a session, one settings or a result.
