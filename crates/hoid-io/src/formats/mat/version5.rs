@@ -149,7 +149,7 @@ impl Reader<'_> {
             let name = String::from_utf8_lossy(parts.next()?.bytes).into_owned();
             let system = parts.next()?;
             let of = parts.next().unwrap_or(system).bytes;
-            let what = object(&shown(&String::from_utf8_lossy(of)));
+            let what = object(&String::from_utf8_lossy(of));
             let path = if place.depth == 0 {
                 shown(&name)
             } else {
