@@ -17,6 +17,15 @@ pub(crate) fn shown(text: &str) -> String {
     cut.escape_debug().to_string()
 }
 
+/// Number of first bytes of a file in a message.
+const FIRST_BYTES: usize = 12;
+
+/// The start of a file for a message about its format: `it starts with "..."`.
+pub(crate) fn start_of(bytes: &[u8]) -> String {
+    let start = bytes.get(..FIRST_BYTES).unwrap_or(bytes);
+    format!("it starts with \"{}\"", String::from_utf8_lossy(start).escape_debug())
+}
+
 /// Maximum length of a column name in a message, characters.
 const NAMED: usize = 80;
 

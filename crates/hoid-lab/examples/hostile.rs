@@ -1,4 +1,5 @@
-//! A million modified messages to the lab, files of sessions and numbers of saved trackers: no panic, caught or not.
+//! A million modified messages to the lab, files of sessions, settings, results and numbers of saved trackers: no panic,
+//! caught or not.
 //! The numbers of `research/notes/mutations.md`.
 //!
 //! `cargo xtask slow hostile [CASES] [FIRST] [SEED]`; built with overflow checks on, as the tests are.
@@ -11,6 +12,8 @@ mod draw;
 mod hostile;
 #[path = "../tests/common/person.rs"]
 mod person;
+#[path = "../tests/common/texts.rs"]
+mod texts;
 
 use std::{
     panic::{self, AssertUnwindSafe},

@@ -146,8 +146,9 @@ pub fn judge(out: &Path, record: &Record, logged: &Logged) -> Result<Calibration
     let waits: Vec<f64> = logged.events.iter().map(|event| event.tick - event.stamp_ms).collect();
     let frames: Vec<f64> = logged
         .frames
-        .windows(2)
-        .map(|two| two[1].drawn_ms - two[0].drawn_ms)
+        .iter()
+        .zip(logged.frames.iter().skip(1))
+        .map(|(last, next)| next.drawn_ms - last.drawn_ms)
         .collect();
     let found = Calibration {
         utc: utc::now(),

@@ -239,7 +239,8 @@ impl Config {
         let mut config: Self = toml::from_str(&text).map_err(|error| {
             let line = error
                 .span()
-                .map_or(1, |span| 1 + text[..span.start].matches('\n').count());
+                .and_then(|span| text.get(..span.start))
+                .map_or(1, |before| before.split('\n').count());
             LabError::Config {
                 place: format!("{place}, line {line}"),
                 reason: hoid_io::printable(error.message().trim_end()),
@@ -282,7 +283,7 @@ impl Config {
             }
         }
         for (k, condition) in self.condition.iter().enumerate() {
-            if self.condition[..k].iter().any(|other| other.name == condition.name) {
+            if self.condition.iter().take(k).any(|other| other.name == condition.name) {
                 return wrong(format!(
                     "two conditions are called {:?}: give each its own name",
                     condition.name
@@ -363,13 +364,12 @@ impl Condition {
                 run_in + measured
             ));
         }
-        for (k, s) in [run_in, measured].into_iter().enumerate() {
+        for (key, s) in [("run_in_s", run_in), ("measurement_s", measured)] {
             if ((s * 100.0).round() / 100.0 - s).abs() > 1e-9 {
-                let key = ["run_in_s", "measurement_s"][k];
                 return wrong(format!("{key} is {s}, expected whole hundredths of a second"));
             }
         }
-        let states = course.element_at(0.0)?.den().len() - 1;
+        let states = course.element_at(0.0)?.den().len().saturating_sub(1);
         if states > MOST_STATES {
             return wrong(format!(
                 "the controlled element has {states} states, expected at most {MOST_STATES}"

@@ -73,7 +73,7 @@ pub fn list(out: &Path) -> Result<(), LabError> {
     for folder in Session::folders(out)? {
         let facts = Session::read(&folder)?.facts;
         let entry = people.entry(facts.subject).or_default();
-        entry.0 += 1;
+        entry.0 = entry.0.saturating_add(1);
         entry.1 = facts.licence;
     }
     let mut text = "participant_id\tsessions\tlicense\n".to_owned();

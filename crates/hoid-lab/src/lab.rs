@@ -116,6 +116,13 @@ impl Current {
         let run = self.run.as_ref().filter(|run| run.begun.number == number);
         run.ok_or_else(|| LabError::Order(format!("run {number} is not going on")))
     }
+
+    /// Continues with a session; a run that was sent for another one cannot be started in it.
+    fn enter(&mut self, session: Session) {
+        self.session = Some(session);
+        self.ready = None;
+        self.pages = Pages::default();
+    }
 }
 
 impl Lab {
@@ -366,8 +373,7 @@ impl Shared {
         if state.run.is_some() || matches!(self.mode, Mode::Replay(_)) {
             return Err(LabError::Order("another session continues".to_owned()));
         }
-        state.session = Some(Session::begin(&self.out, &self.config, subject, cc0)?);
-        state.pages = Pages::default();
+        state.enter(Session::begin(&self.out, &self.config, subject, cc0)?);
         experiment::list(&self.out)
     }
 
@@ -378,8 +384,7 @@ impl Shared {
                 "there is no session {name:?} to continue with"
             )));
         }
-        state.session = Some(Session::open(&self.out.join(name))?);
-        state.pages = Pages::default();
+        state.enter(Session::open(&self.out.join(name))?);
         Ok(())
     }
 }

@@ -128,7 +128,7 @@ impl LagFits {
             }
         }
         let samples = |seconds: f64| (seconds / self.ts.s()).round() as usize;
-        let due = samples(SHORTEST_S).max(self.fitted + samples(EVERY_S));
+        let due = samples(SHORTEST_S).max(self.fitted.saturating_add(samples(EVERY_S)));
         if !self.busy
             && self.e.len() >= due
             && let Ok(record) = Record::new(

@@ -21,6 +21,9 @@
 //! | `experiment`, `export`, `replay`, `reports` | what is next to the sessions; archives; runs shown again; pages |
 //! | [`calibrate`] | what the loop of page and events adds to a delay |
 
+// Numbers of a page or a file are never an index, a length or a summand before they are checked.
+#![cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
+
 pub mod calibrate;
 pub mod config;
 pub mod course;

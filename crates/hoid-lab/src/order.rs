@@ -21,6 +21,10 @@ pub struct Planned {
 }
 
 /// The conditions of row `row` of a balanced square of `n`.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "2 n of a list fits into usize; without conditions there is no place, and no remainder by zero"
+)]
 pub fn latin_row(n: usize, row: usize) -> Vec<usize> {
     let rows = if n.is_multiple_of(2) { n } else { 2 * n };
     let row = row % rows.max(1);
@@ -45,14 +49,15 @@ pub fn plan(config: &Config, row: usize) -> Vec<Planned> {
         Order::Latin => latin_row(n, row),
     };
     let runs = |condition: usize| {
-        let own = &config.condition[condition];
-        (0..own.training + own.runs).map(move |k| Planned {
+        let own = config.condition.get(condition)?;
+        let all = 1..=own.training.saturating_add(own.runs);
+        Some(all.map(move |run| Planned {
             condition,
-            training: k < own.training,
-            run: k + 1,
-        })
+            training: run <= own.training,
+            run,
+        }))
     };
-    order.into_iter().flat_map(runs).collect()
+    order.into_iter().filter_map(runs).flatten().collect()
 }
 
 #[cfg(test)]

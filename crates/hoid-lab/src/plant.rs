@@ -33,30 +33,32 @@ impl Plant {
     /// True if the dimensions of the matrices match and the state is not too large.
     pub fn is_sound(&self) -> bool {
         let n = self.order();
-        n <= MOST_STATES && self.a.len() == n * n && self.c.len() == n
+        n <= MOST_STATES && self.a.len() == n.saturating_mul(n) && self.c.len() == n
     }
 
     /// Computes y from the state and v.
     pub fn output(&self, x: &[f64], v: f64) -> f64 {
         let mut y = 0.0;
-        for i in 0..self.order() {
-            y += self.c[i] * x[i];
+        for (c, x) in self.c.iter().zip(x) {
+            y += c * x;
         }
         y + self.d * v
     }
 
     /// Advances the state by one tick.
     pub fn step(&self, x: &mut [f64], v: f64) {
-        let n = self.order();
+        let rows = self.a.chunks_exact(self.order().max(1));
         let mut next = [0.0; MOST_STATES];
-        for i in 0..n {
+        for ((next, row), b) in next.iter_mut().zip(rows).zip(&self.b) {
             let mut sum = 0.0;
-            for j in 0..n {
-                sum += self.a[i * n + j] * x[j];
+            for (a, x) in row.iter().zip(&*x) {
+                sum += a * x;
             }
-            next[i] = sum + self.b[i] * v;
+            *next = sum + b * v;
         }
-        x.copy_from_slice(&next[..n]);
+        for (x, next) in x.iter_mut().zip(next) {
+            *x = next;
+        }
     }
 }
 

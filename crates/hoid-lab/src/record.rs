@@ -17,14 +17,15 @@ pub fn record(begun: &RunStart, task: &Task, logged: &Logged) -> Result<Record, 
     // A log longer than its run contains invalid ticks.
     let n = logged.signals.e.len().min(logged.signals.u.len()).min(task.ticks);
     let every = |values: &[f64]| {
-        values[..n]
+        values
             .iter()
             .copied()
+            .take(n)
             .step_by(TICKS_PER_SAMPLE)
             .collect::<Vec<f64>>()
     };
     let channel = |name: &str, values: Vec<f64>| Channel::new(name, "", values);
-    let mut shown = Vec::with_capacity(n / TICKS_PER_SAMPLE + 1);
+    let mut shown = Vec::new();
     let (mut frames, mut e) = (logged.frames.iter().peekable(), 0.0);
     for k in (0..n).step_by(TICKS_PER_SAMPLE) {
         while let Some(frame) = frames.next_if(|frame| frame.drawn_ms <= k as f64) {

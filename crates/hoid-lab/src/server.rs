@@ -31,10 +31,14 @@ use std::{
 
 use data_encoding::{BASE64, HEXLOWER};
 use sha2::{Digest, Sha256};
+use socket2::SockRef;
 
 use crate::{LabError, lab::Lab};
 use http::{Reply, Request};
 
+/// Number of connections that the system keeps until they are accepted. With the 128 of the standard library a burst of
+/// strangers fills the queue, and the system leaves the page to ask again after a second.
+const QUEUE: i32 = 4096;
 /// Maximum number of simultaneous connections with the token.
 const KNOWN: usize = 64;
 /// Timeout of an answer to one of them.
@@ -85,8 +89,9 @@ impl Server {
             });
             LabError::Server(format!("{asked}: {error}; leave --port out for any free one"))
         })?;
-        let address = listener
-            .local_addr()
+        let address = SockRef::from(&listener)
+            .listen(QUEUE)
+            .and_then(|()| listener.local_addr())
             .map_err(|error| LabError::Server(error.to_string()))?;
         Ok(Self {
             listener,

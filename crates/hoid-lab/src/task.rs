@@ -74,12 +74,12 @@ impl Task {
         let tick = SampleTime::new(TICK_S)?;
         let (run_in_s, measured_s) = course.times_s();
         let whole = |s: f64| (s / TICK_S).round() as usize;
-        let (run_in, ticks) = (whole(run_in_s), whole(run_in_s) + whole(measured_s));
+        let (run_in, ticks) = (whole(run_in_s), whole(run_in_s).saturating_add(whole(measured_s)));
         let start_s = -(run_in as f64) * TICK_S;
         let mut phases: Vec<Phase> = Vec::new();
         let mut last = None;
         for from in (0..ticks).step_by(TICKS_PER_SAMPLE) {
-            let element = course.element_at(start_s + (from + TICKS_PER_SAMPLE / 2) as f64 * TICK_S)?;
+            let element = course.element_at(start_s + from.saturating_add(TICKS_PER_SAMPLE / 2) as f64 * TICK_S)?;
             if last.as_ref() == Some(&element) {
                 continue;
             }
@@ -96,8 +96,8 @@ impl Task {
             replication,
         };
         let [target, disturbance] = course.excitations();
-        let lines = target.function.sinusoids().len() + disturbance.function.sinusoids().len();
-        let mut turns = seed.uniform(lines).into_iter();
+        let lines = [&target, &disturbance].map(|excitation| excitation.function.sinusoids().len());
+        let mut turns = seed.uniform(lines.iter().sum()).into_iter();
         let fade = FADE_S.min(run_in_s);
         let mut table = |excitation: &Excitation, n: usize| -> Result<Vec<f64>, LabError> {
             let mut values = drawn(excitation, &mut turns)?.samples(start_s, tick, n);
@@ -110,7 +110,7 @@ impl Task {
             run_in,
             ticks,
             phases,
-            target: table(&target, ticks + whole(condition.preview_s))?,
+            target: table(&target, ticks.saturating_add(whole(condition.preview_s)))?,
             disturbance: table(&disturbance, ticks)?,
         })
     }
@@ -121,16 +121,17 @@ impl Task {
             u: u.to_vec(),
             e: Vec::with_capacity(u.len()),
         };
-        let mut state = vec![0.0; self.phases.first().map_or(0, |phase| phase.plant.order())];
-        let mut at = 0;
-        for (k, u) in u.iter().enumerate().take(self.ticks) {
-            if self.phases.get(at + 1).is_some_and(|next| next.from <= k) {
-                at += 1;
-            }
-            let plant = &self.phases[at].plant;
-            let v = u + self.disturbance[k];
-            signals.e.push(self.target[k] - plant.output(&state, v));
-            plant.step(&mut state, v);
+        let mut phases = self.phases.iter().peekable();
+        let Some(mut phase) = phases.next() else {
+            return signals;
+        };
+        let mut state = vec![0.0; phase.plant.order()];
+        let forcing = self.target.iter().zip(&self.disturbance);
+        for (k, (u, (target, disturbance))) in u.iter().zip(forcing).enumerate().take(self.ticks) {
+            phase = phases.next_if(|next| next.from <= k).unwrap_or(phase);
+            let v = u + disturbance;
+            signals.e.push(target - phase.plant.output(&state, v));
+            phase.plant.step(&mut state, v);
         }
         signals
     }

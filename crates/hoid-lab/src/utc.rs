@@ -10,6 +10,10 @@ pub fn now() -> String {
 
 /// Seconds since 1970 as `2026-11-23T05:33:00Z`; the civil date by H. Hinnant's algorithm of eras of
 /// 400 years.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "the first step divides, so that no u64 overflows; what is subtracted is part of what it is subtracted from"
+)]
 fn of_seconds(seconds: u64) -> String {
     let (days, of_day) = (seconds / 86_400 + 719_468, seconds % 86_400);
     let (era, day_of_era) = (days / 146_097, days % 146_097);

@@ -172,7 +172,7 @@ fn ticks_of(logged: &Logged) -> Option<Finding> {
 
 fn events_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
     let mut last = 0.0;
-    for (k, event) in logged.events.iter().enumerate() {
+    for (number, event) in (1_usize..).zip(&logged.events) {
         let whole = event.tick >= 0.0 && event.tick.fract() == 0.0 && event.raw.is_finite();
         let late = event.tick - event.stamp_ms.max(0.0);
         let words = if !whole || event.tick < last {
@@ -189,7 +189,7 @@ fn events_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
             last = event.tick;
             continue;
         };
-        return Some(Finding::doubt("lab-event", format!("input event {} {words}", k + 1)));
+        return Some(Finding::doubt("lab-event", format!("input event {number} {words}")));
     }
     None
 }
@@ -217,39 +217,41 @@ fn errors_of(task: &Task, logged: &Logged) -> Option<Finding> {
 fn differing(made: &[f64], logged: &[f64]) -> Option<(usize, usize)> {
     // Minus zero plus zero is zero.
     let differ = |(a, b): (&f64, &f64)| (a + 0.0).to_bits() != (b + 0.0).to_bits();
-    let mut places = (0..logged.len()).filter(|k| made.get(*k).is_none_or(|made| differ((made, &logged[*k]))));
-    let first = places.next()?;
-    Some((first, 1 + places.count()))
+    let places: Vec<usize> = (logged.iter().enumerate())
+        .filter(|(k, logged)| made.get(*k).is_none_or(|made| differ((made, logged))))
+        .map(|(k, _)| k)
+        .collect();
+    Some((*places.first()?, places.len()))
 }
 
 fn frames_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
     let limit = begun.limits.frame_ms;
-    let wrong = |k: usize, words: String| Some(Finding::doubt("lab-frame", format!("frame {} {words}", k + 1)));
+    let wrong = |number: usize, words: String| Some(Finding::doubt("lab-frame", format!("frame {number} {words}")));
     let mut last = 0.0;
-    for (k, frame) in logged.frames.iter().enumerate() {
+    for (number, frame) in (1_usize..).zip(&logged.frames) {
         let shown = (frame.tick >= 0.0)
             .then(|| logged.signals.e.get(frame.tick as usize))
             .flatten();
         if shown.is_none_or(|e| differing(&[*e], &[frame.e]).is_some()) {
-            return wrong(k, format!("does not show e of tick {}", frame.tick));
+            return wrong(number, format!("does not show e of tick {}", frame.tick));
         }
         let due = frame.drawn_ms.floor().min(begun.ticks as f64 - 1.0);
         if frame.tick != due {
             return wrong(
-                k,
+                number,
                 format!("was drawn at {:.1} ms and shows tick {}", frame.drawn_ms, frame.tick),
             );
         }
         let (interval, age) = (frame.drawn_ms - last, frame.drawn_ms - frame.frame_ms);
         if !(0.0..=limit).contains(&interval) {
             return wrong(
-                k,
+                number,
                 format!("came {interval:.1} ms after the last one, expected 0 to {limit} ms"),
             );
         }
         if !(0.0..=limit).contains(&age.abs()) {
             return wrong(
-                k,
+                number,
                 format!("was drawn {age:.1} ms after its own time, expected at most {limit} ms"),
             );
         }
@@ -298,8 +300,9 @@ fn hands_of(begun: &RunStart, ended: &Ended) -> Vec<Finding> {
 fn measures(begun: &RunStart, task: &Task, logged: &Logged) -> Measures {
     let intervals: Vec<f64> = logged
         .frames
-        .windows(2)
-        .map(|pair| pair[1].frame_ms - pair[0].frame_ms)
+        .iter()
+        .zip(logged.frames.iter().skip(1))
+        .map(|(last, next)| next.frame_ms - last.frame_ms)
         .collect();
     let frame_ms = median(&intervals);
     let typical = if begun.refresh_ms > 0.0 {
@@ -321,12 +324,12 @@ fn measures(begun: &RunStart, task: &Task, logged: &Logged) -> Measures {
         .collect();
     let e = &logged.signals.e;
     // Ticks beyond the end of the run are invalid.
-    let e = &e[..e.len().min(task.ticks)];
-    let measured = begun.run_in.min(e.len())..e.len();
-    let rms_e = rms(&e[measured.clone()]);
+    let e = e.get(..task.ticks).unwrap_or(e);
+    let measured = |e: &[f64]| rms(e.get(begun.run_in..).unwrap_or_default());
+    let rms_e = measured(e);
     // The error without control.
     let rest = task.run(&vec![0.0; e.len()]);
-    let rms_forcing = rms(&rest.e[measured]);
+    let rms_forcing = measured(&rest.e);
     Measures {
         ticks: logged.numbers.len(),
         frames: logged.frames.len(),

@@ -8,8 +8,17 @@ mod draw;
 mod hostile;
 #[path = "common/person.rs"]
 mod person;
+#[path = "common/texts.rs"]
+mod texts;
 
+use hoid_lab::{
+    Config,
+    config::{Condition, Signal},
+    session::Session,
+};
 use hostile::Hostile;
+use person::Person;
+use serde_json::json;
 
 const CASES: u64 = 1500;
 /// Cases that once failed: a preview of eleven days, more samples held back than are in the ring.
@@ -20,4 +29,33 @@ fn what_nobody_says_or_saved_ends_nothing() {
     let mut hostile = Hostile::new();
     (0..CASES).for_each(|number| hostile.case(5, number));
     FOUND.into_iter().for_each(|number| hostile.case(2026, number));
+}
+
+/// A page asks for a run, continues with a session whose plan is shorter, and starts the run there.
+#[test]
+fn a_run_of_one_session_does_not_start_in_another() {
+    let dir = tempfile::tempdir().unwrap();
+    let config = |runs: usize| Config {
+        condition: vec![Condition {
+            target: Some(Signal::default()),
+            measurement_s: 0.3,
+            run_in_s: 0.2,
+            runs,
+            ..Condition::default()
+        }],
+        ..Config::default()
+    };
+    Session::begin(dir.path(), &config(1), "P02", false).unwrap();
+    let mut person = Person::begin(dir.path(), config(2));
+    person.next(1).unwrap();
+    person.track(1, 0..500).unwrap();
+    person.finish(1).unwrap();
+    person.say(json!({"type": "next"})).unwrap();
+    person
+        .say(json!({"type": "resume", "session": "sub-P02/ses-01"}))
+        .unwrap();
+    let said = person.say(person::begin(2)).unwrap_err();
+    assert!(said.contains("run 2 was not asked for"), "{said}");
+    // The run of that session starts.
+    person.next(1).unwrap();
 }

@@ -16,16 +16,23 @@
 //! | `budget` | how much memory a file may take |
 //! | `guarded` | panics of foreign readers as errors |
 
+// Numbers of a file are never an index, a length or a summand before they are checked.
+#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 pub(crate) mod arrays;
 mod budget;
 mod csv;
 mod format;
 mod guarded;
 mod lookup;
+#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod mat;
+#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod npz;
+#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod packed;
+#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod parquet;
+#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod xdf;
 
 pub(crate) use budget::Settings;

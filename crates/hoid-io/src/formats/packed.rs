@@ -38,7 +38,7 @@ pub(super) fn unpacked(bytes: &[u8], file: &str) -> Result<Vec<u8>, IoError> {
             return Ok(text);
         }
         budget.take(read as u64, file)?;
-        text.extend_from_slice(&part[..read]);
+        text.extend(part.iter().take(read));
     }
 }
 

@@ -23,11 +23,13 @@ impl Shared {
             return Err(LabError::Order("a run continues".to_owned()));
         }
         let session = session_of(state)?;
-        let Some(planned) = session.next() else {
+        let next = session
+            .next()
+            .and_then(|place| Some((place, session.facts.run(place)?)));
+        let Some((planned, (plan, condition))) = next else {
             return Err(LabError::Order("all runs of the session are done".to_owned()));
         };
-        let plan = &session.facts.plan[planned];
-        let condition = session.facts.config.condition[plan.condition].clone();
+        let condition = condition.clone();
         let number = session.new_number()?;
         let training = plan.training;
         let task = Task::new(&condition, plan.condition as u64, number as u64)?;
@@ -87,8 +89,10 @@ impl Shared {
         // Until the log exists.
         state.over = Some(number);
         let session = session_of(state)?;
-        let plan = &session.facts.plan[planned];
-        let condition = session.facts.config.condition[plan.condition].clone();
+        let Some((plan, condition)) = session.facts.run(planned) else {
+            return Err(LabError::Order(format!("the session has no run {planned}")));
+        };
+        let condition = condition.clone();
         let stem = session.stem(&condition.name, number);
         let begun = RunStart {
             hoid: env!("CARGO_PKG_VERSION").to_owned(),
@@ -136,13 +140,13 @@ impl Shared {
         let Some(run) = &mut state.run else { return Ok(()) };
         run.log.continued_by(batch)?;
         // First the estimate, which is awaited; the disk may take its time.
-        let first = batch.first.next_multiple_of(TICKS_PER_SAMPLE) - batch.first;
-        let samples = (first..batch.u.len().min(batch.e.len()))
-            .step_by(TICKS_PER_SAMPLE)
-            .map(|k| Sample {
-                e: batch.e[k],
-                u: batch.u[k],
-                reference: run.task.target.get(batch.first + k).copied(),
+        let samples = (batch.first..)
+            .zip(batch.u.iter().zip(&batch.e))
+            .filter(|(tick, _)| tick.is_multiple_of(TICKS_PER_SAMPLE))
+            .map(|(tick, (u, e))| Sample {
+                e: *e,
+                u: *u,
+                reference: run.task.target.get(tick).copied(),
             });
         let samples: Samples = samples.collect();
         if let (Some(live), false) = (&run.live, samples.is_empty()) {

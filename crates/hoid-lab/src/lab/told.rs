@@ -55,8 +55,7 @@ impl Shared {
         let session = state.session.as_ref();
         let facts = session.map(|session| &session.facts);
         let next = session.and_then(Session::next);
-        let plan = |k: usize| facts.and_then(|facts| facts.plan.get(k));
-        let condition_of = |k: usize| facts.map(|facts| &facts.config.condition[facts.plan[k].condition]);
+        let run = |place: usize| facts.and_then(|facts| facts.run(place));
         let done = match (&self.mode, session) {
             (Mode::Replay(_), Some(session)) => judged_again(session),
             (_, Some(session)) => session.done.clone(),
@@ -81,11 +80,11 @@ impl Shared {
             },
             done,
             planned: (0..facts.map_or(0, |facts| facts.plan.len()))
-                .filter_map(|k| condition_of(k).map(|condition| condition.name.clone()))
+                .filter_map(|place| run(place).map(|(_, condition)| condition.name.clone()))
                 .collect(),
             next,
-            condition: next.and_then(condition_of).cloned(),
-            training: next.and_then(plan).is_some_and(|plan| plan.training),
+            condition: next.and_then(run).map(|(_, condition)| condition.clone()),
+            training: next.and_then(run).is_some_and(|(plan, _)| plan.training),
             running: state.run.as_ref().map(|run| run.begun.number),
             reporting: state.reporting,
             reports: state.pages.links(),

@@ -47,7 +47,7 @@ impl Stranger {
             }
             match self.stream.read(&mut part) {
                 Ok(0) => return Look::Gone,
-                Ok(n) => self.head.extend_from_slice(&part[..n]),
+                Ok(n) => self.head.extend(part.iter().take(n)),
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(error) if error.kind() == ErrorKind::WouldBlock => break,
                 Err(_) => return Look::Gone,

@@ -64,7 +64,9 @@ impl Stem {
             .iter()
             .filter_map(|name| {
                 let stem = name.strip_suffix("_run.json")?;
-                let number = stem.rsplit_once("_run-")?.1.parse().ok()?;
+                // No session has as many runs as would overflow the number of the next one.
+                let number: u32 = stem.rsplit_once("_run-")?.1.parse().ok()?;
+                let number = usize::try_from(number).ok()?;
                 let own = Self {
                     folder: folder.to_owned(),
                     stem: stem.to_owned(),

@@ -113,15 +113,19 @@ impl RunLog {
             "tick,stamp_ms,handled_ms,raw\n",
             "frame_ms,drawn_ms,tick,e_shown\n",
         ];
-        let make = |k: usize| -> Result<(PathBuf, File), LabError> {
-            let path = stem.file(APPENDED[k]);
+        let make = |end: &str, header: &str| -> Result<(PathBuf, File), LabError> {
+            let path = stem.file(end);
             let opened = OpenOptions::new().append(true).create_new(true).open(&path);
             let mut file = opened.map_err(|source| LabError::file(&path, source))?;
-            append(&path, &mut file, headers[k])?;
+            append(&path, &mut file, header)?;
             Ok((path, file))
         };
         Ok(Self {
-            files: [make(0)?, make(1)?, make(2)?],
+            files: [
+                make(APPENDED[0], headers[0])?,
+                make(APPENDED[1], headers[1])?,
+                make(APPENDED[2], headers[2])?,
+            ],
             whole: headers.map(|header| header.len() as u64),
             synced: Instant::now(),
             logged: 0,
@@ -154,8 +158,8 @@ impl RunLog {
     pub fn append(&mut self, batch: &Batch) -> Result<(), LabError> {
         let end = self.continued_by(batch)?;
         let mut texts = [String::new(), String::new(), String::new()];
-        for (k, (u, e)) in batch.u.iter().zip(&batch.e).enumerate() {
-            texts[0].push_str(&format!("{},{u:?},{e:?}\n", batch.first + k));
+        for (tick, (u, e)) in (batch.first..).zip(batch.u.iter().zip(&batch.e)) {
+            texts[0].push_str(&format!("{tick},{u:?},{e:?}\n"));
         }
         for v in &batch.events {
             texts[1].push_str(&format!(
@@ -172,7 +176,7 @@ impl RunLog {
             return Err(error);
         }
         for (whole, text) in self.whole.iter_mut().zip(&texts) {
-            *whole += text.len() as u64;
+            *whole = whole.saturating_add(text.len() as u64);
         }
         self.logged = end;
         if self.synced.elapsed() > SYNC {
@@ -211,9 +215,10 @@ fn append(path: &Path, file: &mut File, text: &str) -> Result<(), LabError> {
         .map_err(|source| LabError::file(path, source))
 }
 
-/// Number of bytes up to the end of the last complete line.
-pub(super) fn whole_lines(bytes: &[u8]) -> usize {
-    bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1)
+/// The bytes up to the end of the last complete line.
+pub(super) fn whole_lines(bytes: &[u8]) -> &[u8] {
+    let end = bytes.iter().rposition(|byte| *byte == b'\n');
+    end.and_then(|end| bytes.get(..=end)).unwrap_or_default()
 }
 
 #[cfg(all(test, target_os = "linux"))]

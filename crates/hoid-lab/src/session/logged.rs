@@ -60,24 +60,24 @@ fn rows<const N: usize>(path: &Path, mut each: impl FnMut([f64; N])) -> Result<O
     }
     let bytes = hoid_io::read_bytes(path)?;
     let whole = whole_lines(&bytes);
-    let text = String::from_utf8_lossy(&bytes[..whole]);
-    for (k, line) in text.lines().enumerate().skip(1) {
-        let mut numbers = [0.0; N];
+    let text = String::from_utf8_lossy(whole);
+    for (number, line) in (1_usize..).zip(text.lines()).skip(1) {
+        let mut values = [0.0; N];
         let mut cells = line.split(',');
-        let read = numbers.iter_mut().all(|number| match cells.next().map(str::parse) {
+        let read = values.iter_mut().all(|cell| match cells.next().map(str::parse) {
             Some(Ok(value)) => {
-                *number = value;
+                *cell = value;
                 true
             }
             _ => false,
         });
         if !read || cells.next().is_some() {
             let found = hoid_io::printable(line);
-            let words = format!("line {} of {} is {found:?}, expected {N} numbers", k + 1, name());
+            let words = format!("line {number} of {} is {found:?}, expected {N} numbers", name());
             return Ok(Some(words));
         }
-        each(numbers);
+        each(values);
     }
-    let cut = whole < bytes.len() || whole == 0;
+    let cut = whole.len() < bytes.len() || whole.is_empty();
     Ok(cut.then(|| format!("{} is cut", name())))
 }

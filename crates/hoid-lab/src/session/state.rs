@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     LabError,
-    config::Config,
+    config::{Condition, Config},
     order::{Planned, plan},
     utc,
     verify::{Checked, check},
@@ -75,6 +75,12 @@ impl Facts {
             return Err(LabError::damaged(path, reason));
         }
         Ok(facts)
+    }
+
+    /// A planned run, by its index in the plan, and its condition.
+    pub fn run(&self, place: usize) -> Option<(&Planned, &Condition)> {
+        let planned = self.plan.get(place)?;
+        Some((planned, self.config.condition.get(planned.condition)?))
     }
 }
 
@@ -218,7 +224,8 @@ impl Session {
     /// # Errors
     /// [`LabError::Io`].
     pub fn new_number(&self) -> Result<usize, LabError> {
-        Ok(1 + Stem::all(&self.folder)?.last().map_or(0, |(number, _)| *number))
+        let last = Stem::all(&self.folder)?.last().map_or(0, |(number, _)| *number);
+        Ok(last.saturating_add(1))
     }
 
     /// The names of the files of a run.
@@ -296,7 +303,7 @@ impl Session {
     fn write_down(&mut self, done: Done) -> Result<(), LabError> {
         let path = self.folder.join("runs.csv");
         let whole = if path.exists() {
-            whole_lines(&hoid_io::read_bytes(&path)?)
+            whole_lines(&hoid_io::read_bytes(&path)?).len()
         } else {
             0
         };
@@ -354,7 +361,7 @@ fn directories(of: &Path, prefix: &str) -> Result<Vec<PathBuf>, LabError> {
 
 /// The row of a person: that of their first session, otherwise the number of previous people.
 fn row_of(out: &Path, subject: &str) -> Result<usize, LabError> {
-    let mut others = 0;
+    let mut others = 0_usize;
     for person in directories(out, "sub-")? {
         let own = person
             .file_name()
@@ -364,7 +371,7 @@ fn row_of(out: &Path, subject: &str) -> Result<usize, LabError> {
             .find(|folder| is_session(folder));
         match first {
             Some(first) if own => return Ok(Session::read(&first)?.facts.row),
-            Some(_) => others += 1,
+            Some(_) => others = others.saturating_add(1),
             None => {}
         }
     }
@@ -377,6 +384,6 @@ fn read_runs(path: &Path) -> Result<Vec<Done>, LabError> {
     }
     // A truncated or invalid line is omitted: its run is evaluated again when the session is opened.
     let bytes = hoid_io::read_bytes(path)?;
-    let mut reader = csv::Reader::from_reader(&bytes[..whole_lines(&bytes)]);
+    let mut reader = csv::Reader::from_reader(whole_lines(&bytes));
     Ok(reader.deserialize().flatten().collect())
 }

@@ -1,5 +1,5 @@
-//! Invalid messages to a lab, damaged session files, and trackers restored from modified numbers with a valid checksum:
-//! each gives an answer, and none panics, not even a caught panic.
+//! Invalid messages to a lab, damaged session files, changed settings and results, and trackers restored from modified
+//! numbers with a valid checksum: each gives an answer, and none panics, not even a caught panic.
 //!
 //! Case `k` of a seed is the same on every machine.
 #![allow(clippy::unwrap_used)]
@@ -29,6 +29,7 @@ use serde_json::{Value, json};
 use crate::{
     draw::Draw,
     person::{self, Person},
+    texts::{self, Text},
 };
 
 /// Ticks of a run.
@@ -82,6 +83,7 @@ pub struct Hostile {
     person: Person,
     said: usize,
     record: Record,
+    texts: Vec<Text>,
     trackers: Vec<(TrackOptions, Vec<f64>)>,
     warm_up: Vec<f64>,
 }
@@ -114,25 +116,36 @@ impl Hostile {
         let record = Simulator::new(&Scenario::condition(OfText::C4)).unwrap();
         let record = record.run(RunSeed::default(), false).unwrap();
         let (trackers, warm_up) = saved(&record);
+        let texts = texts::all(&record);
+        assert!(
+            texts
+                .iter()
+                .all(|text| text.is_good(&directory.path().join("good.toml")))
+        );
         Self {
             files: file_names(&session).unwrap(),
             session,
             person: Person::begin(&directory.path().join("lab-0"), config()),
             directory,
             said: 0,
+            texts,
             record,
             trackers,
             warm_up,
         }
     }
 
-    /// Runs a case: two of four a tracker, one messages, one files.
+    /// Runs a case: of four one a tracker, one messages, one files of a session, one settings or a result.
     pub fn case(&mut self, seed: u64, number: u64) {
         let mut draw = Draw(seed ^ number.wrapping_mul(0xd134_2543_de82_ef95));
         match number % 4 {
             0 => self.messages(&mut draw),
             1 => self.damaged(&mut draw),
-            _ => self.restored(&mut draw),
+            2 => self.restored(&mut draw),
+            _ => {
+                let text = &self.texts[draw.below(self.texts.len())];
+                text.damaged(&mut draw, &self.directory.path().join("changed.toml"));
+            }
         }
     }
 
@@ -298,7 +311,7 @@ fn saved(record: &Record) -> (Vec<(TrackOptions, Vec<f64>)>, Vec<f64>) {
 }
 
 /// Modifies, removes or adds one value of a message.
-fn change(value: &mut Value, draw: &mut Draw) {
+pub fn change(value: &mut Value, draw: &mut Draw) {
     let deeper = draw.below(4) > 0;
     match value {
         Value::Object(map) if deeper && !map.is_empty() => {
@@ -322,7 +335,7 @@ fn change(value: &mut Value, draw: &mut Draw) {
 }
 
 /// Modifies a byte, the end, a part of a text, or a number in it.
-fn bytes(text: &mut Vec<u8>, draw: &mut Draw) {
+pub fn bytes(text: &mut Vec<u8>, draw: &mut Draw) {
     if text.is_empty() {
         return;
     }

@@ -24,13 +24,15 @@ impl Array {
 
     /// Line `k` of a matrix.
     pub(super) fn line(&self, k: usize, along_first: bool) -> Numbers {
-        let (rows, columns) = (self.dims[0], self.dims[1]);
+        let [rows, columns] = *self.dims.as_slice() else {
+            return self.numbers.line(0, 1, 0);
+        };
         let len = if along_first { rows } else { columns };
         // Along the fastest index, neighbours are adjacent in the file.
         let (first, stride) = match (along_first, self.last_fastest) {
             (true, true) => (k, columns),
-            (true, false) => (k * rows, 1),
-            (false, true) => (k * columns, 1),
+            (true, false) => (k.saturating_mul(rows), 1),
+            (false, true) => (k.saturating_mul(columns), 1),
             (false, false) => (k, rows),
         };
         self.numbers.line(first, stride, len)

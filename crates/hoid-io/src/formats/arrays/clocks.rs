@@ -32,15 +32,22 @@ pub(super) fn aligned(
     };
     let start = to.partition_point(|t| t < first);
     let end = to.partition_point(|t| t <= last);
-    let mut at = 0;
+    let (mut known, mut known_values) = (from.as_slice(), values.as_slice());
     let value = |t: &f64| {
-        while at + 2 < from.len() && from[at + 1] < *t {
-            at += 1;
+        while let [_, later @ ..] = known
+            && let [next, _, ..] = later
+            && next < t
+        {
+            known = later;
+            known_values = known_values.get(1..).unwrap_or_default();
         }
-        between(&from[at..], &values[at.min(values.len())..], *t)
+        between(known, known_values, *t)
     };
     let numbers: Vec<f64> = to.iter().map(value).collect();
-    let hz = |t: &[f64]| (t.len().saturating_sub(1)) as f64 / (t[t.len() - 1] - t[0]);
+    let hz = |t: &[f64]| match t {
+        [first, .., last] => t.len().saturating_sub(1) as f64 / (last - first),
+        _ => f64::NAN,
+    };
     let (from_hz, to_hz) = (hz(&from), hz(&to));
     let mut note = format!(
         "{} is interpolated linearly from {from_hz:.3} Hz to the {to_hz:.3} Hz of {}, where both have samples",
@@ -79,15 +86,16 @@ fn times(column_paths: &[ColumnPath], place: &str, file: &str) -> Result<Vec<f64
         .and_then(ColumnPath::numbers)
         .map(Numbers::values)
         .unwrap_or_default();
-    let standing = |pair: &[f64]| pair[1].partial_cmp(&pair[0]) != Some(std::cmp::Ordering::Greater);
-    match times.windows(2).position(standing) {
+    let pairs = (2_usize..).zip(times.iter().zip(times.iter().skip(1)));
+    let mut standing = pairs.filter(|(_, (t, next))| next.partial_cmp(t) != Some(std::cmp::Ordering::Greater));
+    match standing.next().map(|(row, (t, next))| (row, *t, *next)) {
         None if times.is_empty() => Err(IoError::NoRows { file: file.to_owned() }),
         None => Ok(times),
-        Some(at) => Err(IoError::NotIncreasing {
+        Some((row, previous, found)) => Err(IoError::NotIncreasing {
             file: file.to_owned(),
-            place: format!("stream {}, row {}", shown(place), at + 2),
-            found: times[at + 1],
-            previous: times[at],
+            place: format!("stream {}, row {row}", shown(place)),
+            found,
+            previous,
         }),
     }
 }

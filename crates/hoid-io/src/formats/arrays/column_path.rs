@@ -88,7 +88,7 @@ pub(crate) fn parent(path: &str) -> &str {
     let mut depth = 0_usize;
     for (at, byte) in path.bytes().enumerate().rev() {
         match byte {
-            b')' | b']' | b'}' => depth += 1,
+            b')' | b']' | b'}' => depth = depth.saturating_add(1),
             b'(' | b'[' | b'{' => depth = depth.saturating_sub(1),
             b'.' if depth == 0 => return &path[..at],
             _ => {}
@@ -129,8 +129,8 @@ impl Entry {
                         let count = *rows.min(columns);
                         let along_first = rows >= columns;
                         let name = |k: usize| match (indexing, along_first) {
-                            (Indexing::Matlab, true) => format!("{}(:,{})", self.path, k + 1),
-                            (Indexing::Matlab, false) => format!("{}({},:)", self.path, k + 1),
+                            (Indexing::Matlab, true) => format!("{}(:,{})", self.path, k.saturating_add(1)),
+                            (Indexing::Matlab, false) => format!("{}({},:)", self.path, k.saturating_add(1)),
                             (Indexing::Python, true) => format!("{}[:,{k}]", self.path),
                             (Indexing::Python, false) => format!("{}[{k},:]", self.path),
                         };

@@ -73,7 +73,7 @@ pub(crate) struct Numbers {
 impl Numbers {
     /// Interprets the bytes as numbers; an incomplete number at the end is ignored.
     pub(crate) fn new(bytes: Vec<u8>, kind: Kind, big_endian: bool) -> Self {
-        let len = bytes.len() / kind.size();
+        let len = bytes.len().checked_div(kind.size()).unwrap_or(0);
         Self {
             bytes: Rc::new(bytes),
             kind,
@@ -86,14 +86,18 @@ impl Numbers {
 
     /// Takes one number from each item of `item` bytes, at `offset` bytes from its start.
     pub(crate) fn field(bytes: &Rc<Vec<u8>>, kind: Kind, big_endian: bool, offset: usize, item: usize) -> Self {
-        let fits = item > 0 && offset + kind.size() <= item;
+        let fits = offset.checked_add(kind.size()).is_some_and(|end| end <= item);
         Self {
             bytes: Rc::clone(bytes),
             kind,
             big_endian,
             start: offset,
             step: item,
-            len: if fits { bytes.len() / item } else { 0 },
+            len: if fits {
+                bytes.len().checked_div(item).unwrap_or(0)
+            } else {
+                0
+            },
         }
     }
 
@@ -113,14 +117,10 @@ impl Numbers {
     /// Takes each `stride`-th number from `first` on, `len` of them; numbers that do not exist are
     /// omitted.
     pub(crate) fn line(&self, first: usize, stride: usize, len: usize) -> Self {
-        let there = if first >= self.len {
-            0
-        } else {
-            (self.len - 1 - first) / stride.max(1) + 1
-        };
+        let there = self.len.saturating_sub(first).div_ceil(stride.max(1));
         Self {
-            start: self.start + first.min(self.len) * self.step,
-            step: self.step * stride.max(1),
+            start: self.start.saturating_add(first.min(self.len).saturating_mul(self.step)),
+            step: self.step.saturating_mul(stride.max(1)),
             len: len.min(there),
             ..self.clone()
         }
@@ -161,7 +161,10 @@ impl Numbers {
             let n = self.bytes_of(at).map(u64::from_le_bytes)?;
             match self.kind {
                 Kind::U8 | Kind::U16 | Kind::U32 | Kind::U64 => Some(n),
-                Kind::I8 | Kind::I16 | Kind::I32 | Kind::I64 => (n >> (8 * self.kind.size() - 1) == 0).then_some(n),
+                Kind::I8 | Kind::I16 | Kind::I32 | Kind::I64 => {
+                    let sign = 8_u32.checked_mul(self.kind.size() as u32)?.checked_sub(1)?;
+                    (n.checked_shr(sign)? == 0).then_some(n)
+                }
                 Kind::F16 | Kind::F32 | Kind::F64 => None,
             }
         };
@@ -171,12 +174,13 @@ impl Numbers {
     /// The bytes of a number, little-endian, followed by zeros.
     fn bytes_of(&self, at: usize) -> Option<[u8; 8]> {
         let size = self.kind.size();
-        let from = self.start + at * self.step;
-        let stored = self.bytes.get(from..from + size)?;
+        let from = at.checked_mul(self.step)?.checked_add(self.start)?;
+        let stored = self.bytes.get(from..from.checked_add(size)?)?;
         let mut bytes = [0; 8];
-        bytes[..size].copy_from_slice(stored);
+        let number = bytes.get_mut(..size)?;
+        number.copy_from_slice(stored);
         if self.big_endian {
-            bytes[..size].reverse();
+            number.reverse();
         }
         Some(bytes)
     }

@@ -38,7 +38,7 @@ impl Source for ArraySource<'_> {
     }
 
     fn place(&self, row: usize) -> String {
-        format!("row {}", row + 1)
+        format!("row {}", row.saturating_add(1))
     }
 
     fn cell(&self, row: usize, column: usize) -> String {
@@ -68,11 +68,12 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
         used.extend(terms);
     }
     let mut notes = contents.notes;
-    let beside = used.last().map_or("", |at| named.columns[*at].1.parent.as_str());
+    let beside = (used.last())
+        .and_then(|at| named.columns.get(*at))
+        .map_or("", |(_, column_path)| column_path.parent.as_str());
     let mut columns: Vec<(String, &ColumnPath, Numbers)> = Vec::new();
     let mut shared = None;
-    for &at in &used {
-        let (name, column_path) = &named.columns[at];
+    for (name, column_path) in used.iter().filter_map(|at| named.columns.get(*at)) {
         let mut numbers = column_path.numbers().ok_or_else(|| column_path.refused(file))?.clone();
         if contents.own_clocks && column_path.parent != beside {
             let aligned = clocks::aligned(&column_paths, column_path, beside, file)?;
@@ -196,14 +197,16 @@ impl<'a> Named<'a> {
         for expression in expressions {
             let mut ambiguous = None;
             for name in expression.terms() {
-                let found = match paths.iter().position(|path| *path == name) {
-                    Some(at) => vec![at],
-                    None => ends(&paths, name),
-                };
-                match found.as_slice() {
-                    [at] => aliases.extend((paths[*at] != name).then(|| (name.to_owned(), &column_paths[*at]))),
+                if paths.contains(&name) {
+                    continue;
+                }
+                match ends(column_paths, name).as_slice() {
+                    [one] => aliases.push((name.to_owned(), *one)),
                     [] => {}
-                    several => ambiguous = Some((name, several.iter().map(|at| paths[*at]).collect::<Vec<_>>())),
+                    several => {
+                        let paths: Vec<&str> = several.iter().map(|one| one.path.as_str()).collect();
+                        ambiguous = Some((name, paths));
+                    }
                 }
             }
             if let Some((name, paths)) = ambiguous {
@@ -227,14 +230,13 @@ impl<'a> Named<'a> {
     }
 }
 
-/// Paths that end in a name, compared part by part.
-fn ends(paths: &[&str], name: &str) -> Vec<usize> {
-    let ending = |name: &str| -> Vec<usize> {
-        let ends = |path: &str| {
-            path.strip_suffix(name)
-                .is_some_and(|before| before.is_empty() || before.ends_with('.'))
+/// Those whose paths end in a name, compared part by part.
+fn ends<'a>(column_paths: &'a [ColumnPath], name: &str) -> Vec<&'a ColumnPath> {
+    let ending = |name: &str| -> Vec<&'a ColumnPath> {
+        let ends = |column_path: &&ColumnPath| {
+            (column_path.path.strip_suffix(name)).is_some_and(|before| before.is_empty() || before.ends_with('.'))
         };
-        (0..paths.len()).filter(|at| ends(paths[*at])).collect()
+        column_paths.iter().filter(ends).collect()
     };
     let found = ending(name);
     // The first of one.

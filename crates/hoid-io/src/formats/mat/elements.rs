@@ -63,7 +63,7 @@ impl<'a> Elements<'a> {
             let bytes = bytes
                 .get(..length)
                 .ok_or_else(|| format!("{length} bytes in a tag, where 4 fit"))?;
-            self.rest = &self.rest[8..];
+            self.rest = self.rest.get(8..).unwrap_or_default();
             return Ok(Element {
                 kind: first & 0xffff,
                 bytes,
@@ -74,7 +74,7 @@ impl<'a> Elements<'a> {
             .get(4..8)
             .and_then(|b| self.u32(b))
             .ok_or_else(|| ends(self.rest.len()))? as usize;
-        let data = &self.rest[8..];
+        let data = self.rest.get(8..).unwrap_or_default();
         let Some(bytes) = data.get(..length) else {
             return Err(format!("an element of {length} bytes ends after {}", data.len()));
         };

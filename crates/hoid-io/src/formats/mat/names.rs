@@ -52,11 +52,15 @@ pub(super) fn variables(names: &[&str]) -> Vec<String> {
                 || [COMMENTS, NAMES].contains(&variable)
                 || names.iter().any(|other| other != name && *other == variable)
         };
-        let mut number = 2;
+        let mut number = 2_u64;
         while taken(&variable) {
             let end = format!("_{number}");
-            variable = plain.chars().take(LONGEST_NAME - end.len()).collect::<String>() + &end;
-            number += 1;
+            variable = plain
+                .chars()
+                .take(LONGEST_NAME.saturating_sub(end.len()))
+                .collect::<String>()
+                + &end;
+            number = number.saturating_add(1);
         }
         variables.push(variable);
     }

@@ -1,6 +1,7 @@
 //! Objects of MATLAB: only MATLAB can read their contents, and one line of MATLAB extracts their numbers.
 
 use crate::formats::arrays::OBJECT;
+use crate::wording::shown;
 
 /// Description of an object of a class, with the line of MATLAB that saves its numbers.
 pub(super) fn object(class: &str) -> String {
@@ -10,7 +11,7 @@ pub(super) fn object(class: &str) -> String {
         "timeseries" => "t = x.Time; e = squeeze(x.Data);",
         "Dataset" | "dataset" => "t = x{1}.Values.Time; e = squeeze(x{1}.Values.Data);",
         "string" => return format!("{OBJECT} string (in MATLAB, char(x) is text)"),
-        _ => return format!("{OBJECT} {class}"),
+        _ => return format!("{OBJECT} {}", shown(class)),
     };
     format!("{OBJECT} {class} (in MATLAB, with x for its name: {line} save run.mat t e u)")
 }
@@ -26,5 +27,13 @@ mod tests {
             assert!(said.contains(class) && said.contains("save run.mat"), "{said}");
         }
         assert!(object("thing").contains("class thing"));
+    }
+
+    #[test]
+    fn the_name_of_a_class_moves_no_terminal() {
+        assert_eq!(
+            object("ti\0\u{1b}[31m"),
+            format!("{} ti\\0\\u{{1b}}[31m", super::OBJECT)
+        );
     }
 }

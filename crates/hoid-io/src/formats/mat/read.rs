@@ -6,6 +6,7 @@ use super::{version4, version5, version73};
 use crate::IoError;
 use crate::formats::arrays::{Contents, Indexing};
 use crate::formats::budget::Budget;
+use crate::wording::start_of;
 
 /// The first bytes of HDF5.
 const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
@@ -30,10 +31,9 @@ pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<Contents, IoError> {
         Some([.., b'I', b'M']) => version5::read(bytes, false, &mut budget, file)?,
         Some([.., b'M', b'I']) => version5::read(bytes, true, &mut budget, file)?,
         // Version 4 starts with a number below 5000, the later ones with text.
-        _ if bytes[..bytes.len().min(4)].contains(&0) => version4::read(bytes, &mut budget, file)?,
+        _ if bytes.iter().take(4).any(|byte| *byte == 0) => version4::read(bytes, &mut budget, file)?,
         _ => {
-            let start = String::from_utf8_lossy(&bytes[..bytes.len().min(12)]).into_owned();
-            return Err(wrong(format!("it starts with \"{}\"", start.escape_debug())));
+            return Err(wrong(start_of(bytes)));
         }
     };
     Ok(Contents::new(named(entries), Indexing::Matlab))

@@ -16,9 +16,9 @@ pub(super) fn read(bytes: &[u8], budget: &mut Budget, file: &str) -> Result<Vec<
     while !rest.is_empty() {
         let (entry, behind) = variable(rest).map_err(|found| IoError::Damaged {
             file: file.to_owned(),
-            found: format!("variable {}: {found}", entries.len() + 1),
+            found: format!("variable {}: {found}", entries.len().saturating_add(1)),
         })?;
-        budget.take((rest.len() - behind.len()) as u64, file)?;
+        budget.take(rest.len().saturating_sub(behind.len()) as u64, file)?;
         entries.push(entry);
         rest = behind;
     }
@@ -30,7 +30,11 @@ fn variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
         .get(..HEADER)
         .ok_or_else(|| format!("the file is cut: it ends after {} bytes", bytes.len()))?;
     let number = |at: usize, big_endian: bool| {
-        let bytes = <[u8; 4]>::try_from(&header[4 * at..4 * at + 4]).unwrap_or_default();
+        let bytes = header
+            .chunks_exact(4)
+            .nth(at)
+            .and_then(|four| four.try_into().ok())
+            .unwrap_or_default();
         if big_endian {
             u32::from_be_bytes(bytes)
         } else {
@@ -58,16 +62,20 @@ fn variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
         return Err(format!("its name is {name} bytes long"));
     }
     let count = rows.checked_mul(columns);
-    let length = count.and_then(|count| count.checked_mul(kind.size() * if imaginary == 0 { 1 } else { 2 }));
+    let length = count.and_then(|count| {
+        count
+            .checked_mul(kind.size())?
+            .checked_mul(if imaginary == 0 { 1 } else { 2 })
+    });
     let ends = || {
         let there = bytes.len();
         format!("the file is cut, or a size is wrong: {rows} x {columns} numbers end after {there} bytes")
     };
-    let data = bytes.get(HEADER + name..).ok_or_else(ends)?;
+    let named = bytes.get(HEADER..).and_then(|named| named.split_at_checked(name));
+    let (text, data) = named.ok_or_else(ends)?;
     let (data, rest) = length
         .and_then(|length| data.split_at_checked(length))
         .ok_or_else(ends)?;
-    let text = &bytes[HEADER..HEADER + name];
     let text: Vec<u8> = text.iter().copied().take_while(|byte| *byte != 0).collect();
     let name = String::from_utf8_lossy(&text).into_owned();
     let numbers = || Numbers::new(data.to_vec(), kind, big_endian);
@@ -90,8 +98,9 @@ fn variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
         1 => {
             let characters: Vec<char> = numbers().values().iter().map(|code| char::from(*code as u8)).collect();
             let row = |at: usize| {
-                characters[at..]
+                characters
                     .iter()
+                    .skip(at)
                     .step_by(rows)
                     .collect::<String>()
                     .trim_end()

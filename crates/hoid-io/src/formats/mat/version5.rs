@@ -55,9 +55,9 @@ pub(super) fn read(bytes: &[u8], big_endian: bool, budget: &mut Budget, file: &s
         budget,
         file,
     };
-    let mut variable = 0;
+    let mut variable = 0_usize;
     while !elements.is_empty() {
-        variable += 1;
+        variable = variable.saturating_add(1);
         reader.variable(&mut elements).map_err(|stop| match stop {
             Stop::Other(error) => error,
             Stop::Damaged(found) => IoError::Damaged {
@@ -149,7 +149,7 @@ impl Reader<'_> {
             let name = String::from_utf8_lossy(parts.next()?.bytes).into_owned();
             let system = parts.next()?;
             let of = parts.next().unwrap_or(system).bytes;
-            let what = object(&shown(&String::from_utf8_lossy(of)));
+            let what = object(&String::from_utf8_lossy(of));
             let path = if place.depth == 0 {
                 shown(&name)
             } else {
@@ -184,7 +184,7 @@ impl Reader<'_> {
                 let bytes = parts.clone().next().map_or(0, |element| element.bytes.len());
                 // They are expanded to characters of four bytes.
                 let rows = dims.first().map_or(1, |rows| (*rows).min(bytes));
-                self.budget.take_texts(rows, 5 * bytes, self.file)?;
+                self.budget.take_texts(rows, bytes.saturating_mul(5), self.file)?;
                 let texts = texts(&mut parts, &dims, count)?;
                 self.push(place, place.path, Value::Texts(texts))
             }
@@ -249,7 +249,7 @@ impl Reader<'_> {
         for at in 0..count {
             let parent = match count {
                 1 => place.path.to_owned(),
-                _ => format!("{}({})", place.path, at + 1),
+                _ => format!("{}({})", place.path, at.saturating_add(1)),
             };
             for name in &names {
                 let matrix = parts.of(data::MATRIX, "a field")?;
@@ -271,7 +271,7 @@ impl Reader<'_> {
         let before = self.entries.len();
         for at in 0..count {
             let matrix = parts.of(data::MATRIX, "a cell")?;
-            let path = format!("{}{{{}}}", place.path, at + 1);
+            let path = format!("{}{{{}}}", place.path, at.saturating_add(1));
             self.matrix(
                 matrix,
                 parts.big_endian,
@@ -283,7 +283,8 @@ impl Reader<'_> {
             )?;
         }
         let text = |entry: &Entry| matches!(&entry.value, Value::Texts(texts) if texts.len() == 1);
-        if self.entries.len() - before == count && self.entries[before..].iter().all(text) {
+        let cells = self.entries.get(before..).unwrap_or_default();
+        if cells.len() == count && cells.iter().all(text) {
             let texts = self.entries.drain(before..).filter_map(|entry| match entry.value {
                 Value::Texts(texts) => texts.into_iter().next(),
                 _ => None,
@@ -299,7 +300,7 @@ impl Reader<'_> {
     }
 
     fn push(&mut self, place: VariablePath<'_>, path: &str, value: Value) -> Result<(), Stop> {
-        let bytes = (path.len() + place.parent.len()) as u64 + ENTRY_BYTES;
+        let bytes = (path.len().saturating_add(place.parent.len()) as u64).saturating_add(ENTRY_BYTES);
         self.budget.take(bytes, self.file)?;
         let mut entry = Entry::new(path, value);
         place.parent.clone_into(&mut entry.parent);
@@ -312,16 +313,16 @@ fn deeper(place: VariablePath<'_>) -> Result<usize, Stop> {
     if place.depth == MOST_NESTED {
         return Err(format!("structures more than {MOST_NESTED} deep").into());
     }
-    Ok(place.depth + 1)
+    Ok(place.depth.saturating_add(1))
 }
 
 /// Reads a name, which may be padded with zeros.
 fn name(bytes: &[u8]) -> Result<String, String> {
-    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
-    if end > LONGEST_NAME {
-        return Err(format!("a name of {end} bytes"));
+    let name = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
+    if name.len() > LONGEST_NAME {
+        return Err(format!("a name of {} bytes", name.len()));
     }
-    Ok(String::from_utf8_lossy(&bytes[..end]).into_owned())
+    Ok(String::from_utf8_lossy(name).into_owned())
 }
 
 /// The rows of an array of characters.
@@ -333,7 +334,7 @@ fn texts(parts: &mut Elements<'_>, dims: &[usize], count: usize) -> Result<Vec<S
     let element = parts.next()?;
     let bytes = element.bytes;
     let order = |pair: &[u8]| {
-        let pair = [pair[0], pair[1]];
+        let pair = pair.try_into().unwrap_or_default();
         if parts.big_endian {
             u16::from_be_bytes(pair)
         } else {
@@ -355,8 +356,9 @@ fn texts(parts: &mut Elements<'_>, dims: &[usize], count: usize) -> Result<Vec<S
         [1, ..] | [] => Ok(vec![characters.into_iter().collect()]),
         [rows, ..] if *rows <= characters.len() => {
             let row = |at: usize| {
-                characters[at..]
+                characters
                     .iter()
+                    .skip(at)
                     .step_by(*rows)
                     .collect::<String>()
                     .trim_end()

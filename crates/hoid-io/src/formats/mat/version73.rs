@@ -89,7 +89,7 @@ impl Reader<'_> {
         for (name, group) in groups {
             // Data that MATLAB stores for itself.
             if !(depth == 0 && name.starts_with('#')) {
-                self.group(&group, &inside(&name), depth + 1)?;
+                self.group(&group, &inside(&name), depth.saturating_add(1))?;
             }
         }
         Ok(())
@@ -157,7 +157,7 @@ impl Reader<'_> {
             DType::U64 => self.array::<u64>(dataset, path, Kind::U64, dims)?,
             DType::String => Value::Texts(dataset.read_string().map_err(|e| error(self, e))?),
             DType::VariableLengthString => Value::Unread(String::from("texts of any length")),
-            DType::Compound(fields) if fields.len() == 2 && fields[0].0 == "real" => {
+            DType::Compound(fields) if matches!(fields.as_slice(), [(name, _), _] if name == "real") => {
                 Value::Unread(String::from("complex numbers"))
             }
             DType::Compound(_) => return self.table(dataset, (parent, path)),
@@ -212,21 +212,22 @@ impl Reader<'_> {
         for (at, object) in objects.into_iter().enumerate() {
             let (parent, path) = match path.strip_prefix(parent).and_then(|name| name.strip_prefix('.')) {
                 Some(field) if !cells && several && !parent.is_empty() => {
-                    let element = format!("{parent}({})", at + 1);
+                    let element = format!("{parent}({})", at.saturating_add(1));
                     let path = format!("{element}.{field}");
                     (element, path)
                 }
-                _ => (parent.to_owned(), format!("{path}{{{}}}", at + 1)),
+                _ => (parent.to_owned(), format!("{path}{{{}}}", at.saturating_add(1))),
             };
             match object {
-                Object::Dataset(dataset) => self.dataset(&dataset, &parent, &path, depth + 1)?,
-                Object::Group(group) => self.group(&group, &path, depth + 1)?,
+                Object::Dataset(dataset) => self.dataset(&dataset, &parent, &path, depth.saturating_add(1))?,
+                Object::Group(group) => self.group(&group, &path, depth.saturating_add(1))?,
                 _ => {}
             }
         }
         // Cells that hold only texts are one column.
         let text = |entry: &Entry| matches!(&entry.value, Value::Texts(texts) if texts.len() == 1);
-        if cells && self.entries.len() - before == count && self.entries[before..].iter().all(text) {
+        let new = self.entries.get(before..).unwrap_or_default();
+        if cells && new.len() == count && new.iter().all(text) {
             let texts = self.entries.drain(before..).filter_map(|entry| match entry.value {
                 Value::Texts(texts) => texts.into_iter().next(),
                 _ => None,
@@ -238,7 +239,8 @@ impl Reader<'_> {
     }
 
     fn push(&mut self, parent: &str, path: &str, value: Value) -> Result<(), IoError> {
-        self.budget.take((path.len() + parent.len()) as u64, self.file)?;
+        self.budget
+            .take(path.len().saturating_add(parent.len()) as u64, self.file)?;
         let mut entry = Entry::new(path, value);
         parent.clone_into(&mut entry.parent);
         self.entries.push(entry);
@@ -257,7 +259,7 @@ impl Reader<'_> {
         dims: Vec<usize>,
     ) -> Result<Value, IoError> {
         let values = self.all::<T>(dataset, path)?;
-        let mut bytes = Vec::with_capacity(values.len() * kind.size());
+        let mut bytes = Vec::with_capacity(values.len().saturating_mul(kind.size()));
         values.iter().for_each(|value| value.append(&mut bytes));
         let numbers = Numbers::new(bytes, kind, false);
         let expected = dims.iter().try_fold(1_usize, |count, side| count.checked_mul(*side));

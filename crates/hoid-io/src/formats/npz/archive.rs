@@ -16,16 +16,15 @@ use crate::formats::arrays::{COMMENTS, Contents, Entry, Indexing};
 use crate::formats::budget::Budget;
 use crate::formats::guarded::guarded;
 use crate::results::{TableSchema, Values};
-use crate::wording::{shown, told};
+use crate::wording::{shown, start_of, told};
 
 /// Reads the arrays from the bytes of a file.
 pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
     if !bytes.starts_with(b"PK") {
-        let start = String::from_utf8_lossy(&bytes[..bytes.len().min(12)]).into_owned();
         return Err(IoError::WrongFormat {
             file: file.to_owned(),
             format: "NPZ",
-            found: format!("it starts with \"{}\"", start.escape_debug()),
+            found: start_of(bytes),
             expected: "a zip archive, which starts with PK",
         });
     }
@@ -40,10 +39,16 @@ fn members(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
     for index in 0..archive.len() {
         let mut member = archive
             .by_index(index)
-            .map_err(|error| refused(&error, &format!("member {}", index + 1), file))?;
+            .map_err(|error| refused(&error, &format!("member {}", index.saturating_add(1)), file))?;
         let path = match member.name() {
             Ok(name) => name.into_owned(),
-            Err(error) => return Err(refused(&error, &format!("the name of member {}", index + 1), file)),
+            Err(error) => {
+                return Err(refused(
+                    &error,
+                    &format!("the name of member {}", index.saturating_add(1)),
+                    file,
+                ));
+            }
         };
         let Some(name) = path.strip_suffix(".npy") else {
             others.push(shown(&path));

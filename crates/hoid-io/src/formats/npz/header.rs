@@ -106,7 +106,7 @@ impl Reader<'_> {
         loop {
             match characters.next()? {
                 (at, c) if c == quote => {
-                    self.rest = &self.rest[at + 1..];
+                    self.rest = self.rest.get(at..)?.strip_prefix(quote)?;
                     return Some(text);
                 }
                 (_, '\\') => match characters.next()?.1 {
@@ -132,7 +132,7 @@ impl Reader<'_> {
                     if depth == DEEPEST {
                         return None;
                     }
-                    items.push(self.literal(depth + 1)?);
+                    items.push(self.literal(depth.saturating_add(1))?);
                     if self.token(',').is_none() {
                         self.token(end)?;
                         break;

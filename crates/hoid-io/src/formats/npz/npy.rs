@@ -7,9 +7,12 @@ use crate::IoError;
 use crate::formats::arrays::{Array, Entry, Kind, MOMENTS, Numbers, Value};
 use crate::formats::budget::Budget;
 use crate::results::Values;
-use crate::wording::shown;
+use crate::wording::{shown, start_of};
 
 const MAGIC: &[u8] = b"\x93NUMPY";
+/// Bytes before a header: the magic bytes, the version, and the length in two bytes, or in four since version 2.
+const BEFORE_SHORT: usize = MAGIC.len() + 4;
+const BEFORE_LONG: usize = MAGIC.len() + 6;
 /// A longer header is damage, bytes.
 const LONGEST_HEADER: usize = 1 << 20;
 /// The numbers start at a multiple of this, bytes.
@@ -126,7 +129,7 @@ pub(super) fn entries(
 ) -> Result<Vec<Entry>, NpyError> {
     let (header, at) = header_of(&bytes)?;
     unpacked(&header, budget, file)?;
-    let data = || bytes[at..].to_vec();
+    let data = || bytes.get(at..).unwrap_or_default().to_vec();
     let entries = match &header.descr {
         Descr::Plain(descr) => {
             let item = Item::of(descr);
@@ -166,16 +169,12 @@ fn unpacked(header: &Header, budget: &mut Budget, file: &str) -> Result<(), IoEr
 fn header_of(bytes: &[u8]) -> Result<(Header, usize), NpyError> {
     let damaged = |what: &str| NpyError::Damaged(what.to_owned());
     if !bytes.starts_with(MAGIC) {
-        let start = String::from_utf8_lossy(&bytes[..bytes.len().min(12)]).into_owned();
-        return Err(NpyError::NoMagic(format!(
-            "it starts with \"{}\"",
-            start.escape_debug()
-        )));
+        return Err(NpyError::NoMagic(start_of(bytes)));
     }
-    let rest = &bytes[MAGIC.len()..];
+    let rest = bytes.get(MAGIC.len()..).unwrap_or_default();
     let (length, before) = match rest {
-        [1, _, a, b, ..] => (usize::from(u16::from_le_bytes([*a, *b])), MAGIC.len() + 4),
-        [2 | 3, _, a, b, c, d, ..] => (u32::from_le_bytes([*a, *b, *c, *d]) as usize, MAGIC.len() + 6),
+        [1, _, a, b, ..] => (usize::from(u16::from_le_bytes([*a, *b])), BEFORE_SHORT),
+        [2 | 3, _, a, b, c, d, ..] => (u32::from_le_bytes([*a, *b, *c, *d]) as usize, BEFORE_LONG),
         [version, ..] if !(1..=3).contains(version) => {
             return Err(NpyError::Damaged(format!("the array is of version {version}")));
         }
@@ -186,14 +185,15 @@ fn header_of(bytes: &[u8]) -> Result<(Header, usize), NpyError> {
             "the header of an array is {length} bytes long"
         )));
     }
+    let end = before.saturating_add(length);
     let text = bytes
-        .get(before..before + length)
+        .get(before..end)
         .ok_or_else(|| damaged("the array ends in its header"))?;
     // Latin 1 before version 3; all that hoid needs is ASCII in both, except for names.
     let text = String::from_utf8_lossy(text);
     let header = header::parse(&text)
         .ok_or_else(|| NpyError::Damaged(format!("the header of an array reads {}", shown(&text))))?;
-    Ok((header, before + length))
+    Ok((header, end))
 }
 
 /// Number of items, if they fill the bytes.
@@ -268,7 +268,7 @@ fn clock(counts: &Numbers, unit_s: f64, moments: bool) -> Numbers {
     let first = known.iter().flatten().next().copied().filter(|_| moments).unwrap_or(0);
     // A quotient keeps the digits that a product with 1e-9 would lose.
     let seconds = |count: i64| {
-        let count = (i128::from(count) - i128::from(first)) as f64;
+        let count = i128::from(count).saturating_sub(i128::from(first)) as f64;
         if unit_s < 1.0 {
             count / (1.0 / unit_s).round()
         } else {
@@ -311,11 +311,12 @@ fn structured(
         .unwrap_or(usize::MAX);
     count(header, item, data.len())?;
     let data = Rc::new(data);
-    let mut offset = 0;
+    let mut offset = 0_usize;
     let mut values = Vec::with_capacity(items.len());
     for (name, kind, size) in items {
+        let field = offset..offset.saturating_add(size);
         let texts = |of: &dyn Fn(&[u8]) -> String| {
-            let text = |row: &[u8]| of(&row[offset..offset + size]);
+            let text = |row: &[u8]| of(row.get(field.clone()).unwrap_or_default());
             Value::Texts(data.chunks_exact(item).map(text).collect())
         };
         let value = match kind {
@@ -331,7 +332,7 @@ fn structured(
         if !name.is_empty() {
             values.push((name.clone(), value));
         }
-        offset += size;
+        offset = field.end;
     }
     Ok(values)
 }
@@ -349,8 +350,11 @@ fn unicode(bytes: &[u8], big_endian: bool) -> String {
 }
 
 fn latin(bytes: &[u8]) -> String {
-    let end = bytes.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
-    String::from_utf8_lossy(&bytes[..end]).into_owned()
+    let text = bytes
+        .iter()
+        .rposition(|byte| *byte != 0)
+        .and_then(|last| bytes.get(..=last));
+    String::from_utf8_lossy(text.unwrap_or_default()).into_owned()
 }
 
 /// A one-dimensional array, as numpy writes it.
@@ -378,11 +382,11 @@ pub(super) fn written(values: Values<'_>) -> Vec<u8> {
         header::quoted(&descr),
         values.len()
     );
-    let before = MAGIC.len() + 4;
-    let padding = (ALIGNMENT - (before + header.len() + 1) % ALIGNMENT) % ALIGNMENT;
+    let whole = BEFORE_SHORT.saturating_add(header.len()).saturating_add(1);
+    let padding = whole.next_multiple_of(ALIGNMENT).saturating_sub(whole);
     header.extend(std::iter::repeat_n(' ', padding));
     header.push('\n');
-    let mut bytes = Vec::with_capacity(before + header.len() + data.len());
+    let mut bytes = Vec::with_capacity(BEFORE_SHORT.saturating_add(header.len()).saturating_add(data.len()));
     bytes.extend_from_slice(MAGIC);
     bytes.extend_from_slice(&[1, 0]);
     // A plain header is far shorter than 2^16.

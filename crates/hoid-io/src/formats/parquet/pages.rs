@@ -106,8 +106,12 @@ impl PageHeader {
                 }
                 BYTE => drop(byte(bytes)?),
                 4..=6 => self.number(inside, field, zigzag(bytes)?)?,
-                STRUCT => self.structure(bytes, Some(if depth == 0 { field } else { -1 }), depth + 1)?,
-                other => self.pass_over(bytes, other, depth + 1)?,
+                STRUCT => self.structure(
+                    bytes,
+                    Some(if depth == 0 { field } else { -1 }),
+                    depth.saturating_add(1),
+                )?,
+                other => self.pass_over(bytes, other, depth.saturating_add(1))?,
             }
         }
     }
@@ -165,7 +169,7 @@ impl PageHeader {
         }
         for _ in 0..count {
             for kind in kinds {
-                self.pass_over(bytes, *kind, depth + 1)?;
+                self.pass_over(bytes, *kind, depth.saturating_add(1))?;
             }
         }
         Some(())
@@ -180,9 +184,9 @@ fn byte(bytes: &mut &[u8]) -> Option<u8> {
 
 fn varint(bytes: &mut &[u8]) -> Option<u64> {
     let mut value = 0_u64;
-    for place in 0..10 {
+    for shift in (0..70).step_by(7) {
         let next = byte(bytes)?;
-        value |= u64::from(next & 0x7f).checked_shl(7 * place)?;
+        value |= u64::from(next & 0x7f).checked_shl(shift)?;
         if next < 0x80 {
             return Some(value);
         }
@@ -192,7 +196,7 @@ fn varint(bytes: &mut &[u8]) -> Option<u64> {
 
 fn zigzag(bytes: &mut &[u8]) -> Option<i64> {
     let value = varint(bytes)?;
-    Some((value >> 1).cast_signed() ^ -(value & 1).cast_signed())
+    Some((value >> 1).cast_signed() ^ (value & 1).cast_signed().wrapping_neg())
 }
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ use crate::IoError;
 use crate::formats::budget::Budget;
 use crate::formats::guarded::guarded;
 use crate::table::check_number;
-use crate::wording::{shown, told};
+use crate::wording::{shown, start_of, told};
 
 /// The magic bytes at both ends.
 const MAGIC: &[u8; 4] = b"PAR1";
@@ -58,8 +58,7 @@ fn check_ends(bytes: &[u8], file: &str) -> Result<(), IoError> {
             remedy: "write it without encryption",
         });
     } else if !bytes.starts_with(MAGIC) {
-        let start = String::from_utf8_lossy(&bytes[..bytes.len().min(12)]).into_owned();
-        format!("it starts with \"{}\"", start.escape_debug())
+        start_of(bytes)
     } else if bytes.len() < 12 {
         String::from("it ends after its first bytes")
     } else if !bytes.ends_with(MAGIC) {
@@ -111,7 +110,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
         for chunk in group.columns() {
             let place = || {
                 let name = chunk.column_path().string();
-                format!("column {}, row group {}", shown(&name), number + 1)
+                format!("column {}, row group {}", shown(&name), number.saturating_add(1))
             };
             if chunk.file_path().is_some() {
                 continue;
@@ -187,7 +186,9 @@ impl ColumnPath<'_> {
             (Type::FLOAT, _) => Data::Real(self.values::<FloatType, _>(|value| f64::from(*value))?),
             (Type::DOUBLE, _) => Data::Real(self.values::<DoubleType, _>(|value| *value)?),
             (Type::INT96, _) => Data::Moments(self.values::<Int96Type, _>(Int96::to_nanos)?),
-            (Type::INT32, C::TIME_MILLIS) => Data::Moments(self.values::<Int32Type, _>(|ms| i64::from(*ms) * MILLI)?),
+            (Type::INT32, C::TIME_MILLIS) => {
+                Data::Moments(self.values::<Int32Type, _>(|ms| i64::from(*ms).saturating_mul(MILLI))?)
+            }
             (Type::INT64, _) if let Some(unit_ns) = clock_ns(column) => {
                 Data::Moments(self.values::<Int64Type, _>(|value| value.saturating_mul(unit_ns))?)
             }
@@ -246,23 +247,23 @@ impl ColumnPath<'_> {
             return Err(ParquetError::General(format!("{found} values in {rows} rows")));
         }
         let defined = chunk.column_descr().max_def_level();
-        let end = values.len() + metadata.num_rows() as usize;
+        let end = values.len().saturating_add(metadata.num_rows() as usize);
         let group = self.reader.get_row_group(group)?;
         let mut reader = get_typed_column_reader::<T>(group.get_column_reader(self.index)?);
         let (mut levels, mut stored) = (Vec::new(), Vec::new());
         while values.len() < end {
             levels.clear();
             stored.clear();
-            let wanted = PART.min(end - values.len());
+            let wanted = PART.min(end.saturating_sub(values.len()));
             let (rows, ..) = reader.read_records(wanted, Some(&mut levels), None, &mut stored)?;
             if rows != wanted {
-                let missing = end - values.len() - rows;
+                let missing = end.saturating_sub(values.len()).saturating_sub(rows);
                 return Err(ParquetError::EOF(format!("{missing} values are missing")));
             }
             let first = values.len();
             if defined == 0 {
                 values.extend(stored.iter().map(of));
-                self.weigh(&values[first..])?;
+                self.weigh(values.get(first..).unwrap_or_default())?;
                 continue;
             }
             let mut stored = stored.iter();
@@ -273,7 +274,7 @@ impl ColumnPath<'_> {
                 }
                 values.push(value.map_or_else(V::default, of));
             }
-            self.weigh(&values[first..])?;
+            self.weigh(values.get(first..).unwrap_or_default())?;
         }
         Ok(())
     }
@@ -288,7 +289,7 @@ impl ColumnPath<'_> {
     /// Converts an error of the crate, with its place.
     fn error(&self, group: usize, error: ParquetError) -> IoError {
         let file = self.file.to_owned();
-        let place = format!("column {}, row group {}", shown(&self.name), group + 1);
+        let place = format!("column {}, row group {}", shown(&self.name), group.saturating_add(1));
         match error {
             ParquetError::NYI(what) => IoError::Unsupported {
                 file,
@@ -324,7 +325,7 @@ impl Weight for u64 {}
 
 impl Weight for String {
     fn bytes(&self) -> u64 {
-        TEXT + self.len() as u64
+        TEXT.saturating_add(self.len() as u64)
     }
 }
 
@@ -360,7 +361,8 @@ fn half(bytes: &[u8]) -> f64 {
 
 /// An integer of up to 16 bytes, big-endian.
 fn signed(bytes: &[u8]) -> i128 {
-    let sign = -i128::from(bytes.first().is_some_and(|first| *first >= 0x80));
+    let negative = bytes.first().is_some_and(|first| *first >= 0x80);
+    let sign = if negative { -1 } else { 0_i128 };
     bytes.iter().fold(sign, |value, byte| value << 8 | i128::from(*byte))
 }
 

@@ -38,7 +38,7 @@ impl Source for ParquetSource<'_> {
     }
 
     fn place(&self, row: usize) -> String {
-        format!("row {}", row + 1)
+        format!("row {}", row.saturating_add(1))
     }
 
     fn cell(&self, row: usize, column: usize) -> String {
@@ -48,10 +48,11 @@ impl Source for ParquetSource<'_> {
             {
                 String::from("null")
             }
-            Some(Cells::Numbers { infinite, .. }) => match infinite.binary_search_by_key(&row, |cell| cell.0) {
-                Ok(k) => infinite[k].1.to_string(),
-                Err(_) => String::from("NaN"),
-            },
+            Some(Cells::Numbers { infinite, .. }) => {
+                let found = infinite.binary_search_by_key(&row, |cell| cell.0).ok();
+                let cell = found.and_then(|k| infinite.get(k));
+                cell.map_or_else(|| String::from("NaN"), |(_, value)| value.to_string())
+            }
             Some(Cells::Texts { texts, .. }) => texts.get(row).map_or_else(String::new, |text| shown(text)),
             Some(Cells::Moments { .. }) => String::from("a date or time"),
             Some(Cells::Unread(what)) => String::from(*what),
@@ -109,11 +110,12 @@ fn column_of(read: ReadColumn, rows: usize) -> (Column, Cells) {
         }
         Data::Moments(moments) => {
             let known = |row: &usize| nulls.binary_search(row).is_err();
-            let first = (0..moments.len()).find(known).map_or(0, |row| moments[row]);
+            let first = (moments.iter().enumerate()).find(|(row, _)| known(row));
+            let first = first.map_or(0, |(_, moment)| *moment);
             column.moments = true;
             column.unit = String::from("s");
             column.values = moments.into_iter().map(|ns| seconds(ns, first)).collect();
-            nulls.iter().for_each(|row| column.values[*row] = f64::NAN);
+            without(&mut column.values, &nulls);
             column.precision = Precision::of_times(&column.values, single);
             return (column, Cells::Moments { nulls });
         }
@@ -123,7 +125,7 @@ fn column_of(read: ReadColumn, rows: usize) -> (Column, Cells) {
             return (column, Cells::Unread(what));
         }
     };
-    nulls.iter().for_each(|row| column.values[*row] = f64::NAN);
+    without(&mut column.values, &nulls);
     if is_time(&column.name) {
         column.precision = Precision::of_times(&column.values, single);
     }
@@ -134,4 +136,13 @@ fn column_of(read: ReadColumn, rows: usize) -> (Column, Cells) {
         .filter(|(_, value)| value.is_infinite());
     let infinite = infinite.map(|(row, value)| (row, *value)).collect();
     (column, Cells::Numbers { nulls, infinite })
+}
+
+/// Makes the values of these rows missing.
+pub(super) fn without(values: &mut [f64], nulls: &[usize]) {
+    for row in nulls {
+        if let Some(value) = values.get_mut(*row) {
+            *value = f64::NAN;
+        }
+    }
 }

@@ -2,6 +2,7 @@
 
 use super::columns::{Data, ReadColumn};
 use super::read::read as read_columns;
+use super::record::without;
 use crate::IoError;
 use crate::results::{ColumnValues, OutputColumn, OutputTable};
 use crate::wording::shown;
@@ -17,7 +18,7 @@ pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<OutputTable, IoError> {
     let mut columns = Vec::with_capacity(read.columns.len());
     for ReadColumn { name, data, nulls, .. } in read.columns {
         let real = |mut values: Vec<f64>| {
-            nulls.iter().for_each(|row| values[*row] = f64::NAN);
+            without(&mut values, &nulls);
             ColumnValues::Real(values)
         };
         let values = match data {

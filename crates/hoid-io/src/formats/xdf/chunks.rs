@@ -78,9 +78,9 @@ pub(super) fn streams(bytes: &[u8]) -> Result<(Vec<Stream>, Option<usize>), Stri
     let mut streams: Vec<Stream> = Vec::new();
     let mut known: HashMap<u32, usize> = HashMap::new();
     while !rest.rest.is_empty() {
-        let at = bytes.len() - rest.rest.len();
+        let at = bytes.len().saturating_sub(rest.rest.len());
         let ends = || format!("the chunk at byte {at} is cut, or its length is wrong");
-        let is_length = matches!(bytes[at], 1 | 4 | 8);
+        let is_length = matches!(rest.rest, [1 | 4 | 8, ..]);
         let Some(taken) = rest.length().and_then(|length| rest.take(length)) else {
             if is_length && !streams.is_empty() {
                 return Ok((streams, Some(at)));
@@ -194,7 +194,7 @@ impl Stream {
             };
             match &mut self.samples {
                 Samples::Numbers { kind, bytes } => {
-                    bytes.extend_from_slice(content.take(self.header.channels * kind.size())?);
+                    bytes.extend_from_slice(content.take(self.header.channels.saturating_mul(kind.size()))?);
                 }
                 Samples::Texts(texts) => {
                     for _ in 0..self.header.channels {

@@ -8,7 +8,7 @@ use super::clock;
 use crate::IoError;
 use crate::formats::arrays::{Array, Contents, Entry, Indexing, Numbers, Value};
 use crate::formats::budget::Budget;
-use crate::wording::shown;
+use crate::wording::{shown, start_of};
 
 /// Approximate memory of an entry, bytes.
 const ENTRY: u64 = 512;
@@ -16,11 +16,10 @@ const ENTRY: u64 = 512;
 /// Reads the streams from the bytes of a file.
 pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
     if !bytes.starts_with(b"XDF:") {
-        let start = String::from_utf8_lossy(&bytes[..bytes.len().min(12)]).into_owned();
         return Err(IoError::WrongFormat {
             file: file.to_owned(),
             format: "XDF",
-            found: format!("it starts with \"{}\"", start.escape_debug()),
+            found: start_of(bytes),
             expected: "XDF: at its start",
         });
     }
@@ -35,7 +34,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
             "the file is cut at byte {at} of {}: the samples before it are read, and the {} bytes after it are not; copy the \
              file again where its original is whole",
             bytes.len(),
-            bytes.len() - at
+            bytes.len().saturating_sub(at)
         )
     }));
     for stream in &streams {
@@ -49,8 +48,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
                 shown(&stream.header.name),
                 stream.stamps.len()
             ));
-        } else if stream.footer.is_none() && !stream.stamps.is_empty() {
-            let (first, last) = (stream.stamps[0], stream.stamps[stream.stamps.len() - 1]);
+        } else if let (None, Some(first), Some(last)) = (&stream.footer, stream.stamps.first(), stream.stamps.last()) {
             notes.push(format!(
                 "stream {} has no footer: the file was cut short, or its recorder never closed it; {} samples over {:.3} s \
                  are there, and what came after them is lost",
@@ -80,7 +78,10 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
             name => name.to_owned(),
         };
         let parent = names.unique(&name);
-        budget.take(ENTRY * (1 + stream.header.channels as u64), file)?;
+        budget.take(
+            ENTRY.saturating_mul((stream.header.channels as u64).saturating_add(1)),
+            file,
+        )?;
         entries.extend(entries_of(
             stream,
             &parent,
@@ -96,12 +97,11 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
 /// The time stamps and the channels of a stream.
 fn entries_of(stream: Stream, parent: &str, times: &[f64]) -> Vec<Entry> {
     let mut names = Names::default();
-    let mut entries = vec![Entry::field(
-        parent,
-        &names.unique("t"),
-        Value::Array(Array::vector(Numbers::from_f64(times))),
-    )];
-    entries[0].unit = String::from("s");
+    let times = Value::Array(Array::vector(Numbers::from_f64(times)));
+    let mut entries = vec![Entry {
+        unit: String::from("s"),
+        ..Entry::field(parent, &names.unique("t"), times)
+    }];
     let channels = stream.header.channels;
     let mut values: Vec<Value> = match stream.samples {
         Samples::Texts(texts) => (0..channels)
@@ -109,14 +109,14 @@ fn entries_of(stream: Stream, parent: &str, times: &[f64]) -> Vec<Entry> {
             .collect(),
         Samples::Numbers { kind, bytes } => {
             let bytes = Rc::new(bytes);
-            let item = channels * kind.size();
+            let item = channels.saturating_mul(kind.size());
             (0..channels)
                 .map(|channel| {
                     Value::Array(Array::vector(Numbers::field(
                         &bytes,
                         kind,
                         false,
-                        channel * kind.size(),
+                        channel.saturating_mul(kind.size()),
                         item,
                     )))
                 })
@@ -126,7 +126,7 @@ fn entries_of(stream: Stream, parent: &str, times: &[f64]) -> Vec<Entry> {
     for (channel, value) in values.drain(..).enumerate() {
         let known = stream.header.labels.get(channel);
         let label = known.map(|(label, _)| label.trim()).filter(|label| !label.is_empty());
-        let label = names.unique(&label.map_or_else(|| format!("ch{}", channel + 1), str::to_owned));
+        let label = names.unique(&label.map_or_else(|| format!("ch{}", channel.saturating_add(1)), str::to_owned));
         let mut entry = Entry::field(parent, &label, value);
         known.map_or("", |(_, unit)| unit.trim()).clone_into(&mut entry.unit);
         entries.push(entry);
@@ -145,10 +145,10 @@ struct Names {
 impl Names {
     fn unique(&mut self, name: &str) -> String {
         let mut unique = name.to_owned();
-        let number = self.next.entry(unique.clone()).or_insert(2);
+        let number: &mut usize = self.next.entry(unique.clone()).or_insert(2);
         while !self.known.insert(unique.clone()) {
             unique = format!("{name}({number})");
-            *number += 1;
+            *number = number.saturating_add(1);
         }
         unique
     }
