@@ -92,7 +92,7 @@ def read(
         Columns logged at instants of their own, so that some rows lack them, by name: ``{"u":
         "hold"}`` holds the last value, ``"linear"`` draws straight lines, ``"drop"`` drops the rows.
     columns : sequence of str, optional
-        Columns to keep beside input, output and time; ``[]`` for none. Of a long CSV file the others
+        Columns to keep in addition to input, output and time; ``[]`` for none. Of a long CSV file the others
         take neither time nor memory. Without it all.
     drop_repeated : bool
         Drop rows that occur twice, with the same time.

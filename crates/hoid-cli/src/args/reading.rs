@@ -48,7 +48,7 @@ pub struct ReadArgs {
     /// (linear), or drop those rows. May be repeated
     #[arg(long, value_name = "COLUMN=hold|linear|drop", value_parser = parse_sparse, value_delimiter = ',', allow_hyphen_values = true)]
     pub sparse: Vec<(String, Sparse)>,
-    /// Columns to keep beside input, output and time, as f_t,r or none: of a long CSV file the others take neither time
+    /// Columns to keep beyond input, output and time, as f_t,r or none: of a long CSV file the others take neither time
     /// nor memory [default: all]
     #[arg(long, value_name = "COLUMN,...", value_delimiter = ',')]
     pub columns: Option<Vec<String>>,
@@ -73,7 +73,7 @@ impl ReadArgs {
         }
     }
 
-    /// The columns to keep beside input, output and time; `None` for all.
+    /// The columns to keep in addition to input, output and time; `None` for all.
     pub fn kept_columns(&self) -> Option<Vec<String>> {
         let kept = self.columns.as_ref()?;
         Some(kept.iter().filter(|column| *column != "none").cloned().collect())

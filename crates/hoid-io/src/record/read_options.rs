@@ -59,7 +59,7 @@ pub struct ReadOptions {
     /// Columns that were logged at instants of their own, so that some rows lack their value; `e` and `u` are input and
     /// output where no column has that name. By default none.
     pub sparse: BTreeMap<String, Sparse>,
-    /// Columns to keep beside input, output and time, by their names; by default all. Of a CSV file the others are not
+    /// Columns to keep in addition to input, output and time, by their names; by default all. Of a CSV file the others are not
     /// held in memory.
     pub columns: Option<Vec<String>>,
     /// Permitted repairs.

@@ -56,7 +56,7 @@ pub(crate) fn selected<'a>(table: Table<'a>, keep: impl Fn(usize, &str) -> bool)
 /// Checks that the columns asked for are among these.
 ///
 /// # Errors
-/// [`IoError::NoSuchColumn`] for one that is not, be it of the input, the output or beside them.
+/// [`IoError::NoSuchColumn`] for one that is not, be it of the input, the output or in addition.
 pub(crate) fn check_selected(names: &[&str], options: &ReadOptions, file: &str) -> Result<(), IoError> {
     let Some(kept) = &options.columns else { return Ok(()) };
     for signal in options.input.iter().chain([&options.output]) {

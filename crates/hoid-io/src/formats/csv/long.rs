@@ -1,4 +1,4 @@
-//! A long text of plain numbers, read block by block: neither its bytes nor the columns that nobody asked for are held
+//! A long text of plain numbers, read block by block: neither its bytes nor the columns that were not asked for are held
 //! in memory, and reading ends behind the requested span.
 //!
 //! The first lines are read as any table is, with their names, units and notes. All rows after them must be plain
@@ -15,7 +15,7 @@ use super::plain::{Layout, RowStarts, plain_rows};
 use super::span_end::SpanEnd;
 use super::table::{Parsed, nth_row, parsed};
 use crate::record::ReadOptions;
-use crate::table::{Cell, Source, Table, selected};
+use crate::table::{Cell, Source, Table, check_selected, selected};
 use crate::time::{is_time, may_be_time};
 use crate::wording::shown;
 
@@ -26,7 +26,7 @@ const HEAD: usize = 256 << 10;
 /// Bytes of the first block; each next one is twice as long, up to [`LARGEST`].
 const BLOCK: usize = 1 << 20;
 const LARGEST: usize = 32 << 20;
-/// Places in the rest of a file at which the time is looked at.
+/// Places in the rest of a file at which the time is examined.
 const PROBES: u32 = 64;
 /// Bytes read at such a place: more than a line has.
 const PROBE: usize = 64 << 10;
@@ -60,6 +60,11 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
     };
     let separator = parsed.separator;
     let names: Vec<String> = parsed.columns.iter().map(|column| column.name.clone()).collect();
+    // What is missing is said by the reader of whole texts, with all columns that there are.
+    let known: Vec<&str> = names.iter().map(String::as_str).collect();
+    if check_selected(&known, options, file).is_err() {
+        return Ok(None);
+    }
     let wanted: Vec<bool> = (names.iter().enumerate())
         .map(|(at, name)| options.wants(name) || may_be_time(at, name, options.time.as_ref()))
         .collect();
@@ -325,6 +330,8 @@ mod tests {
                 .unwrap()
                 .is_none()
         );
+        let missing = wanting(&["z"], None);
+        assert!(of_length(file.path(), "run.csv", &missing, 0).unwrap().is_none());
         let last = text.rfind(",go,").unwrap();
         let quoted = format!("{},\"go\",{}", &text[..last], &text[last + 4..]);
         let found = of_length(self::file(&quoted).path(), "run.csv", &options, 0).unwrap();
