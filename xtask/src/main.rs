@@ -133,7 +133,7 @@ const fn slow_of(name: &'static str, package: &'static str, example: &'static st
     }
 }
 
-const SLOW: [Slow; 16] = [
+const SLOW: [Slow; 18] = [
     slow_of("people-coverage", "hoid", "people_coverage"),
     Slow {
         program: Some("hoid-cli"),
@@ -149,6 +149,8 @@ const SLOW: [Slow; 16] = [
         ..slow_of("mutations", "hoid-io", "mutations")
     },
     slow_of("bombs", "hoid-io", "bombs"),
+    slow_of("long-csv", "hoid-io", "long_csv"),
+    slow_of("step-time", "hoid-core", "step_time"),
     Slow {
         profile: "dev",
         ..slow_of("hostile", "hoid-lab", "hostile")

@@ -25,6 +25,20 @@ pub enum AnalysisError {
     /// A file without the requested columns, which contains them under other names.
     #[error(transparent)]
     OtherColumns(Box<OtherColumns>),
+    /// A column that is in another of the files.
+    #[error(
+        "{file} has no column {missing}, but {other} has: each file is a recording of its own. Where both are one recording, join them \
+         by their times, in Python by pandas.merge(pandas.read_csv(\"{file}\"), pandas.read_csv(\"{other}\"), on=\"t\", how=\"outer\")\
+         .sort_values(\"t\").to_csv(\"joined.csv\", index=False), and read joined.csv with --sparse e=linear,u=linear --resample"
+    )]
+    InAnotherFile {
+        /// The file without the column.
+        file: String,
+        /// The column.
+        missing: String,
+        /// The file that has it.
+        other: String,
+    },
     /// An offset of a channel that does not exist.
     #[error("--offset: there is no channel {name:?}; the record has {known}, and e and u represent input and output")]
     NoSuchChannel {

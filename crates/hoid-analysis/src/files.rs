@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use hoid_io::{ReadRecord, read_prepared, read_segments};
+use hoid_io::{IoError, ReadRecord, read_prepared, read_segments, survey};
 use hoid_model::Record;
 
 use crate::{
@@ -23,7 +23,9 @@ impl Reading {
     ) -> Result<Recordings, AnalysisError> {
         let mut all = Recordings::default();
         for path in paths {
-            let reads = self.segments(path)?;
+            let reads = self
+                .segments(path)
+                .map_err(|error| in_another_file(error, path, paths))?;
             let parts = reads.len() > 1 || !self.mask.is_empty();
             for read in reads {
                 told(path, &read);
@@ -74,6 +76,26 @@ impl Reading {
             reading: self.clone(),
         });
         Ok(one)
+    }
+}
+
+/// Error for a column that is in another of the files: eye and stick, each with a rate of its own, are no two recordings.
+fn in_another_file(error: AnalysisError, path: &Path, paths: &[PathBuf]) -> AnalysisError {
+    let AnalysisError::Io(IoError::NoSuchColumn { missing, .. }) = &error else {
+        return error;
+    };
+    let has_it = |other: &&PathBuf| {
+        let found =
+            survey(other).is_ok_and(|found| found.columns.iter().any(|c| format!("\"{}\"", c.path) == *missing));
+        found && other.as_path() != path
+    };
+    match paths.iter().find(has_it) {
+        None => error,
+        Some(other) => AnalysisError::InAnotherFile {
+            file: path.display().to_string(),
+            missing: missing.clone(),
+            other: other.display().to_string(),
+        },
     }
 }
 

@@ -76,6 +76,7 @@ impl From<AnalysisError> for CliError {
                 let command = others.command(typed.map(|word| word.to_string_lossy().into_owned()));
                 Self::OtherColumns(format!("{}: {command}", others.found()))
             }
+            AnalysisError::InAnotherFile { .. } => Self::OtherColumns(error.to_string()),
             AnalysisError::SameSamples { .. }
             | AnalysisError::NoSuchChannel { .. }
             | AnalysisError::Options { .. }

@@ -301,28 +301,29 @@ fn not_convertible(reason: &NotConvertible) -> String {
 
 /// Crossover and margins in one line.
 pub fn margins(m: &MarginEstimates) -> String {
-    let or_none = |value: Option<Estimate>, unit: &str| match value {
-        Some(e) => {
-            let (value, error) = match e.standard_error {
-                Some(_) => with_uncertainty(&e),
-                None => (format!("{:.4}", e.value), String::new()),
-            };
-            let error = if error.is_empty() {
-                error
-            } else {
-                format!(" (standard error {error})")
-            };
-            format!("{value} {unit}{error}")
-        }
-        None => "none".to_owned(),
+    let shown = |value: &Estimate, unit: &str| {
+        let (value, error) = match value.standard_error {
+            Some(_) => with_uncertainty(value),
+            None => (format!("{:.4}", value.value), String::new()),
+        };
+        let error = match error.as_str() {
+            "" => error,
+            error => format!(" (standard error {error})"),
+        };
+        format!("{value} {unit}{error}")
     };
-    format!(
-        "Crossover frequency {}, phase margin {}; gain margin {} at {}.\n",
-        or_none(m.crossover_rad_s, "rad/s"),
-        or_none(m.phase_margin_deg, "deg"),
-        or_none(m.gain_margin_db, "dB"),
-        or_none(m.phase_crossover_rad_s, "rad/s"),
-    )
+    let crossover = match (&m.crossover_rad_s, &m.phase_margin_deg) {
+        (Some(crossover), Some(margin)) => {
+            let (crossover, margin) = (shown(crossover, "rad/s"), shown(margin, "deg"));
+            format!("Crossover frequency {crossover}, phase margin {margin}")
+        }
+        _ => "No crossover: the gain of the loop does not fall through one".to_owned(),
+    };
+    let gain = match (&m.gain_margin_db, &m.phase_crossover_rad_s) {
+        (Some(margin), Some(at)) => format!("gain margin {} at {}", shown(margin, "dB"), shown(at, "rad/s")),
+        _ => "no gain margin: the phase of the loop does not fall through -180 deg".to_owned(),
+    };
+    format!("{crossover}; {gain}.\n")
 }
 
 /// Crossover and margins of a known loop in one line, and each crossover if there are several.
@@ -521,4 +522,40 @@ pub fn candidates(choice: &Choice) -> String {
         ));
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_loop_without_a_margin_is_said_in_words() {
+        let known = |value: f64| {
+            Some(Estimate {
+                value,
+                standard_error: None,
+            })
+        };
+        let margins_of = |crossover: Option<Estimate>, gain: Option<Estimate>| {
+            margins(&MarginEstimates {
+                crossover_rad_s: crossover,
+                phase_margin_deg: crossover,
+                gain_margin_db: gain,
+                phase_crossover_rad_s: gain,
+            })
+        };
+        assert_eq!(
+            margins_of(known(2.0), known(3.0)),
+            "Crossover frequency 2.0000 rad/s, phase margin 2.0000 deg; gain margin 3.0000 dB at 3.0000 rad/s.\n"
+        );
+        assert_eq!(
+            margins_of(known(2.0), None),
+            "Crossover frequency 2.0000 rad/s, phase margin 2.0000 deg; no gain margin: the phase of the loop does not fall through \
+             -180 deg.\n"
+        );
+        assert!(
+            margins_of(None, known(3.0))
+                .starts_with("No crossover: the gain of the loop does not fall through one; gain")
+        );
+    }
 }

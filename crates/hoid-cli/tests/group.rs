@@ -117,7 +117,11 @@ fn a_virtual_experiment_is_analysed_and_reported() {
     // Again: refused, and with --resume nothing is computed twice.
     let (code, message) = bad(at, &["group", "people", "--out", "out"]);
     assert!(code == 1 && message.contains("--resume"), "{message}");
-    let found = json(at, &["group", "people", "--out", "out", "--csv", "--resume", "--json"]);
+    let resumed = ["group", "people", "--out", "out", "--csv", "--resume"];
+    let found = json(
+        at,
+        &[&resumed[..], &["--json", "--figure", "narrow.svg", "--width", "85mm"]].concat(),
+    );
     assert_eq!(found["runs"], 8);
     assert_eq!(found["failures"].as_array().map(Vec::len), Some(0));
     let people = found["people"].as_array().unwrap();
@@ -144,6 +148,35 @@ fn a_virtual_experiment_is_analysed_and_reported() {
             assert!(end(1) - end(0) > 2.0 * 1.96 * error, "{measure}");
         }
         assert!(person["verdict"]["level"].is_string());
+    }
+    // In a column of 85 mm each subject has a figure, whose text of 13 px in 420 has 7.5 pt; on a page they are side by side.
+    good(
+        at,
+        &[&resumed[..], &["--figure", "wide.svg", "--width", "170mm"]].concat(),
+    );
+    let figures: Vec<(String, String)> = files(at)
+        .into_iter()
+        .filter(|(name, _)| name.ends_with(".svg"))
+        .map(|(name, bytes)| (name, String::from_utf8(bytes).unwrap()))
+        .collect();
+    let names: Vec<&str> = figures.iter().map(|(name, _)| name.as_str()).collect();
+    let narrow = ["C1-S1", "C1-S2", "C3-S1", "C3-S2"].map(|of| format!("narrow-{of}.svg"));
+    assert_eq!(
+        names,
+        [
+            &narrow.each_ref().map(String::as_str)[..],
+            &["wide-C1.svg", "wide-C3.svg"]
+        ]
+        .concat()
+    );
+    for (name, svg) in &figures {
+        let (width, box_width) = if name.starts_with("narrow") {
+            (85, 420)
+        } else {
+            (170, 840)
+        };
+        assert!(svg.contains(&format!("width=\"{width}mm\"")), "{name}");
+        assert!(svg.contains(&format!("viewBox=\"0 0 {box_width} ")), "{name}");
     }
     // A modified file makes a different group.
     fs::write(

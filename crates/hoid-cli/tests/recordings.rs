@@ -265,3 +265,48 @@ fn wrong_preparations_are_told_in_the_users_words() {
         );
     }
 }
+
+/// Eye and stick in files of their own, at 100 and 50 Hz: the message names a way that reads them.
+#[test]
+fn two_files_at_two_rates_are_one_recording() {
+    let directory = recorded(|k, [t, e, u]| {
+        assert!(k >= 2);
+        vec![[t, e.to_degrees(), u]]
+    });
+    let at = directory.path();
+    let text = fs::read_to_string(at.join("run.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = text.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    let write = |name: &str, header: &str, row: &dyn Fn(usize, &[&str]) -> Option<String>| {
+        let lines: Vec<String> = rows.iter().enumerate().filter_map(|(k, cells)| row(k, cells)).collect();
+        fs::write(at.join(name), format!("{header}\n{}\n", lines.join("\n"))).unwrap();
+    };
+    write("eye.csv", "t,e", &|_, cells| Some(format!("{},{}", cells[0], cells[1])));
+    let slow = |k: usize, cells: &[&str]| k.is_multiple_of(2).then(|| format!("{},{}", cells[0], cells[2]));
+    write("stick.csv", "t,u", &slow);
+    let (code, message) = bad(at, &["identify", "eye.csv", "stick.csv"]);
+    assert_eq!(code, 1);
+    for part in [
+        "no column \"u\"",
+        "but stick.csv has",
+        "pandas.read_csv(\"eye.csv\")",
+        "how=\"outer\"",
+    ] {
+        assert!(message.contains(part), "{message}");
+    }
+    // What the line of pandas writes.
+    write("joined.csv", "t,e,u", &|k, cells| {
+        let u = if k.is_multiple_of(2) { cells[2] } else { "" };
+        Some(format!("{},{},{u}", cells[0], cells[1]))
+    });
+    let advised = message.split("joined.csv with ").nth(1).unwrap().trim();
+    let advised: Vec<&str> = advised.split(' ').collect();
+    let gain = |options: &[&str]| {
+        let found = json_of_any_worth(at, &[&["identify", "--json"], options].concat());
+        found["operator"]["K_e"]["value"].as_f64().unwrap()
+    };
+    let (joined, whole) = (gain(&[&["joined.csv"], &advised[..]].concat()), gain(&["run.csv"]));
+    assert!((joined / whole - 1.0).abs() < 0.03, "{joined} {whole}");
+    // Neither file alone, nor two runs without the column, is taken for such a pair.
+    let (_, alone) = bad(at, &["identify", "eye.csv"]);
+    assert!(!alone.contains("pandas"), "{alone}");
+}

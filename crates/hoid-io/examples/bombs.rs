@@ -7,13 +7,15 @@
 #[allow(dead_code)]
 #[path = "../tests/common/bombs/mod.rs"]
 mod bombs;
+#[path = "../tests/common/memory.rs"]
+mod memory;
 #[allow(dead_code)]
 #[path = "../tests/common/mutations/mod.rs"]
 mod mutations;
 
 use std::{fs, panic, path::PathBuf, process::ExitCode, time::Duration};
 
-use bombs::{FORMATS, burst, peak_kb};
+use bombs::{FORMATS, burst};
 
 const MOST_KB: u64 = 300_000;
 const LONGEST: Duration = Duration::from_secs(2);
@@ -34,7 +36,7 @@ fn main() -> ExitCode {
                 failed = true;
                 continue;
             };
-            let peak = peak_kb().unwrap_or(0);
+            let peak = memory::peak_kb().unwrap_or(0);
             if took > LONGEST || peak > MOST_KB {
                 println!("{format} {k}: {:.1} s, {} MB", took.as_secs_f64(), peak / 1000);
                 failed = true;

@@ -8,6 +8,8 @@
 #[allow(dead_code)]
 #[path = "common/bombs/mod.rs"]
 mod bombs;
+#[path = "common/memory.rs"]
+mod memory;
 #[allow(dead_code)]
 #[path = "common/mutations/mod.rs"]
 mod mutations;
@@ -17,7 +19,6 @@ use std::{fs, path::PathBuf};
 use bombs::{
     FORMATS, burst, mat, npz,
     parquet::{GROUP, Page, columns, groups, page},
-    peak_kb,
     zeros::{self, MEGABYTE},
 };
 use hoid_io::{read_any_scenario, read_fit, read_table, survey};
@@ -119,7 +120,7 @@ fn small_files_do_not_unpack_without_a_bound() {
     let said = read_fit(&at("long.json")).map(drop).unwrap_err().to_string();
     assert!(said.contains("more than 10 MB of settings"), "{said}");
     drop(values);
-    if let Some(peak) = peak_kb() {
+    if let Some(peak) = memory::peak_kb() {
         assert!(peak < MOST_KB, "{peak} kB");
     }
     for (format, ending, maker) in FORMATS {
@@ -127,7 +128,7 @@ fn small_files_do_not_unpack_without_a_bound() {
         let refused: u64 = (0..SAMPLE)
             .map(|k| {
                 let refused = burst(&path, maker, k).0.refused;
-                let peak = peak_kb().unwrap_or(0);
+                let peak = memory::peak_kb().unwrap_or(0);
                 assert!(peak < MOST_KB, "{format} {k}: {peak} kB");
                 refused
             })

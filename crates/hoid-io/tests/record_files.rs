@@ -403,3 +403,32 @@ fn a_constant_term_of_a_difference_is_no_fault() {
     assert_eq!(found("y", "-r"), ["constant: r is constant: 0"]);
     assert_eq!(found("r-u", "y").len(), 2);
 }
+
+#[test]
+fn only_the_columns_asked_for_are_kept() {
+    let directory = tempfile::tempdir().unwrap();
+    let csv = directory.path().join("run.csv");
+    fs::write(
+        &csv,
+        "time_ms,word,r,y,u,x,n\n0,a,1,0,5,7,9\n10,b,2,0,6,8,10\n20,c,4,1,7,9,\n",
+    )
+    .unwrap();
+    let options = |columns: &[&str]| ReadOptions {
+        input: Some("r-y".parse().unwrap()),
+        columns: Some(columns.iter().map(|name| (*name).to_owned()).collect()),
+        ..ReadOptions::default()
+    };
+    let names = |path: &Path, columns: &[&str]| -> Vec<String> {
+        let read = read_record(path, &options(columns)).unwrap();
+        assert_eq!(read.record.input(), [1.0, 2.0, 3.0]);
+        read.record.channels().map(|channel| channel.name.clone()).collect()
+    };
+    assert_eq!(names(&csv, &[]), ["r-y", "u", "r", "y"]);
+    assert_eq!(names(&csv, &["x"]), ["r-y", "u", "r", "y", "x"]);
+    let npz = directory.path().join("run.npz");
+    let all = read_record(&csv, &options(&["x"])).unwrap().record;
+    write_record(&npz, &all).unwrap();
+    assert_eq!(names(&npz, &[]), ["r-y", "u", "r", "y"]);
+    let error = read_record(&csv, &options(&["z"])).unwrap_err().to_string();
+    assert!(error.contains("\"z\"") && error.contains("word"), "{error}");
+}

@@ -116,6 +116,7 @@ impl From<AnalysisError> for Failure {
                 let of: Vec<String> = of.into_iter().map(estimator).collect();
                 bad_option(format!("{name} belongs to {}{instead}", of.join(", ")))
             }
+            AnalysisError::InAnotherFile { .. } => Self(FormatError::new_err(text)),
             AnalysisError::SameSamples { .. } | AnalysisError::NotAResult { .. } => Self(DataError::new_err(text)),
             AnalysisError::NoSuchChannel { .. }
             | AnalysisError::Options { .. }

@@ -20,7 +20,7 @@ type ReadParts<'py> = (Bound<'py, PyDict>, Vec<String>, Vec<String>);
 
 /// The record of a file, or the records between the masked parts.
 #[pyfunction]
-#[pyo3(signature = (path, *, input, output, time, trial, all_trials, sampling_frequency, start, stop, resample, fill, sparse, detrend, drop_repeated, unit, scale, offset, decimate,
+#[pyo3(signature = (path, *, input, output, time, trial, all_trials, sampling_frequency, start, stop, resample, fill, sparse, columns, detrend, drop_repeated, unit, scale, offset, decimate,
     new_sampling_frequency, run_in, mask, shortest))]
 #[allow(clippy::too_many_arguments)]
 pub fn read<'py>(
@@ -37,6 +37,7 @@ pub fn read<'py>(
     resample: bool,
     fill: bool,
     sparse: BTreeMap<String, String>,
+    columns: Option<Vec<String>>,
     detrend: &str,
     drop_repeated: bool,
     unit: BTreeMap<String, String>,
@@ -59,6 +60,7 @@ pub fn read<'py>(
         sampling_hz: sampling_frequency,
         span_s: (start, stop),
         sparse: names::sparse(sparse)?,
+        columns,
         repair: Repair { resample, fill },
     };
     let preparation = Preparation {

@@ -126,18 +126,31 @@ fn margins(fit: &FamilyFit, element: &ContinuousTransferFunction) -> Option<Marg
     })
 }
 
+/// Frequencies beyond the peak of the neuromuscular system that a figure shows, of its natural frequency.
+const BEYOND_PEAK: f64 = 1.5;
+
+/// The frequency to which the curves reach, also where the last line is below the peak that is reported; 0 if none is.
+fn reach_rad_s(fit: &FamilyFit) -> f64 {
+    let all = &fit.operator(0).parameters;
+    let peak = all.iter().find(|p| p.name == "omega_nm" && p.determined);
+    let nyquist = std::f64::consts::PI / fit.sample_time.s();
+    peak.map_or(0.0, |omega_nm| (BEYOND_PEAK * omega_nm.value).min(0.9 * nyquist))
+}
+
 /// The fitted operator: by prediction error with its band, at the lines, by instrumental variables.
 fn curves(fit: &FamilyFit, described: &Description) -> Vec<ModelCurve> {
     let half = 0.5 * fit.sample_time.s();
+    let reach = reach_rad_s(fit);
     let curve = |name: &str, operator: &FamilyOperator| {
         let turn = |omega: f64| Complex64::from_polar(1.0, -omega * half);
-        ModelCurve::over(described, name, operator.tau_e_s() + half, |omega| {
+        ModelCurve::over(described, reach, name, operator.tau_e_s() + half, |omega| {
             operator.response(omega) * turn(omega)
         })
     };
     let delay_s = fit.operator(0).operator.tau_e_s() + half;
     let mut all = vec![ModelCurve::with_band(
         described,
+        reach,
         "prediction error, band 95 %",
         delay_s,
         |omega| fit.frequency_response(0, omega),

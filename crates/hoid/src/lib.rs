@@ -42,6 +42,15 @@
 //! let simulator = Simulator::new(&Scenario::condition(Condition::C1))?;
 //! let record = simulator.run(RunSeed { seed: 1, ..RunSeed::default() }, false)?;
 //!
+//! // Options have types: two forms are compared, at the lines of the target and by prediction error.
+//! let family = FamilyEstimator {
+//!     forms: vec![Form::Gain, Form::Lead],
+//!     excitation: Some("f_t".to_owned()),
+//!     ..FamilyEstimator::default()
+//! };
+//! let person: FamilyFit = family.fit(std::slice::from_ref(&record))?;
+//! assert_eq!(person.form, Form::Lead);
+//!
 //! let orders = Structure::BoxJenkins.operator_orders(29);
 //! let fit = Estimator::new(Structure::BoxJenkins, orders).fit(&[record])?;
 //! let omega = fit.operator()?.omega_nm_rad_s;
@@ -89,12 +98,13 @@ pub mod prelude {
     pub use hoid_analysis::{Identification, Identified, Recordings, identify};
     pub use hoid_ident::{
         Choice, Constraint, Estimator, Fit, GreyBox, IdentError, InitialState, OrderRanges, choose_orders,
+        family::{FamilyEstimator, FamilyFit, OperatorPrior},
         identify_box_jenkins,
     };
     #[cfg(feature = "io")]
     pub use hoid_io::{ReadOptions, read, read_record, write_record};
     pub use hoid_model::{
-        Channel, OperatorParameters, Orders, PolynomialModel, Record, SampleTime, Structure,
+        Channel, FamilyOperator, Form, OperatorParameters, Orders, PolynomialModel, Record, SampleTime, Structure,
         scenario::{Condition, Scenario},
         uncertainty::{Estimate, OperatorEstimate},
     };

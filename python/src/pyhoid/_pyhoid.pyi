@@ -563,6 +563,7 @@ def read(
     resample: bool,
     fill: bool,
     sparse: dict[str, str],
+    columns: list[str] | None,
     detrend: str,
     drop_repeated: bool,
     unit: dict[str, str],

@@ -8,7 +8,7 @@ use super::parse::parse_width;
 
 #[derive(Debug, Args)]
 pub struct FigureArgs {
-    /// Draw what was found into this file (.svg; .pdf and .png where built with the feature pdf-png)
+    /// Draw what was found into this file (.svg; .pdf and .png where built with --features pdf-png)
     #[arg(long, value_name = "FILE")]
     pub figure: Option<PathBuf>,
     /// Width of the figure, as 85mm, 17cm or 3.3in [default: 420 pixels]

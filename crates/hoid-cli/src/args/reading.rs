@@ -48,6 +48,10 @@ pub struct ReadArgs {
     /// (linear), or drop those rows. May be repeated
     #[arg(long, value_name = "COLUMN=hold|linear|drop", value_parser = parse_sparse, value_delimiter = ',', allow_hyphen_values = true)]
     pub sparse: Vec<(String, Sparse)>,
+    /// Columns to keep beyond input, output and time, as f_t,r or none: of a long CSV file the others take neither time
+    /// nor memory [default: all]
+    #[arg(long, value_name = "COLUMN,...", value_delimiter = ',')]
+    pub columns: Option<Vec<String>>,
     #[command(flatten)]
     pub prepare: PrepareArgs,
     /// Take out the mean or the straight line of input and output, last
@@ -56,12 +60,23 @@ pub struct ReadArgs {
 }
 
 impl ReadArgs {
-    /// The same with the first input alone: further ones are channels of the record, which it has anyway.
+    /// The same with the first input alone: further ones are channels of the record, and are kept.
     pub fn with_one_input(&self) -> Self {
+        let further = self.inputs[1..].iter().cloned();
         Self {
             inputs: self.inputs[..1].to_vec(),
+            columns: self
+                .columns
+                .clone()
+                .map(|kept| kept.into_iter().chain(further).collect()),
             ..self.clone()
         }
+    }
+
+    /// The columns to keep in addition to input, output and time; `None` for all.
+    pub fn kept_columns(&self) -> Option<Vec<String>> {
+        let kept = self.columns.as_ref()?;
+        Some(kept.iter().filter(|column| *column != "none").cloned().collect())
     }
 }
 

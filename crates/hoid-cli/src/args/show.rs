@@ -12,7 +12,7 @@ pub struct ShowArgs {
     /// Print one JSON object instead of tables
     #[arg(long)]
     pub json: bool,
-    /// Write the estimates with errors and intervals as a table for a paper: .tex (booktabs), .md, .csv, .parquet ...
+    /// Write estimates, errors, intervals as a table for a paper: .tex (booktabs), .md, .csv, .parquet ...
     #[arg(long, value_name = "FILE")]
     pub table: Option<PathBuf>,
 }

@@ -58,6 +58,7 @@ fn options(args: &ReadArgs, with_input: bool) -> Result<ReadOptions, CliError> {
         sampling_hz: args.fs,
         span_s: (args.from, args.to),
         sparse: by_channel("--sparse", &args.sparse)?,
+        columns: args.kept_columns(),
         repair: Repair {
             resample: args.resample,
             fill: args.fill,

@@ -61,7 +61,7 @@ pub struct RecordedElement {
     pub delay_s: f64,
     /// Share of the power at u that it does not explain.
     pub unexplained: f64,
-    /// The frequency at which its response differs most, but for the delay, rad/s, and its response there as a
+    /// The frequency at which its response differs most, except for the delay, rad/s, and its response there as a
     /// multiple of that of the given element.
     pub difference: (f64, Complex64),
     /// Delay within which e and u count as aligned, s.
@@ -69,7 +69,7 @@ pub struct RecordedElement {
 }
 
 impl RecordedElement {
-    /// True if it has the response of the given element, but for a delay.
+    /// True if it has the response of the given element, except for a delay.
     pub fn is_given(&self) -> bool {
         self.difference.1.ln().norm() <= SAME
     }

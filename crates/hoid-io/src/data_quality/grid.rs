@@ -9,6 +9,10 @@
 //! The jitter is the deviation from straight lines over parts of 256 rows without a gap, so that
 //! slow drift does not count as jitter.
 
+use std::borrow::Cow;
+
+use crate::time::sampling::every;
+
 /// Rows of a part, and the fewest rows of one.
 const PART: usize = 256;
 const LEAST_PART: usize = 5;
@@ -47,12 +51,17 @@ impl Grid {
                 back.push(row);
             }
         }
-        let times: Vec<f64> = rows.iter().map(|row| t[*row]).collect();
+        // All rows of nearly every recording: these are not copied.
+        let times: Cow<'_, [f64]> = match rows.len() == t.len() {
+            true => Cow::Borrowed(t),
+            false => rows.iter().map(|row| t[*row]).collect(),
+        };
         // The median of single steps is exact without jitter; that of sixteen steps together
         // averages jitter out, where few rows are missing.
         let median = |length: usize| {
             let mut spans: Vec<f64> = times
                 .windows(length + 1)
+                .step_by(every(times.len()))
                 .map(|w| (w[length] - w[0]) / length as f64)
                 .collect();
             let middle = spans.len() / 2;
@@ -71,6 +80,10 @@ impl Grid {
                 let slope = slope(&times, &steps);
                 if slope.is_finite() && slope > 0.0 {
                     sample_time_s = slope;
+                }
+                if is_even(&times, &steps, sample_time_s) {
+                    // Followed again, no step would be another one.
+                    break;
                 }
             }
         }
@@ -122,6 +135,12 @@ impl Grid {
         }
         (freedom > 0).then(|| ((squares / freedom as f64).sqrt(), worst.0, worst.1))
     }
+}
+
+/// True if no row is missing and each time is near its place on the grid.
+fn is_even(times: &[f64], steps: &[f64], ts: f64) -> bool {
+    let near = |(i, t): (usize, &f64)| (t - times[0] - i as f64 * ts).abs() < 0.25 * ts;
+    steps.iter().all(|step| *step == 1.0) && times.iter().enumerate().all(near)
 }
 
 /// Computes the grid steps from row to row, one for each time.

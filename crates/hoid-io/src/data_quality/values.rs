@@ -1,7 +1,7 @@
 //! Saturation, quantisation, constants and missing values of one channel.
 //!
-//! A channel is quantised if its values, fewer than half as many as its rows, lie on a grid within
-//! `1e-3 q`, where q is the smallest step between two of them; the smallest and the largest may lie
+//! A channel is quantised if its values, fewer than half as many as its rows (of a long channel: its first
+//! [`EXAMINED`]), lie on a grid within `1e-3 q`, where q is the smallest step between two of them; the smallest and the largest may lie
 //! off the grid, as the end stops of a stick do.
 //!
 //! It is saturated at a limit if it stays there as no peak does. In full precision no two
@@ -24,6 +24,10 @@ const COARSE: f64 = 1e-2;
 const STAY: (usize, usize) = (3, 5);
 /// Ratio of the rows at the limit to the average of the next steps.
 const PEAK: usize = 6;
+
+/// Rows after which a channel whose values are different so far counts as one in full precision: hours of a recording. All
+/// its values in order would take longer than reading them.
+const EXAMINED: usize = 1 << 20;
 
 /// A saturation limit of a channel.
 pub(crate) struct Rail {
@@ -56,22 +60,26 @@ impl Levels {
     const END: usize = 4;
 
     pub(crate) fn of(values: &[f64]) -> Self {
-        let mut levels: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-        let finite = levels.len();
-        levels.sort_unstable_by(f64::total_cmp);
-        levels.dedup();
-        if let [first, .., last] = levels.as_slice() {
-            let range = last - first;
-            let mut kept: Option<f64> = None;
-            levels.retain(|level| {
-                let keep = kept.is_none_or(|kept| level - kept > 1e-12 * range);
-                if keep {
-                    kept = Some(*level);
-                }
-                keep
-            });
+        Self::examined(values, EXAMINED)
+    }
+
+    /// The levels, by the first rows where these are different.
+    fn examined(values: &[f64], most: usize) -> Self {
+        let rows = values.len();
+        let finite = values.iter().filter(|v| v.is_finite()).count();
+        if rows > most {
+            let first = distinct(&values[..most]);
+            if 2 * first.len() > most && first.len() > 2 * Self::END {
+                return Self {
+                    count: rows,
+                    rows,
+                    finite,
+                    kept: ends(values, &first),
+                };
+            }
         }
-        let (count, rows) = (levels.len(), values.len());
+        let mut levels = distinct(values);
+        let count = levels.len();
         if 2 * count > rows && count > 2 * Self::END {
             levels.drain(Self::END..count - Self::END);
             levels.shrink_to_fit();
@@ -109,6 +117,34 @@ impl Levels {
         };
         (step > 0.0 && step.is_finite() && inner.iter().all(|level| off(level) < 1e-3)).then_some((step, self.count))
     }
+}
+
+/// The levels of some values, in increasing order.
+fn distinct(values: &[f64]) -> Vec<f64> {
+    let mut levels: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    levels.sort_unstable_by(f64::total_cmp);
+    levels.dedup();
+    if let [first, .., last] = levels.as_slice() {
+        let least = 1e-12 * (last - first);
+        let mut kept: Option<f64> = None;
+        levels.retain(|level| {
+            let keep = kept.is_none_or(|kept| level - kept > least);
+            if keep {
+                kept = Some(*level);
+            }
+            keep
+        });
+    }
+    levels
+}
+
+/// The levels at both ends of many values, from those of the first ones: no level beyond these is at an end.
+fn ends(values: &[f64], first: &[f64]) -> Vec<f64> {
+    let (lower, upper) = (first[Levels::END - 1], first[first.len() - Levels::END]);
+    let outer: Vec<f64> = values.iter().copied().filter(|v| *v <= lower || *v >= upper).collect();
+    let mut levels = distinct(&outer);
+    levels.drain(Levels::END..levels.len() - Levels::END);
+    levels
 }
 
 /// Lower and upper saturation limits of a channel.
@@ -241,4 +277,30 @@ fn missing(
         at(first)
     );
     tell(QualityIssueKind::Missing, rows, rows as f64, "rows", places, text);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_channel_in_full_precision_is_known_by_its_first_rows() {
+        let wave = |k: usize| (0.37 * k as f64).sin() + 0.3 * (1.01 * k as f64).cos();
+        let mut values: Vec<f64> = (0..4000).map(wave).collect();
+        values[3000..3005].fill(2.0);
+        values[3500] = f64::NAN;
+        for most in [64, 1000, 3999] {
+            let (quick, all) = (Levels::examined(&values, most), Levels::of(&values));
+            assert_eq!((&quick.kept, quick.finite), (&all.kept, 3999));
+            assert!(!quick.is_coarse() && quick.quantum().is_none());
+            let found = rails(&values, &quick);
+            assert_eq!((found.len(), found[0].value, found[0].stays.len()), (1, 2.0, 1));
+            assert_eq!(found[0].stays[0], 3000..3005);
+        }
+        // In steps, all rows are examined: the largest level is in one of the last.
+        let mut coarse: Vec<f64> = values.iter().map(|v| (10.0 * v).round() / 10.0).collect();
+        coarse[3990] = 7.0;
+        let found = Levels::examined(&coarse, 64);
+        assert!(found.is_coarse() && found.kept.last() == Some(&7.0));
+    }
 }

@@ -11,7 +11,7 @@ use super::arrays::{Contents, output_table_of, table_of};
 use crate::IoError;
 use crate::record::{ReadOptions, trials};
 use crate::results::{OutputTable, TableSchema, Values};
-use crate::table::Table;
+use crate::table::{Table, check_selected, selected};
 use crate::time::with_time;
 
 /// A file format.
@@ -84,21 +84,14 @@ impl Format {
         file: &'a str,
         options: &ReadOptions,
     ) -> Result<Table<'a>, IoError> {
-        let (table, is_trial) = match self.reading {
-            Reading::Table { record, .. } => (record(bytes, file)?, false),
+        match self.reading {
+            Reading::Table { record, .. } => finished(record(bytes, file)?, false, options),
             Reading::Arrays(read) => {
                 let contents = read(std::mem::take(bytes), file)?;
                 let (contents, is_trial) = trials::of_contents(contents, options.trial.as_ref(), file)?;
-                (table_of(contents, options, file)?, is_trial)
+                finished(table_of(contents, options, file)?, is_trial, options)
             }
-        };
-        let table = with_time(table, options.time.as_ref())?;
-        // Samples that are counted need no time column, and a restarting one is ignored.
-        let by_itself = options.trial.is_none() && options.sampling_hz.is_some();
-        if is_trial || by_itself {
-            return Ok(table);
         }
-        trials::of_table(table, options.trial.as_ref())
     }
 
     /// Reads a table of results.
@@ -108,4 +101,17 @@ impl Format {
             Reading::Arrays(read) => output_table_of(read(bytes, file)?, file),
         }
     }
+}
+
+/// The table of the requested trial and columns, with its time.
+pub(super) fn finished<'a>(table: Table<'a>, is_trial: bool, options: &ReadOptions) -> Result<Table<'a>, IoError> {
+    let table = with_time(table, options.time.as_ref())?;
+    check_selected(&table.names(), options, table.source.file())?;
+    let table = selected(table, |_, name| name == "t" || options.wants(name));
+    // Samples that are counted need no time column, and a restarting one is ignored.
+    let by_itself = options.trial.is_none() && options.sampling_hz.is_some();
+    if is_trial || by_itself {
+        return Ok(table);
+    }
+    trials::of_table(table, options.trial.as_ref())
 }

@@ -1,11 +1,13 @@
 //! The format of a file by its extension, and the known extensions.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use super::format::{Format, Writing};
+use super::format::{Format, Writing, finished};
 use super::{ALL, csv, packed};
 use crate::IoError;
+use crate::record::ReadOptions;
+use crate::table::Table;
 
 /// The extensions of the files that can be read, for help texts and messages:
 /// `.csv (also as .txt), .tsv, ... or .xdf`.
@@ -136,14 +138,18 @@ pub(crate) fn format_to_write(path: &Path) -> Result<&'static Format, IoError> {
     })
 }
 
+/// The name of a packed text without `.gz`. Only text is packed: binary formats compress their columns themselves.
+fn packed_text(path: &Path) -> Option<PathBuf> {
+    packed::inner(path).filter(|inner| format_of(inner).is_some_and(|format| format.name == csv::CSV.name))
+}
+
 /// The format of a file, and its bytes.
 pub(crate) fn bytes_of(path: &Path) -> Result<(&'static Format, Vec<u8>), IoError> {
     let file = || path.display().to_string();
     if path.is_dir() {
         return Err(IoError::Directory { file: file() });
     }
-    // Only text is packed: binary formats compress their columns themselves.
-    let inner = packed::inner(path).filter(|inner| format_of(inner).is_some_and(|format| format.name == csv::CSV.name));
+    let inner = packed_text(path);
     let plain = inner.as_deref().unwrap_or(path);
     let format = format_to_read(plain)?;
     let mut bytes = fs::read(path).map_err(|source| IoError::Unreadable { file: file(), source })?;
@@ -154,6 +160,42 @@ pub(crate) fn bytes_of(path: &Path) -> Result<(&'static Format, Vec<u8>), IoErro
         bytes = packed::with_sidecar(bytes, plain);
     }
     Ok((format, bytes))
+}
+
+/// The format and the table of a long text of plain numbers, read block by block; `None` for any other file.
+///
+/// # Errors
+/// [`IoError::Unreadable`].
+pub(crate) fn long_text<'a>(
+    path: &Path,
+    file: &'a str,
+    options: &ReadOptions,
+) -> Result<Option<(&'static Format, Table<'a>)>, IoError> {
+    let text = format_of(path).filter(|format| format.name == csv::CSV.name);
+    let table = text.map(|_| csv::long_table(path, file, options)).transpose();
+    let unreadable = |source| IoError::Unreadable {
+        file: file.to_owned(),
+        source,
+    };
+    Ok(text.zip(table.map_err(unreadable)?.flatten()))
+}
+
+/// The requested columns of a file of any format, whose table may borrow from `bytes`.
+///
+/// # Errors
+/// As for reading a record.
+pub(crate) fn table_of_file<'a>(
+    path: &Path,
+    file: &'a str,
+    bytes: &'a mut Vec<u8>,
+    options: &ReadOptions,
+) -> Result<Table<'a>, IoError> {
+    if let Some((_, table)) = long_text(path, file, options)? {
+        return finished(table, false, options);
+    }
+    let (format, read) = bytes_of(path)?;
+    *bytes = read;
+    format.table(bytes, file, options)
 }
 
 #[cfg(test)]

@@ -38,7 +38,7 @@ mod xdf;
 pub(crate) use budget::Settings;
 pub(crate) use csv::write_record as write_record_as_csv;
 pub(crate) use format::{ColumnsWriter, Format, Reading, RowWriter, Writing};
-pub(crate) use lookup::{bytes_of, format_to_write};
+pub(crate) use lookup::{bytes_of, format_to_write, long_text, table_of_file};
 pub use lookup::{readable_endings, writable_endings};
 
 /// All formats, in the order in which messages name them. No two share an extension.

@@ -15,7 +15,7 @@ use super::from_table::{ReadRecord, record_of};
 use super::read_options::ReadOptions;
 use super::sparse::without_gaps;
 use crate::IoError;
-use crate::formats::bytes_of;
+use crate::formats::table_of_file;
 use crate::preparation::{NewRate, Offset, Preparation, Step};
 
 /// Additional rows beyond the span for an offset between samples.
@@ -66,8 +66,8 @@ pub fn read_aligned(
 /// Reads the record as recorded.
 pub(super) fn read_as_recorded(path: &Path, options: &ReadOptions, drop_repeated: bool) -> Result<ReadRecord, IoError> {
     let file = path.display().to_string();
-    let (format, mut bytes) = bytes_of(path)?;
-    let (table, steps) = without_gaps(format.table(&mut bytes, &file, options)?, options)?;
+    let mut bytes = Vec::new();
+    let (table, steps) = without_gaps(table_of_file(path, &file, &mut bytes, options)?, options)?;
     let label = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     let read = record_of(table, options, drop_repeated)?;
     Ok(ReadRecord {

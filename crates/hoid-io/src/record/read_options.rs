@@ -59,6 +59,9 @@ pub struct ReadOptions {
     /// Columns that were logged at instants of their own, so that some rows lack their value; `e` and `u` are input and
     /// output where no column has that name. By default none.
     pub sparse: BTreeMap<String, Sparse>,
+    /// Columns to keep in addition to input, output and time, by their names; by default all. Of a CSV file the others are not
+    /// held in memory.
+    pub columns: Option<Vec<String>>,
     /// Permitted repairs.
     pub repair: Repair,
 }
@@ -73,8 +76,22 @@ impl Default for ReadOptions {
             sampling_hz: None,
             span_s: (None, None),
             sparse: BTreeMap::new(),
+            columns: None,
             repair: Repair::default(),
         }
+    }
+}
+
+impl ReadOptions {
+    /// True if a column is to be read; the time is another matter.
+    pub(crate) fn wants(&self, name: &str) -> bool {
+        let is_term = |signal: &ColumnExpression| signal.terms().contains(&name);
+        self.columns.as_ref().is_none_or(|kept| {
+            kept.iter().any(|column| column == name)
+                || self.input.iter().chain([&self.output]).any(is_term)
+                || self.sparse.contains_key(name)
+                || self.trial.as_ref().is_some_and(|trial| trial.column == name)
+        })
     }
 }
 

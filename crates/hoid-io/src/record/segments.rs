@@ -16,7 +16,7 @@ use super::read_options::{ReadOptions, TrialChoice};
 use super::sparse::without_gaps;
 use crate::IoError;
 use crate::data_quality::{QualityIssue, QualityIssueKind, issues_of_record};
-use crate::formats::bytes_of;
+use crate::formats::table_of_file;
 use crate::preparation::{Preparation, Step};
 use crate::wording::{decimal, list};
 
@@ -103,8 +103,8 @@ fn read_trial(
             "a time of 0 s or more",
         ));
     }
-    let (format, mut bytes) = bytes_of(path)?;
-    let (table, _) = without_gaps(format.table(&mut bytes, &file, options)?, options)?;
+    let mut bytes = Vec::new();
+    let (table, _) = without_gaps(table_of_file(path, &file, &mut bytes, options)?, options)?;
     let (quality_issues, rows) = issues_of_record(&table, options)?;
     let time = table.names().iter().position(|name| *name == "t");
     let at = |row: usize| match (time, options.sampling_hz) {

@@ -12,7 +12,8 @@ use super::values::{ValueSurvey, values};
 use crate::IoError;
 use crate::data_quality::{QualityIssue, QualityIssueKind, Signal, Signals, issues_of, names_a_clock};
 use crate::formats::arrays::TIMES;
-use crate::formats::{Reading, bytes_of};
+use crate::formats::{Format, Reading, bytes_of, long_text};
+use crate::record::ReadOptions;
 use crate::time::with_time;
 
 /// Contents of a file.
@@ -51,11 +52,7 @@ pub struct ColumnSurvey {
 /// As for reading: [`IoError`], naming the place in the file.
 pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
     let file = path.display().to_string();
-    let (format, mut bytes) = bytes_of(path)?;
-    let (columns, notes) = match format.reading {
-        Reading::Table { record, .. } => of_table(with_time(record(&mut bytes, &file)?, None)?),
-        Reading::Arrays(read) => of_arrays(&read(bytes, &file)?),
-    };
+    let (format, columns, notes) = columns_of(path, &file)?;
     let is_time = |column: &&RawColumn| TIMES.contains(&column.name.as_str()) && column.rows > 1;
     let samplings = columns
         .iter()
@@ -77,6 +74,20 @@ pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
         columns: columns.into_iter().map(survey).collect(),
         notes,
     })
+}
+
+/// Format, columns and notes of a file.
+fn columns_of(path: &Path, file: &str) -> Result<(&'static Format, Vec<RawColumn>, Vec<String>), IoError> {
+    if let Some((format, table)) = long_text(path, file, &ReadOptions::default())? {
+        let (columns, notes) = of_table(with_time(table, None)?);
+        return Ok((format, columns, notes));
+    }
+    let (format, mut bytes) = bytes_of(path)?;
+    let (columns, notes) = match format.reading {
+        Reading::Table { record, .. } => of_table(with_time(record(&mut bytes, file)?, None)?),
+        Reading::Arrays(read) => of_arrays(&read(bytes, file)?),
+    };
+    Ok((format, columns, notes))
 }
 
 fn signal(column: &RawColumn) -> Signal<'_> {

@@ -4,9 +4,20 @@
 //! as a word, as in `Tracking error`, `stick [V]` or `e (deg)`. A single letter counts only as the first word.
 
 /// Names of the error, the most specific first.
-const ERRORS: [&str; 6] = ["e", "error", "err", "tracking_error", "tracking error", "e_t"];
+const ERRORS: [&str; 10] = [
+    "e",
+    "error",
+    "err",
+    "tracking_error",
+    "tracking error",
+    "e_t",
+    "fehler",
+    "regelfehler",
+    "regelabweichung",
+    "erreur",
+];
 /// Names of the control.
-const CONTROLS: [&str; 8] = [
+const CONTROLS: [&str; 13] = [
     "u",
     "control",
     "stick",
@@ -15,6 +26,11 @@ const CONTROLS: [&str; 8] = [
     "control_input",
     "joystick",
     "delta",
+    "knüppel",
+    "steuerknüppel",
+    "stellgröße",
+    "commande",
+    "manche",
 ];
 
 /// The column whose name denotes the tracking error.
@@ -63,6 +79,11 @@ mod tests {
             Some("Stick [V]")
         );
         assert_eq!(error_among(&["e (deg)", "u (deg)"]), Some("e (deg)"));
+        let german = ["Zeit [s]", "Fehler [deg]", "Knüppel [V]"];
+        assert_eq!(
+            (error_among(&german), control_among(&german)),
+            (Some(german[1]), Some(german[2]))
+        );
         assert_eq!(control_among(&["stick force", "stick position"]), None);
         assert_eq!(error_among(&["phase e", "terror", ""]), None);
     }

@@ -7,6 +7,7 @@
 //! | `cell` | [`Cell`]: numbers with a point or a comma, the words for a missing value |
 //! | `precision` | [`Precision`]: how exactly a column is printed |
 //! | `column_expression` | [`ColumnExpression`]: which columns are the input and the output |
+//! | `selection` | the columns that are kept, if not all are |
 //! | `common_names` | error and control by the names that people give their columns |
 
 mod cell;
@@ -14,6 +15,7 @@ pub(crate) mod column_expression;
 mod columns;
 mod common_names;
 mod precision;
+mod selection;
 
 pub(crate) use cell::{Cell, DECIMAL_COMMA, has_decimal_comma, with_decimal_point};
 pub use column_expression::ColumnExpression;
@@ -21,3 +23,4 @@ pub(crate) use column_expression::Signal;
 pub(crate) use columns::{Column, Source, Table, UNITS_ROW, asides, check_names, check_number, kept};
 pub use common_names::{control_among, error_among};
 pub(crate) use precision::Precision;
+pub(crate) use selection::{check_selected, selected};

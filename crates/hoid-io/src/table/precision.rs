@@ -89,6 +89,15 @@ impl Precision {
         }
     }
 
+    /// The size below which the unit is that of fixed decimals, and that unit.
+    pub(crate) fn fixed_unit(self) -> (f64, f64) {
+        match self.decimals {
+            None => (f64::INFINITY, 0.0),
+            Some(decimals) if self.significant == 0 => (f64::INFINITY, 10_f64.powi(-decimals)),
+            Some(decimals) => (10_f64.powi(self.significant - decimals), 10_f64.powi(-decimals)),
+        }
+    }
+
     /// One unit of the last printed digit of a value of this size. Fixed decimals give the same
     /// unit everywhere; with a fixed number of significant digits the unit grows with the value.
     pub(crate) fn unit(self, value: f64) -> f64 {
@@ -124,6 +133,18 @@ mod tests {
         assert!((significant.unit(0.016667) - 1e-6).abs() < 1e-18);
         assert!((precision(&["1.67e-02", "1.00e-01"]).unit(0.0167) - 1e-4).abs() < 1e-18);
         assert_eq!(precision(&["0", "1", "120"]).unit(3.0), 1.0);
+        for texts in [
+            &["0.00", "12.34"][..],
+            &["0", "0.016667", "1.0167", "100.02"],
+            &["1.67e-02", "1.00e-01"],
+            &["120"],
+        ] {
+            let (limit, unit) = precision(texts).fixed_unit();
+            for value in [0.5, 0.99, 0.999_999] {
+                assert_eq!(precision(texts).unit(value * limit), unit, "{texts:?}");
+            }
+            assert!(precision(texts).unit(10.0 * limit) > unit, "{texts:?}");
+        }
         assert!(precision(&["0.30000000000000004"]).unit(0.3) < 1e-15);
         assert_eq!(Precision::default().unit(3.0), 0.0);
         // Any content of a file gives a number of s.

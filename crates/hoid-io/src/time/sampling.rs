@@ -71,7 +71,8 @@ pub(crate) fn even(t: &[f64], precision: Precision, stated_s: Option<f64>) -> Re
     let typical_s = typical_step(t, rounding);
     gap(t, rounding, typical_s)?;
     let mean_s = (last - first) / steps;
-    let tolerance = |k: usize| (JITTER * mean_s).max(rounding.unit(t[k]).max(rounding.unit(first)) * (1.0 + 1e-6));
+    let first_unit = rounding.unit(first);
+    let tolerance = |k: usize| (JITTER * mean_s).max(rounding.unit(t[k]).max(first_unit) * (1.0 + 1e-6));
     // The excess over the tolerance decides; NaN, from times that overflow, is excess as well.
     let deviation = |k: usize| (t[k] - (first + k as f64 * mean_s)).abs();
     let excess = |k: &usize| deviation(*k) - tolerance(*k);
@@ -130,19 +131,28 @@ fn increasing(t: &[f64]) -> Result<(), Uneven> {
     }
 }
 
+/// Every how many steps of a long time suffice for its median: a million.
+pub(crate) fn every(times: usize) -> usize {
+    (times >> 20).max(1)
+}
+
 /// Largest rounding error of a printed t.
 #[derive(Clone, Copy)]
 struct Rounding {
     precision: Precision,
+    /// [`Precision::fixed_unit`]: for nearly all times no logarithm is needed.
+    fixed: (f64, f64),
     median_step_s: f64,
 }
 
 impl Rounding {
     fn of(t: &[f64], precision: Precision) -> Self {
-        let mut steps: Vec<f64> = t.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let pairs = t.windows(2).step_by(every(t.len()));
+        let mut steps: Vec<f64> = pairs.map(|pair| pair[1] - pair[0]).collect();
         let middle = steps.len() / 2;
         Self {
             precision,
+            fixed: precision.fixed_unit(),
             median_step_s: *steps.select_nth_unstable_by(middle, f64::total_cmp).1,
         }
     }
@@ -150,7 +160,9 @@ impl Rounding {
     /// One unit of the last digit of t, but at most the median step: a coarser t would have been
     /// constant.
     fn unit(self, t: f64) -> f64 {
-        self.precision.unit(t).min(self.median_step_s)
+        let (limit, fixed) = self.fixed;
+        let unit = if t.abs() < limit { fixed } else { self.precision.unit(t) };
+        unit.min(self.median_step_s)
     }
 }
 

@@ -72,6 +72,19 @@ pub(crate) fn is_time(name: &str) -> bool {
     column_role(name) != ColumnRole::Other
 }
 
+/// True if a column may be the time or a part of it, by its name and position or as chosen.
+pub(crate) fn may_be_time(at: usize, name: &str, choice: Option<&TimeChoice>) -> bool {
+    let last = name.to_lowercase();
+    let last = last.rsplit(['.', '_', '/', ' ']).next().unwrap_or_default();
+    let is_part = matches!(Unit::of(last), Some(Unit::Power(0 | -9)));
+    let is_chosen = choice.is_some_and(|choice| choice.column.split('+').any(|part| part == name));
+    is_time(name)
+        || is_part
+        || is_chosen
+        || choice.is_some_and(|choice| choice.column == name)
+        || (at == 0 && name.is_empty())
+}
+
 /// The table with a column t in s, if a column is a time or was selected as such.
 pub(crate) fn with_time<'a>(mut table: Table<'a>, choice: Option<&TimeChoice>) -> Result<Table<'a>, IoError> {
     let found = match choice {

@@ -40,8 +40,14 @@ pub struct ModelCurve {
 
 impl ModelCurve {
     /// A response over the frequency range of a description with a small margin.
-    pub fn over(found: &Description, name: &str, delay_s: f64, response: impl Fn(f64) -> Complex64) -> Self {
-        let omega_rad_s = frequencies(found);
+    pub fn over(
+        found: &Description,
+        reach_rad_s: f64,
+        name: &str,
+        delay_s: f64,
+        response: impl Fn(f64) -> Complex64,
+    ) -> Self {
+        let omega_rad_s = frequencies(found, reach_rad_s);
         Self {
             name: name.to_owned(),
             response: omega_rad_s.iter().map(|omega| response(*omega)).collect(),
@@ -54,11 +60,12 @@ impl ModelCurve {
     /// A response with its standard errors over the same frequencies.
     pub fn with_band(
         found: &Description,
+        reach_rad_s: f64,
         name: &str,
         delay_s: f64,
         response: impl Fn(&[f64]) -> Vec<ResponsePoint>,
     ) -> Self {
-        let points = response(&frequencies(found));
+        let points = response(&frequencies(found, reach_rad_s));
         let value = |p: &ResponsePoint| {
             let gain = 10.0_f64.powf(p.magnitude_db.value / 20.0);
             Complex64::from_polar(gain, p.phase_deg.value.to_radians())
@@ -107,10 +114,11 @@ impl ModelCurve {
 }
 
 /// The frequency range of a description with a small margin, rad/s.
-fn frequencies(found: &Description) -> Vec<f64> {
+fn frequencies(found: &Description, reach_rad_s: f64) -> Vec<f64> {
     let lines = &found.function.lines;
     let ends = lines.first().zip(lines.last());
     let (low, high) = ends.map_or((0.1, 10.0), |(a, b)| (0.9 * a.omega_rad_s, 1.1 * b.omega_rad_s));
+    let high = f64::max(high, reach_rad_s);
     let step = (high / low).ln() / (POINTS - 1) as f64;
     (0..POINTS).map(|k| low * (step * k as f64).exp()).collect()
 }
@@ -249,7 +257,7 @@ mod tests {
     #[test]
     fn a_model_lies_in_the_turn_of_the_points() {
         let found = described(4);
-        let model = |turn: f64| ModelCurve::over(&found, "m", 0.3, |w| Complex64::from_polar(2.0, turn - 0.3 * w));
+        let model = |turn: f64| ModelCurve::over(&found, 0.0, "m", 0.3, |w| Complex64::from_polar(2.0, turn - 0.3 * w));
         let points: Vec<(f64, f64)> = found
             .function
             .lines
@@ -276,7 +284,7 @@ mod tests {
     fn a_model_has_its_band() {
         let found = described(4);
         let of = |error: Option<f64>| {
-            ModelCurve::with_band(&found, "m", 0.3, |omega| {
+            ModelCurve::with_band(&found, 0.0, "m", 0.3, |omega| {
                 let point = |&omega_rad_s: &f64| ResponsePoint {
                     omega_rad_s,
                     magnitude_db: Estimate {
@@ -309,7 +317,9 @@ mod tests {
     #[test]
     fn the_figure_has_points_models_and_coherence() {
         let found = described(4);
-        let model = ModelCurve::over(&found, "gain and delay", 0.3, |w| Complex64::from_polar(2.0, -0.3 * w));
+        let model = ModelCurve::over(&found, 0.0, "gain and delay", 0.3, |w| {
+            Complex64::from_polar(2.0, -0.3 * w)
+        });
         let svg = describing("d", "t", &found, std::slice::from_ref(&model));
         for text in [
             "magnitude",
@@ -328,9 +338,22 @@ mod tests {
     }
 
     #[test]
+    fn curves_reach_beyond_the_last_line() {
+        let found = described(4);
+        let last = found.function.lines.last().unwrap().omega_rad_s;
+        for (asked, reached) in [(0.0, 1.1 * last), (last, 1.1 * last), (3.0 * last, 3.0 * last)] {
+            let curve = ModelCurve::over(&found, asked, "m", 0.3, |_| Complex64::new(1.0, 0.0));
+            assert!(
+                (curve.omega_rad_s.last().unwrap() / reached - 1.0).abs() < 1e-12,
+                "{asked}"
+            );
+        }
+    }
+
+    #[test]
     fn models_that_agree_are_all_seen() {
         let found = described(4);
-        let model = |name: &str| ModelCurve::over(&found, name, 0.3, |w| Complex64::from_polar(2.0, -0.3 * w));
+        let model = |name: &str| ModelCurve::over(&found, 0.0, name, 0.3, |w| Complex64::from_polar(2.0, -0.3 * w));
         let broken = |models: &[ModelCurve]| describing("d", "t", &found, models).matches("stroke-dasharray").count();
         let (none, one) = (broken(&[]), broken(&[model("a")]));
         let (two, three) = (broken(&[model("a"), model("b")]), broken(&["a", "b", "c"].map(model)));

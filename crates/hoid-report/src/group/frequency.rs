@@ -65,14 +65,14 @@ impl GroupReport<'_> {
     /// Bode points of the describing functions, one figure for each condition with a column for
     /// each of its subjects.
     pub(super) fn describing_functions(&self) -> Vec<Value> {
-        let figures = self.describing_figures().into_iter();
+        let figures = self.describing_figures(false).into_iter();
         figures
             .map(|(condition, figure)| context! { condition, figure })
             .collect()
     }
 
-    /// The same as pairs of condition and SVG text.
-    pub(super) fn describing_figures(&self) -> Vec<(String, String)> {
+    /// The same as pairs of condition and SVG text; narrow ones have a single column, of one subject.
+    pub(super) fn describing_figures(&self, narrow: bool) -> Vec<(String, String)> {
         let Some(lines) = self.tables.frequencies.map(|f| f.lines) else {
             return Vec::new();
         };
@@ -116,20 +116,22 @@ impl GroupReport<'_> {
             let there = subjects.iter().filter(took_part);
             there.map(|subject| column(condition, subject)).collect()
         };
-        conditions
-            .iter()
-            .map(|condition| (condition, columns(condition)))
-            .filter(|(_, columns)| !columns.is_empty())
-            .map(|(condition, columns)| {
-                let id = id_of("describing", condition);
-                let figure = bode_grid(
-                    &id,
-                    &format!("Describing functions, condition {condition}"),
-                    &BodeGrid { columns },
-                );
-                (condition.to_string(), figure)
-            })
-            .collect()
+        let mut figures = Vec::new();
+        for condition in conditions.iter() {
+            let all = columns(condition);
+            let title = format!("Describing functions, condition {condition}");
+            if narrow && all.len() > 1 {
+                for column in all {
+                    let name = format!("{condition}-{}", column.title.trim_start_matches("subject "));
+                    let grid = BodeGrid { columns: vec![column] };
+                    figures.push((name.clone(), bode_grid(&id_of("describing", &name), &title, &grid)));
+                }
+            } else if !all.is_empty() {
+                let figure = bode_grid(&id_of("describing", condition), &title, &BodeGrid { columns: all });
+                figures.push((condition.to_string(), figure));
+            }
+        }
+        figures
     }
 
     /// Delay of a person, s, for unwrapping the phase between two lines; 0 if unknown.

@@ -71,12 +71,20 @@ impl Tables {
     }
 }
 
+/// Least width of a figure of several columns, mm: their text has 6 pt then, as journals require.
+const PAGE_MM: f64 = 137.0;
+
 /// The describing functions of a finished group with the fitted operators, one figure for each
-/// condition: its name and the SVG text. None if no condition has a periodic excitation.
+/// condition: its name and the SVG text. None if no condition has a periodic excitation. For a width of one text column
+/// there is a figure for each subject, whose text stays legible.
 ///
 /// # Errors
 /// As [`write_group_pages`].
-pub fn group_figures(manifest: &Manifest, out: &Path) -> Result<Vec<(String, String)>, ReportError> {
+pub fn group_figures(
+    manifest: &Manifest,
+    out: &Path,
+    width_mm: Option<f64>,
+) -> Result<Vec<(String, String)>, ReportError> {
     let tables = Tables::read(out)?;
     let report = GroupReport {
         manifest,
@@ -85,7 +93,7 @@ pub fn group_figures(manifest: &Manifest, out: &Path) -> Result<Vec<(String, Str
         settings: Vec::new(),
         subject: None,
     };
-    Ok(report.describing_figures())
+    Ok(report.describing_figures(width_mm.is_some_and(|width| width < PAGE_MM)))
 }
 
 /// Writes the page of the group and one for each subject to the directory of its tables; `path` is

@@ -36,6 +36,7 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
         sampling_hz: reading.sampling_hz,
         span_s: (reading.from_s, reading.to_s),
         sparse: reading.sparse()?,
+        columns: None,
         repair: Repair {
             resample: reading.resample,
             fill: reading.fill,

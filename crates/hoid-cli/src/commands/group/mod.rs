@@ -181,7 +181,11 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
     let summary = GroupSummary::read(&manifest, out)?;
     let pages = shown(&write_group_pages(&manifest, path, out)?);
     if let Some(place) = &args.picture.figure {
-        draw(&group_figures(&manifest, out)?, place, args.picture.width)?;
+        draw(
+            &group_figures(&manifest, out, args.picture.width)?,
+            place,
+            args.picture.width,
+        )?;
     }
     let pooled = match args.pool {
         true => Some(pooled::pooled(&manifest, &summary, out)?),

@@ -5,16 +5,21 @@
 //! | `foreign` | what other programs write, made plain |
 //! | `text` | encoding, comments, separator, lines |
 //! | `table`, `plain` | the columns of a record; its rows of plain numbers, fast |
+//! | `long` | a long text of plain numbers, block by block |
+//! | `span_end` | where it ends being read, for a span |
 //! | `record` | a record into CSV |
 //! | `columns` | tables of results, out and in |
 
 mod columns;
 mod foreign;
+mod long;
 mod plain;
 mod record;
+mod span_end;
 mod table;
 mod text;
 
+pub(super) use long::table as long_table;
 pub(crate) use record::write_with_commas as write_record;
 
 use crate::formats::format::{Format, Reading, Writing};

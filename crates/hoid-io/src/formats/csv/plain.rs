@@ -1,7 +1,7 @@
 //! Fast reader for rows of plain numbers, as nearly all rows of a recording are.
 //!
 //! A row is plain if each of its cells is empty or a number with a decimal point, with at most
-//! blanks around it. Any other row (texts, quotes, comments, too many or too few cells) ends the
+//! blanks around it, and those of columns that were not asked for any text without quotes. Any other row (texts, quotes, comments, too many or too few cells) ends the
 //! run, and is read by the full CSV reader ([`super::table`]). The numbers are the same, correctly
 //! rounded by both (D. Lemire, *Software: Practice and Experience* 51 (2021) 1700-1727).
 //!
@@ -19,10 +19,7 @@ const PART: usize = 4 << 20;
 const FIRST: usize = 64 << 10;
 /// Maximum number of threads.
 const THREADS: usize = 8;
-/// Interval of the rows whose position is kept.
-const KEPT: usize = 1024;
-
-/// Positions of the rows of a table in its text: every [`KEPT`]-th, and the last.
+/// Positions of the rows of a table in its text: every [`KEPT`](RowStarts::KEPT)-th, and the last.
 #[derive(Debug, Default)]
 pub(super) struct RowStarts {
     kept: Vec<usize>,
@@ -31,9 +28,12 @@ pub(super) struct RowStarts {
 }
 
 impl RowStarts {
+    /// Interval of the rows whose position is kept.
+    pub(super) const KEPT: usize = 1024;
+
     /// Adds a row.
     pub(super) fn push(&mut self, start: usize) {
-        if self.rows.is_multiple_of(KEPT) {
+        if self.rows.is_multiple_of(Self::KEPT) {
             self.kept.push(start);
         }
         self.rows += 1;
@@ -52,8 +52,8 @@ impl RowStarts {
 
     /// The nearest row at or before `row` whose position is kept, and that position.
     pub(super) fn before(&self, row: usize) -> Option<(usize, usize)> {
-        let at = self.kept.get(row / KEPT)?;
-        Some((row / KEPT * KEPT, *at))
+        let at = self.kept.get(row / Self::KEPT)?;
+        Some((row / Self::KEPT * Self::KEPT, *at))
     }
 }
 
@@ -70,11 +70,13 @@ pub(super) struct Plain {
     pub(super) end: usize,
 }
 
-/// Layout of the rows: the separator, and the columns whose precision is requested.
+/// Layout of the rows: the separator, the columns whose precision is requested, and those whose values are.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Layout<'a> {
     pub(super) separator: u8,
     pub(super) with_precision: &'a [bool],
+    /// Cells of other columns may hold any text without quotes.
+    pub(super) wanted: &'a [bool],
 }
 
 /// Passes on the plain rows from `from` on, in runs, in their order.
@@ -148,6 +150,13 @@ impl Plain {
 fn run(bytes: &[u8], part: Range<usize>, layout: Layout<'_>) -> Plain {
     let columns = layout.with_precision.len();
     let mut found = Plain::nothing(layout, part.start);
+    // Rows are about as long as the first one.
+    let line = bytes[part.clone()].iter().position(|byte| *byte == b'\n').unwrap_or(0) + 1;
+    let rows = part.len() / line + part.len() / line / 16 + 1;
+    for (values, wanted) in found.values.iter_mut().zip(layout.wanted) {
+        values.reserve(if *wanted { rows } else { 0 });
+    }
+    found.starts.reserve(rows);
     let mut row = vec![f64::NAN; columns];
     let mut printed = vec![0..0; columns];
     while found.end < part.end {
@@ -157,11 +166,14 @@ fn run(bytes: &[u8], part: Range<usize>, layout: Layout<'_>) -> Plain {
             found.end += 1;
             continue;
         }
-        let Some(end) = plain_row(&bytes[..part.end], start, layout.separator, &mut row, &mut printed) else {
+        let Some(end) = plain_row(&bytes[..part.end], start, layout, &mut row, &mut printed) else {
             break;
         };
         found.starts.push(start);
         for (column, value) in row.iter().enumerate() {
+            if !layout.wanted[column] {
+                continue;
+            }
             found.values[column].push(*value);
             if layout.with_precision[column] && !value.is_nan() {
                 found.precision[column].add_bytes(&bytes[printed[column].clone()]);
@@ -177,7 +189,7 @@ fn run(bytes: &[u8], part: Range<usize>, layout: Layout<'_>) -> Plain {
 fn plain_row(
     bytes: &[u8],
     start: usize,
-    separator: u8,
+    layout: Layout<'_>,
     row: &mut [f64],
     printed: &mut [Range<usize>],
 ) -> Option<usize> {
@@ -190,20 +202,27 @@ fn plain_row(
     let (mut at, last) = (start, row.len() - 1);
     let mut empty = true;
     for (column, (value, place)) in row.iter_mut().zip(printed).enumerate() {
-        at = blanks(at);
-        *value = f64::NAN;
-        if matches!(bytes.get(at), Some(b'0'..=b'9' | b'-' | b'+' | b'.')) {
-            let (number, length) = fast_float2::parse_partial::<f64, _>(&bytes[at..]).ok()?;
-            if !number.is_finite() {
-                return None;
+        if !layout.wanted[column] {
+            let ends = |byte: &u8| *byte == layout.separator || matches!(byte, b'\n' | b'\r' | b'"');
+            let length = bytes[at..].iter().position(ends).unwrap_or(bytes.len() - at);
+            empty &= length == 0;
+            at += length;
+        } else {
+            at = blanks(at);
+            *value = f64::NAN;
+            if matches!(bytes.get(at), Some(b'0'..=b'9' | b'-' | b'+' | b'.')) {
+                let (number, length) = fast_float2::parse_partial::<f64, _>(&bytes[at..]).ok()?;
+                if !number.is_finite() {
+                    return None;
+                }
+                *value = number;
+                *place = at..at + length;
+                at = blanks(at + length);
+                empty = false;
             }
-            *value = number;
-            *place = at..at + length;
-            at = blanks(at + length);
-            empty = false;
         }
         match bytes.get(at) {
-            Some(byte) if *byte == separator && column < last => at += 1,
+            Some(byte) if *byte == layout.separator && column < last => at += 1,
             Some(b'\n' | b'\r') | None if column == last => {}
             _ => return None,
         }

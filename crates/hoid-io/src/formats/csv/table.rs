@@ -40,21 +40,27 @@ struct CsvSource<'a> {
 impl CsvSource<'_> {
     /// Position of a row, and its cells.
     fn row(&self, row: usize) -> Option<(usize, csv::ByteRecord)> {
-        let (mut at_row, from) = self.starts.before(row)?;
-        let bytes = self.text.as_bytes();
-        let mut reader = reader(&bytes[from..], self.separator);
-        let mut record = csv::ByteRecord::new();
-        while matches!(reader.read_byte_record(&mut record), Ok(true)) {
-            if is_blank_line(&record) {
-                continue;
-            }
-            if at_row == row {
-                return Some((row_start(bytes, from + position(&record)), record));
-            }
-            at_row += 1;
-        }
-        None
+        let (kept, from) = self.starts.before(row)?;
+        let (start, record) = nth_row(&self.text.as_bytes()[from..], row - kept, self.separator)?;
+        Some((from + start, record))
     }
+}
+
+/// Position and cells of the n-th row of a text that starts with a row.
+pub(super) fn nth_row(bytes: &[u8], n: usize, separator: u8) -> Option<(usize, csv::ByteRecord)> {
+    let mut reader = reader(bytes, separator);
+    let mut record = csv::ByteRecord::new();
+    let mut rows = 0;
+    while matches!(reader.read_byte_record(&mut record), Ok(true)) {
+        if is_blank_line(&record) {
+            continue;
+        }
+        if rows == n {
+            return Some((row_start(bytes, position(&record)), record));
+        }
+        rows += 1;
+    }
+    None
 }
 
 /// Position of a record, including the bytes that the reader skips before it.
@@ -89,9 +95,44 @@ impl Source for CsvSource<'_> {
     }
 }
 
+/// What a text holds, and where its rows are.
+pub(super) struct Parsed {
+    pub(super) columns: Vec<Column>,
+    pub(super) rows: usize,
+    pub(super) separator: u8,
+    /// True if its numbers have decimal commas.
+    pub(super) commas: bool,
+    pub(super) starts: RowStarts,
+    pub(super) sample_time_s: Option<f64>,
+    pub(super) notes: Vec<String>,
+}
+
 /// Reads the table from the bytes of a CSV file.
 pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoError> {
     let text = text(bytes, file)?;
+    let parsed = parsed(text, file)?;
+    let source = CsvSource {
+        file,
+        text,
+        separator: parsed.separator,
+        starts: parsed.starts,
+        open: open_line(text),
+    };
+    let mut notes = parsed.notes;
+    if source.is_open(parsed.rows - 1) {
+        notes.extend(cut_number(&source, parsed.rows));
+    }
+    Ok(Table {
+        columns: parsed.columns,
+        rows: parsed.rows,
+        sample_time_s: parsed.sample_time_s,
+        source: Box::new(source),
+        notes,
+    })
+}
+
+/// Reads the columns of a text.
+pub(super) fn parsed(text: &str, file: &str) -> Result<Parsed, IoError> {
     let mut lines = text.lines().filter(|line| !is_aside(line));
     let Some(header_line) = lines.next() else {
         return Err(IoError::Empty { file: file.to_owned() });
@@ -111,6 +152,7 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
         commas,
         open: open_line(text),
         times: columns.iter().map(|column| is_time(&column.name)).collect(),
+        wanted: vec![true; columns.len()],
         moments: columns.iter().map(|_| Moments::default()).collect(),
         starts: RowStarts::default(),
         empty_at_end: 0,
@@ -134,22 +176,13 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
     if commas {
         notes.push(String::from("the commas in its numbers are taken as decimal commas"));
     }
-    let sample_time_s = asides(comments(text), &mut columns);
-    let source = CsvSource {
-        file,
-        text,
-        separator,
-        starts,
-        open: open_line(text),
-    };
-    if source.is_open(count - 1) {
-        notes.extend(cut_number(&source, count));
-    }
-    Ok(Table {
+    Ok(Parsed {
+        sample_time_s: asides(comments(text), &mut columns),
         columns,
         rows: count,
-        sample_time_s,
-        source: Box::new(source),
+        separator,
+        commas,
+        starts,
         notes,
     })
 }
@@ -180,6 +213,7 @@ struct Rows<'a> {
     open: Option<usize>,
     /// True for columns that may be the time.
     times: Vec<bool>,
+    wanted: Vec<bool>,
     moments: Vec<Moments>,
     starts: RowStarts,
     empty_at_end: usize,
@@ -194,6 +228,7 @@ impl Rows<'_> {
         let layout = Layout {
             separator: self.separator,
             with_precision: &self.times,
+            wanted: &self.wanted,
         };
         let (moments, starts, empty_at_end) = (&mut self.moments, &mut self.starts, &mut self.empty_at_end);
         plain_rows(self.bytes, from, layout, |run| {

@@ -20,10 +20,13 @@ use std::{fs, path::Path, time::Duration};
 
 use hoid_io::{read_any_scenario, read_fit};
 
-use crate::mutations::{
-    draw::Draw,
-    readers::{self, Answers},
-    spent::Spent,
+use crate::{
+    memory,
+    mutations::{
+        draw::Draw,
+        readers::{self, Answers},
+        spent::Spent,
+    },
 };
 
 /// Makes a bomb.
@@ -46,7 +49,7 @@ pub fn burst(path: &Path, maker: Maker, number: u64) -> (Answers, Duration) {
     fs::write(path, &bytes).unwrap();
     let length = bytes.len();
     drop(bytes);
-    forget_peak();
+    memory::forget_peak();
     let start = Spent::now();
     let settings = |refused: bool| Answers {
         read: u64::from(!refused),
@@ -58,16 +61,4 @@ pub fn burst(path: &Path, maker: Maker, number: u64) -> (Answers, Duration) {
         _ => readers::all(path, length, number),
     };
     (answers, start.elapsed())
-}
-
-/// Resets the peak memory before a bomb, on systems that support it.
-fn forget_peak() {
-    let _ = fs::write("/proc/self/clear_refs", "5");
-}
-
-/// Largest memory of the process, kB, on systems that report it.
-pub fn peak_kb() -> Option<u64> {
-    let status = fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmHWM"))?;
-    line.split_whitespace().nth(1)?.parse().ok()
 }

@@ -77,6 +77,7 @@ fn options(draw: &mut Draw) -> ReadOptions {
                 )
             })
             .collect(),
+        columns: (draw.below(4) == 0).then(|| vec![draw.one_of(&["x", "r", "t", "z"]).to_string()]),
         span_s: [(None, None), (Some(0.005), Some(0.025)), (Some(-1e300), Some(1e300))][draw.below(3)],
         repair: Repair {
             resample: draw.below(2) == 0,

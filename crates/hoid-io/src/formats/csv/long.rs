@@ -1,0 +1,370 @@
+//! A long text of plain numbers, read block by block: neither its bytes nor the columns that were not asked for are held
+//! in memory, and reading ends behind the requested span.
+//!
+//! The first lines are read as any table is, with their names, units and notes. All rows after them must be plain
+//! ([`super::plain`]); where one is not, there is no table here, and the whole text is read by [`super::table`].
+//!
+//! Reading ends early behind the requested span ([`super::span_end`]).
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use super::foreign::made_plain;
+use super::plain::{Layout, RowStarts, plain_rows};
+use super::span_end::SpanEnd;
+use super::table::{Parsed, nth_row, parsed};
+use crate::record::ReadOptions;
+use crate::table::{Cell, Source, Table, check_selected, selected};
+use crate::time::{is_time, may_be_time};
+use crate::wording::shown;
+
+/// Shorter files are read as a whole, bytes.
+const LONG: u64 = 16 << 20;
+/// Bytes in which header and first rows are.
+const HEAD: usize = 256 << 10;
+/// Bytes of the first block; each next one is twice as long, up to [`LARGEST`].
+const BLOCK: usize = 1 << 20;
+const LARGEST: usize = 32 << 20;
+/// Places in the rest of a file at which the time is examined.
+const PROBES: u32 = 64;
+/// Bytes read at such a place: more than a line has.
+const PROBE: usize = 64 << 10;
+
+/// The table of a long text; `None` if it is short, or something in it is more than plain numbers.
+///
+/// # Errors
+/// The file cannot be read.
+pub(crate) fn table<'a>(path: &Path, file: &'a str, options: &ReadOptions) -> io::Result<Option<Table<'a>>> {
+    of_length(path, file, options, LONG)
+}
+
+/// The table of a text of at least `long` bytes.
+fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -> io::Result<Option<Table<'a>>> {
+    let Ok(about) = std::fs::metadata(path) else {
+        return Ok(None);
+    };
+    if !about.is_file() || about.len() < long {
+        return Ok(None);
+    }
+    let mut text = Text {
+        file: File::open(path)?,
+        at: 0,
+        buffer: Vec::new(),
+        lines: 0,
+        length: about.len() as usize,
+        next: BLOCK,
+    };
+    let Some(mut parsed) = text.head(file)? else {
+        return Ok(None);
+    };
+    let separator = parsed.separator;
+    let names: Vec<String> = parsed.columns.iter().map(|column| column.name.clone()).collect();
+    // What is missing is reported by the reader of whole texts, with all columns that there are.
+    let known: Vec<&str> = names.iter().map(String::as_str).collect();
+    if check_selected(&known, options, file).is_err() {
+        return Ok(None);
+    }
+    let wanted: Vec<bool> = (names.iter().enumerate())
+        .map(|(at, name)| options.wants(name) || may_be_time(at, name, options.time.as_ref()))
+        .collect();
+    let times: Vec<bool> = names.iter().map(|name| is_time(name)).collect();
+    let layout = Layout {
+        separator,
+        with_precision: &times,
+        wanted: &wanted,
+    };
+    let end = SpanEnd::of(&parsed, file, options);
+    // Room for all rows, as far as the first ones tell their length: what is not filled takes no memory.
+    let bytes_per_row = (text.at / parsed.rows).max(1);
+    let rows = if end.is_some() { 0 } else { text.length / bytes_per_row };
+    for (column, _) in parsed.columns.iter_mut().zip(&wanted).filter(|(_, wanted)| **wanted) {
+        column.values.reserve(rows.saturating_sub(parsed.rows));
+    }
+    let mut may_end = end.is_some();
+    while let Some(base) = text.advance()? {
+        let read = plain_rows(&text.buffer[..text.lines], 0, layout, |run| {
+            run.starts.iter().for_each(|start| parsed.starts.push(base + start));
+            let each = parsed.columns.iter_mut().zip(run.values).zip(run.precision);
+            for ((column, values), precision) in each {
+                column.values.extend(values);
+                column.precision.join(precision);
+            }
+        });
+        if read < text.lines {
+            return Ok(None);
+        }
+        if let Some(end) = end.as_ref().filter(|end| may_end && end.is_reached(&parsed)) {
+            may_end = false;
+            if end.is_last(&mut text, &parsed)? {
+                break;
+            }
+        }
+    }
+    let rows = parsed.starts.len();
+    let source = LongSource {
+        file,
+        path: path.to_owned(),
+        separator,
+        starts: parsed.starts,
+    };
+    let table = Table {
+        columns: parsed.columns,
+        rows,
+        sample_time_s: parsed.sample_time_s,
+        source: Box::new(source),
+        notes: parsed.notes,
+    };
+    Ok(Some(selected(table, |at, _| wanted[at])))
+}
+
+/// A file that is read from its start to its end.
+pub(super) struct Text {
+    file: File,
+    /// Position of the next byte.
+    at: usize,
+    /// Bytes that were read, and how many of them are whole lines.
+    buffer: Vec<u8>,
+    lines: usize,
+    length: usize,
+    /// Bytes of the next block.
+    next: usize,
+}
+
+impl Text {
+    /// The first lines, read as any table; `None` if they are not of a table of numbers with a point.
+    fn head(&mut self, file: &str) -> io::Result<Option<Parsed>> {
+        let mut bytes = self.bytes(0, HEAD)?;
+        let Some(line) = bytes.iter().rposition(|byte| *byte == b'\n') else {
+            return Ok(None);
+        };
+        bytes.truncate(line + 1);
+        self.at = bytes.len();
+        let last = self.bytes(self.length.saturating_sub(1), 1)?;
+        let is_marked = bytes.starts_with(b"\xef\xbb\xbf");
+        if last != b"\n" || is_marked || bytes.contains(&0) || !made_plain(&mut bytes).is_empty() {
+            return Ok(None);
+        }
+        self.file.seek(SeekFrom::Start(self.at as u64))?;
+        let is_plain = |parsed: &Parsed| {
+            let numbers = parsed.columns.iter().all(|column| !column.moments);
+            numbers && !parsed.commas && parsed.starts.len() == parsed.rows
+        };
+        let parsed = std::str::from_utf8(&bytes)
+            .ok()
+            .and_then(|text| parsed(text, file).ok());
+        Ok(parsed.filter(is_plain))
+    }
+
+    /// Reads the next lines; returns the position of the first, `None` at the end.
+    fn advance(&mut self) -> io::Result<Option<usize>> {
+        // One buffer for all blocks.
+        self.buffer.drain(..self.lines);
+        let base = self.at - self.buffer.len();
+        loop {
+            let from = self.buffer.len();
+            let read = (&mut self.file).take(self.next as u64).read_to_end(&mut self.buffer)?;
+            self.at += read;
+            self.next = (2 * self.next).min(LARGEST);
+            let line = self.buffer[from..].iter().rposition(|byte| *byte == b'\n');
+            self.lines = line.map_or(self.buffer.len(), |line| from + line + 1);
+            if line.is_some() || read == 0 {
+                return Ok((self.lines > 0).then_some(base));
+            }
+        }
+    }
+
+    /// Some bytes of the file, wherever it is read.
+    pub(super) fn bytes(&mut self, from: usize, most: usize) -> io::Result<Vec<u8>> {
+        self.file.seek(SeekFrom::Start(from as u64))?;
+        let mut bytes = Vec::with_capacity(most);
+        (&mut self.file).take(most as u64).read_to_end(&mut bytes)?;
+        Ok(bytes)
+    }
+
+    /// Values of a column at places from here to the end, in their order; NaN where there is none.
+    pub(super) fn probed(&mut self, column: usize, separator: u8) -> io::Result<Vec<f64>> {
+        let here = self.at;
+        let from = here - (self.buffer.len() - self.lines);
+        let rest = (self.length - from) as f64;
+        let value = |text: &mut Self, part: f64| -> io::Result<f64> {
+            let bytes = text.bytes(from + (rest * part) as usize, PROBE)?;
+            // A place is in the middle of a line; the first one behind it is whole.
+            let line = bytes.split(|byte| *byte == b'\n').nth(1).unwrap_or_default();
+            let row = nth_row(line, 0, separator);
+            let cell = row.as_ref().and_then(|(_, row)| row.get(column)).unwrap_or_default();
+            Ok(match Cell::parse(&String::from_utf8_lossy(cell)) {
+                Cell::Number(value) => value,
+                Cell::Missing | Cell::Text => f64::NAN,
+            })
+        };
+        // Multiples of the golden section lie nowhere in step with trials of one length.
+        let mut parts: Vec<f64> = (1..=PROBES)
+            .map(|k| (f64::from(k) * 0.618_033_988_749_895).fract())
+            .collect();
+        parts.sort_unstable_by(f64::total_cmp);
+        let probed = parts
+            .into_iter()
+            .map(|part| value(self, part))
+            .collect::<io::Result<_>>()?;
+        self.file.seek(SeekFrom::Start(here as u64))?;
+        Ok(probed)
+    }
+}
+
+/// The file again, where a message needs a line or a cell.
+struct LongSource<'a> {
+    file: &'a str,
+    path: PathBuf,
+    separator: u8,
+    starts: RowStarts,
+}
+
+impl LongSource<'_> {
+    /// Position of a row, and its cells.
+    fn row(&self, row: usize) -> Option<(usize, csv::ByteRecord)> {
+        let (kept, from) = self.starts.before(row)?;
+        let mut file = File::open(&self.path).ok()?;
+        file.seek(SeekFrom::Start(from as u64)).ok()?;
+        // The rows up to the next one whose position is known, or up to the last.
+        let end = self
+            .starts
+            .before(kept + RowStarts::KEPT)
+            .map_or(self.starts.last()? + PROBE, |next| next.1);
+        let mut bytes = Vec::new();
+        file.take((end - from) as u64).read_to_end(&mut bytes).ok()?;
+        let (start, record) = nth_row(&bytes, row - kept, self.separator)?;
+        Some((from + start, record))
+    }
+}
+
+impl Source for LongSource<'_> {
+    fn file(&self) -> &str {
+        self.file
+    }
+
+    fn place(&self, row: usize) -> String {
+        let count = || {
+            let (start, _) = self.row(row)?;
+            let mut before = BufReader::new(File::open(&self.path).ok()?).take(start as u64);
+            let mut lines = 0;
+            while before.skip_until(b'\n').ok()? > 0 {
+                lines += 1;
+            }
+            Some(lines)
+        };
+        count().map_or_else(
+            || format!("row {}", row + 1),
+            |lines: usize| format!("line {}", lines + 1),
+        )
+    }
+
+    fn cell(&self, row: usize, column: usize) -> String {
+        let record = self.row(row).map(|(_, record)| record);
+        let cell = record.as_ref().and_then(|record| record.get(column));
+        cell.map_or_else(String::new, |cell| shown(&String::from_utf8_lossy(cell)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write as _;
+
+    use super::super::table::parse;
+    use super::*;
+
+    fn file(text: &str) -> tempfile::NamedTempFile {
+        let file = tempfile::Builder::new().suffix(".csv").tempfile().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        file
+    }
+
+    /// Six columns at 100 Hz, of which one is a word; times start again after `trial` rows.
+    fn text(rows: usize, trial: usize) -> String {
+        let mut text = String::from("# units: e deg\nt,e,word,u,x,n\n");
+        for row in 0..rows {
+            let (t, x) = ((row % trial) as f64 / 100.0, row as f64);
+            let e = if row % 1000 == 7 {
+                String::new()
+            } else {
+                (0.37 * x).sin().to_string()
+            };
+            writeln!(text, "{t:.2},{e},go,{:.5},{:e},{}", (0.11 * x).cos(), x / 7.0, row).unwrap();
+        }
+        text
+    }
+
+    fn wanting(columns: &[&str], to_s: Option<f64>) -> ReadOptions {
+        ReadOptions {
+            columns: Some(columns.iter().map(|name| (*name).to_owned()).collect()),
+            span_s: (None, to_s),
+            ..ReadOptions::default()
+        }
+    }
+
+    #[test]
+    fn columns_and_places_are_those_of_the_whole_text() {
+        let text = text(60_000, 60_000);
+        let file = file(&text);
+        let options = wanting(&["n"], None);
+        let found = of_length(file.path(), "run.csv", &options, 0).unwrap().unwrap();
+        let whole = parse(text.as_bytes(), "run.csv").unwrap();
+        assert_eq!((found.names(), found.rows), (vec!["t", "e", "u", "n"], 60_000));
+        for (at, in_whole) in [0, 1, 3, 5].into_iter().enumerate() {
+            let (a, b) = (&found.columns[at], &whole.columns[in_whole]);
+            assert_eq!((a.precision, &a.unit, &a.texts), (b.precision, &b.unit, &b.texts));
+            assert!(
+                a.values
+                    .iter()
+                    .zip(&b.values)
+                    .all(|(a, b)| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()))
+            );
+            for row in [0, 7, 1023, 1024, 40_000, 59_999] {
+                assert_eq!(found.source.place(row), whole.source.place(row));
+                assert_eq!(found.source.cell(row, at), whole.source.cell(row, in_whole));
+            }
+        }
+        // The word is wanted, or in a quote: the whole text is read.
+        assert!(
+            of_length(file.path(), "run.csv", &ReadOptions::default(), 0)
+                .unwrap()
+                .is_none()
+        );
+        let missing = wanting(&["z"], None);
+        assert!(of_length(file.path(), "run.csv", &missing, 0).unwrap().is_none());
+        let last = text.rfind(",go,").unwrap();
+        let quoted = format!("{},\"go\",{}", &text[..last], &text[last + 4..]);
+        let found = of_length(self::file(&quoted).path(), "run.csv", &options, 0).unwrap();
+        assert!(found.is_none());
+    }
+
+    #[test]
+    fn reading_ends_behind_the_span_unless_the_time_starts_again() {
+        let rows = |text: &str, options: &ReadOptions| {
+            let table = of_length(file(text).path(), "run.csv", options, 0).unwrap().unwrap();
+            (
+                table.rows,
+                table.columns[0].values.iter().filter(|t| **t < 10.0).count(),
+            )
+        };
+        let (first, in_span) = rows(&text(200_000, 200_000), &wanting(&[], Some(10.0)));
+        assert!((1000..60_000).contains(&first), "{first}");
+        assert_eq!(in_span, 1000);
+        assert_eq!(rows(&text(200_000, 200_000), &wanting(&[], None)).0, 200_000);
+        // Trials of 2000 s, the same at the end of the first.
+        assert_eq!(
+            rows(&text(200_000, 100_000), &wanting(&[], Some(10.0))),
+            (200_000, 2000)
+        );
+        // Counted samples, and a time in another unit.
+        let counted = ReadOptions {
+            sampling_hz: Some(100.0),
+            ..wanting(&[], Some(10.0))
+        };
+        assert!(rows(&text(200_000, 200_000), &counted).0 < 60_000);
+        let ms = text(200_000, 200_000).replacen("\nt,", "\ntime_ms,", 1);
+        let whole = rows(&ms, &wanting(&[], Some(10.0)));
+        assert_eq!(whole.0, 200_000, "2000 ms are not 10 s");
+        assert!(rows(&ms, &wanting(&[], Some(0.01))).0 < 60_000);
+    }
+}

@@ -1,0 +1,111 @@
+//! The end of a span in a long text, behind which no row is read.
+//!
+//! A time behind the span does not suffice: in a file of trials the time starts again, and the span may be in a later
+//! one. The times of the rest are therefore probed at some places; they increase to the end of the file, or all of it
+//! is read.
+
+use std::io;
+
+use super::long::Text;
+use super::table::Parsed;
+use crate::record::ReadOptions;
+use crate::table::{Source, Table};
+use crate::time::with_time;
+
+/// The end of the span.
+pub(super) enum SpanEnd {
+    /// Samples are counted: the number of rows to the end.
+    Row(usize),
+    /// The column of the time, and the bounds of the span as it is written there.
+    Time { column: usize, from: f64, to: f64 },
+}
+
+/// No message is made of the first rows.
+struct Nowhere<'a>(&'a str);
+
+impl Source for Nowhere<'_> {
+    fn file(&self) -> &str {
+        self.0
+    }
+
+    fn place(&self, row: usize) -> String {
+        format!("row {}", row + 1)
+    }
+
+    fn cell(&self, _: usize, _: usize) -> String {
+        String::new()
+    }
+}
+
+impl SpanEnd {
+    /// The end of the requested span, from the first rows; `None` if all rows are needed.
+    pub(super) fn of(head: &Parsed, file: &str, options: &ReadOptions) -> Option<Self> {
+        let to_s = options.span_s.1?;
+        // A value between two of a sparse column, and a trial, may need what is behind the span.
+        if !options.sparse.is_empty() || options.trial.is_some() {
+            return None;
+        }
+        let copy = |column: &crate::table::Column| crate::table::Column {
+            name: column.name.clone(),
+            unit: column.unit.clone(),
+            values: column.values.clone(),
+            ..crate::table::Column::default()
+        };
+        let first_rows = Table {
+            columns: head.columns.iter().map(copy).collect(),
+            rows: head.rows,
+            sample_time_s: None,
+            source: Box::new(Nowhere(file)),
+            notes: Vec::new(),
+        };
+        let table = with_time(first_rows, options.time.as_ref()).ok()?;
+        let column = table.columns.iter().position(|column| column.name == "t");
+        let start_s = column.map_or(0.0, |column| table.columns[column].values[0]);
+        match (options.sampling_hz, column) {
+            (Some(hz), column) if column.is_none() || !options.repair.resample => {
+                let rows = ((to_s - start_s) * hz).ceil() + 2.0;
+                (rows > 2.0).then_some(Self::Row(rows as usize))
+            }
+            (_, None) => None,
+            (_, Some(column)) => {
+                // t is the written time moved and in another unit.
+                let (t, written) = (&table.columns[column].values, &head.columns[column].values);
+                let last = t.len() - 1;
+                let unit = (written[last] - written[0]) / (t[last] - t[0]);
+                let as_written = |s: f64| written[0] + (s - start_s) * unit;
+                let (from, to) = (
+                    as_written(options.span_s.0.unwrap_or(f64::NEG_INFINITY)),
+                    as_written(to_s),
+                );
+                (unit > 0.0 && to.is_finite()).then_some(Self::Time { column, from, to })
+            }
+        }
+    }
+
+    /// True if the rows read so far reach behind the span, and into it.
+    pub(super) fn is_reached(&self, read: &Parsed) -> bool {
+        match *self {
+            Self::Row(rows) => read.starts.len() >= rows,
+            Self::Time { column, from, to } => {
+                let t = &read.columns[column].values;
+                t.last().is_some_and(|t| *t > to) && t.iter().any(|t| *t >= from && *t < to)
+            }
+        }
+    }
+
+    /// True if no row behind those read so far belongs to the span.
+    pub(super) fn is_last(&self, text: &mut Text, read: &Parsed) -> io::Result<bool> {
+        let Self::Time { column, .. } = *self else {
+            return Ok(true);
+        };
+        let increases = read.columns[column].values.windows(2).all(|pair| pair[1] > pair[0]);
+        let mut last = read.columns[column].values.last().copied().unwrap_or(f64::NAN);
+        // A place in the last line has none behind it.
+        let probed = text.probed(column, read.separator)?;
+        Ok(increases
+            && probed
+                .iter()
+                .filter(|t| !t.is_nan())
+                .all(|t| std::mem::replace(&mut last, *t) <= *t))
+    }
+}

@@ -1,0 +1,75 @@
+//! The columns of a table that are kept, where not all are.
+
+use super::columns::{Source, Table};
+use crate::IoError;
+use crate::record::ReadOptions;
+use crate::wording::{did_you_mean, list};
+
+/// Some columns of a table; messages still refer to the columns of the file.
+struct Selected<'a> {
+    source: Box<dyn Source + 'a>,
+    columns: Vec<usize>,
+}
+
+impl Source for Selected<'_> {
+    fn file(&self) -> &str {
+        self.source.file()
+    }
+
+    fn place(&self, row: usize) -> String {
+        self.source.place(row)
+    }
+
+    fn cell(&self, row: usize, column: usize) -> String {
+        self.source
+            .cell(row, self.columns.get(column).copied().unwrap_or(column))
+    }
+
+    fn is_open(&self, row: usize) -> bool {
+        self.source.is_open(row)
+    }
+}
+
+/// The table with the columns for which `keep` is true.
+pub(crate) fn selected<'a>(table: Table<'a>, keep: impl Fn(usize, &str) -> bool) -> Table<'a> {
+    let names = table.names();
+    let columns: Vec<usize> = (0..names.len()).filter(|at| keep(*at, names[*at])).collect();
+    if columns.len() == table.columns.len() {
+        return table;
+    }
+    let Table {
+        columns: all, source, ..
+    } = table;
+    let kept = |(at, _): &(usize, _)| columns.binary_search(at).is_ok();
+    Table {
+        columns: all
+            .into_iter()
+            .enumerate()
+            .filter(kept)
+            .map(|(_, column)| column)
+            .collect(),
+        source: Box::new(Selected { source, columns }),
+        ..table
+    }
+}
+
+/// Checks that the columns asked for are among these.
+///
+/// # Errors
+/// [`IoError::NoSuchColumn`] for one that is not, be it of the input, the output or in addition.
+pub(crate) fn check_selected(names: &[&str], options: &ReadOptions, file: &str) -> Result<(), IoError> {
+    let Some(kept) = &options.columns else { return Ok(()) };
+    for signal in options.input.iter().chain([&options.output]) {
+        signal.resolve(names, file)?;
+    }
+    match kept.iter().find(|column| !names.contains(&column.as_str())) {
+        None => Ok(()),
+        Some(missing) => Err(IoError::NoSuchColumn {
+            file: file.to_owned(),
+            missing: format!("\"{missing}\""),
+            meant: did_you_mean(&[missing], names),
+            asked: kept.join(","),
+            available: list(names),
+        }),
+    }
+}
