@@ -96,7 +96,8 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
         }
         if let Some(end) = end.as_ref().filter(|end| may_end && end.is_reached(&parsed)) {
             may_end = false;
-            if end.is_last(&mut text, &parsed)? {
+            let probed = end.time_column().map(|column| text.probed(column, separator));
+            if end.is_last(&parsed, &probed.transpose()?.unwrap_or_default()) {
                 break;
             }
         }
@@ -119,7 +120,7 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
 }
 
 /// A file that is read from its start to its end.
-pub(super) struct Text {
+struct Text {
     file: File,
     /// Position of the next byte.
     at: usize,
@@ -175,7 +176,7 @@ impl Text {
     }
 
     /// Some bytes of the file, wherever it is read.
-    pub(super) fn bytes(&mut self, from: usize, most: usize) -> io::Result<Vec<u8>> {
+    fn bytes(&mut self, from: usize, most: usize) -> io::Result<Vec<u8>> {
         self.file.seek(SeekFrom::Start(from as u64))?;
         let mut bytes = Vec::with_capacity(most);
         (&mut self.file).take(most as u64).read_to_end(&mut bytes)?;
@@ -183,7 +184,7 @@ impl Text {
     }
 
     /// Values of a column at places from here to the end, in their order; NaN where there is none.
-    pub(super) fn probed(&mut self, column: usize, separator: u8) -> io::Result<Vec<f64>> {
+    fn probed(&mut self, column: usize, separator: u8) -> io::Result<Vec<f64>> {
         let here = self.at;
         let from = here - (self.buffer.len() - self.lines);
         let rest = (self.length - from) as f64;

@@ -4,9 +4,6 @@
 //! one. The times of the rest are therefore probed at some places; they increase to the end of the file, or all of it
 //! is read.
 
-use std::io;
-
-use super::long::Text;
 use super::table::Parsed;
 use crate::record::ReadOptions;
 use crate::table::{Source, Table};
@@ -93,19 +90,22 @@ impl SpanEnd {
         }
     }
 
-    /// True if no row behind those read so far belongs to the span.
-    pub(super) fn is_last(&self, text: &mut Text, read: &Parsed) -> io::Result<bool> {
-        let Self::Time { column, .. } = *self else {
-            return Ok(true);
+    /// The column of the time, if rows are not counted.
+    pub(super) fn time_column(&self) -> Option<usize> {
+        match *self {
+            Self::Row(_) => None,
+            Self::Time { column, .. } => Some(column),
+        }
+    }
+
+    /// True if no row after those read so far belongs to the span: the time increases in them and on to the times that
+    /// were probed in the rest, NaN where there is none.
+    pub(super) fn is_last(&self, read: &Parsed, probed: &[f64]) -> bool {
+        let Some(column) = self.time_column() else {
+            return true;
         };
-        let increases = read.columns[column].values.windows(2).all(|pair| pair[1] > pair[0]);
-        let mut last = read.columns[column].values.last().copied().unwrap_or(f64::NAN);
-        // A place in the last line has none behind it.
-        let probed = text.probed(column, read.separator)?;
-        Ok(increases
-            && probed
-                .iter()
-                .filter(|t| !t.is_nan())
-                .all(|t| std::mem::replace(&mut last, *t) <= *t))
+        let t = read.columns[column].values.iter();
+        let rest = probed.iter().filter(|t| !t.is_nan());
+        t.chain(rest).is_sorted()
     }
 }
