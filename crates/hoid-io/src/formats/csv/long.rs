@@ -1,10 +1,10 @@
 //! A long text of plain numbers, read block by block: neither its bytes nor the columns that were not asked for are held
-//! in memory, and reading ends behind the requested span.
+//! in memory, and reading ends after the requested span.
 //!
 //! The first lines are read as any table is, with their names, units and notes. All rows after them must be plain
 //! ([`super::plain`]); where one is not, there is no table here, and the whole text is read by [`super::table`].
 //!
-//! Reading ends early behind the requested span ([`super::span_end`]).
+//! Reading ends early, after the requested span ([`super::span_end`]).
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
@@ -75,7 +75,7 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
         wanted: &wanted,
     };
     let end = SpanEnd::of(&parsed, file, options);
-    // Room for all rows, as far as the first ones tell their length: what is not filled takes no memory.
+    // Room for all rows, from the length of the first ones: unfilled room takes no memory.
     let bytes_per_row = (text.at / parsed.rows).max(1);
     let rows = if end.is_some() { 0 } else { text.length / bytes_per_row };
     for (column, _) in parsed.columns.iter_mut().zip(&wanted).filter(|(_, wanted)| **wanted) {
@@ -190,7 +190,7 @@ impl Text {
         let rest = (self.length - from) as f64;
         let value = |text: &mut Self, part: f64| -> io::Result<f64> {
             let bytes = text.bytes(from + (rest * part) as usize, PROBE)?;
-            // A place is in the middle of a line; the first one behind it is whole.
+            // A place is in the middle of a line; the next one is whole.
             let line = bytes.split(|byte| *byte == b'\n').nth(1).unwrap_or_default();
             let row = nth_row(line, 0, separator);
             let cell = row.as_ref().and_then(|(_, row)| row.get(column)).unwrap_or_default();
@@ -199,7 +199,7 @@ impl Text {
                 Cell::Missing | Cell::Text => f64::NAN,
             })
         };
-        // Multiples of the golden section lie nowhere in step with trials of one length.
+        // Multiples of the golden section are never in step with trials of one length.
         let mut parts: Vec<f64> = (1..=PROBES)
             .map(|k| (f64::from(k) * 0.618_033_988_749_895).fract())
             .collect();
@@ -340,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn reading_ends_behind_the_span_unless_the_time_starts_again() {
+    fn reading_ends_after_the_span_unless_the_time_starts_again() {
         let rows = |text: &str, options: &ReadOptions| {
             let table = of_length(file(text).path(), "run.csv", options, 0).unwrap().unwrap();
             (

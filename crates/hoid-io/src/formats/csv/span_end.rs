@@ -1,6 +1,6 @@
-//! The end of a span in a long text, behind which no row is read.
+//! The end of a span in a long text, after which no row is read.
 //!
-//! A time behind the span does not suffice: in a file of trials the time starts again, and the span may be in a later
+//! A time after the span is not enough: in a file of trials the time starts again, and the span may be in a later
 //! one. The times of the rest are therefore probed at some places; they increase to the end of the file, or all of it
 //! is read.
 
@@ -38,7 +38,7 @@ impl SpanEnd {
     /// The end of the requested span, from the first rows; `None` if all rows are needed.
     pub(super) fn of(head: &Parsed, file: &str, options: &ReadOptions) -> Option<Self> {
         let to_s = options.span_s.1?;
-        // A value between two of a sparse column, and a trial, may need what is behind the span.
+        // A value between two of a sparse column, and a trial, may need rows after the span.
         if !options.sparse.is_empty() || options.trial.is_some() {
             return None;
         }
@@ -79,7 +79,7 @@ impl SpanEnd {
         }
     }
 
-    /// True if the rows read so far reach behind the span, and into it.
+    /// True if the rows read so far reach into the span and beyond its end.
     pub(super) fn is_reached(&self, read: &Parsed) -> bool {
         match *self {
             Self::Row(rows) => read.starts.len() >= rows,
