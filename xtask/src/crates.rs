@@ -26,7 +26,7 @@ const ALLOWED: [&str; 11] = [
 ];
 
 /// Unwanted crates, by name or by the start of a name that ends with `*`, with reasons.
-const BANNED: [(&str, &str); 17] = [
+const BANNED: [(&str, &str); 16] = [
     (
         "*-sys",
         "it links a library that is not Rust: hoid builds with cargo alone, everywhere",
@@ -46,7 +46,6 @@ const BANNED: [(&str, &str); 17] = [
     ("atty", "it is not maintained; std::io::IsTerminal"),
     ("ansi_term", "it is not maintained"),
     ("lazy_static", "std::sync::OnceLock and LazyLock"),
-    ("paste", "it is not maintained"),
 ];
 /// Crates of [`BANNED`] that are tolerated, with reasons.
 const TOLERATED: [(&str, &str); 5] = [

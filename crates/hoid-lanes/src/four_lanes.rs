@@ -7,8 +7,6 @@
 
 use std::ops::{Add, Mul, Sub};
 
-use fearless_simd::{ExtractToken, Fallback, Level, Simd, SimdBase, SimdFrom, f64x4};
-
 use crate::instruction_set::InstructionSet;
 
 /// Four numbers with lane-wise operations.
@@ -31,57 +29,100 @@ pub trait FourLaneTask {
     fn run<F: FourLanes>(self, zero: F) -> Self::Output;
 }
 
-impl<S: Simd> FourLanes for f64x4<S> {
+/// The registers of every processor of the compilation target.
+impl FourLanes for wide::f64x4 {
     #[inline(always)]
     fn splat(self, value: f64) -> Self {
-        SimdBase::splat(self.token(), value)
+        Self::splat(value)
     }
 
     #[inline(always)]
     fn load(self, values: &[f64; 4]) -> Self {
-        Self::simd_from(self.token(), *values)
+        Self::new(*values)
     }
 
     #[inline(always)]
     fn to_array(self) -> [f64; 4] {
-        *self
+        self.to_array()
     }
 }
 
-fn in_registers<T: FourLaneTask, S: Simd>(simd: S, task: T) -> T::Output {
-    simd.vectorize(
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+mod avx2 {
+    use std::ops::{Add, Mul, Sub};
+
+    use pulp::{NullaryFnOnce, Simd, bytemuck, f64x4, x86::V3};
+
+    use super::{FourLaneTask, FourLanes};
+
+    /// Four numbers in a register of AVX2.
+    #[derive(Debug, Clone, Copy)]
+    pub(super) struct Register {
+        simd: V3,
+        numbers: f64x4,
+    }
+
+    macro_rules! operations {
+        ($($name:ident, $method:ident, $of_simd:ident);+) => {$(
+            impl $name for Register {
+                type Output = Self;
+
+                #[inline(always)]
+                fn $method(self, other: Self) -> Self {
+                    let numbers = self.simd.$of_simd(self.numbers, other.numbers);
+                    Self { numbers, ..self }
+                }
+            }
+        )+};
+    }
+    operations!(Add, add, add_f64s; Sub, sub, sub_f64s; Mul, mul, mul_f64s);
+
+    impl FourLanes for Register {
         #[inline(always)]
-        || task.run(f64x4::simd_from(simd, 0.0)),
-    )
+        fn splat(self, value: f64) -> Self {
+            let numbers = self.simd.splat_f64s(value);
+            Self { numbers, ..self }
+        }
+
+        #[inline(always)]
+        fn load(self, values: &[f64; 4]) -> Self {
+            let numbers = bytemuck::cast(*values);
+            Self { numbers, ..self }
+        }
+
+        #[inline(always)]
+        fn to_array(self) -> [f64; 4] {
+            bytemuck::cast(self.numbers)
+        }
+    }
+
+    /// The task in registers of AVX2.
+    pub(super) struct InAvx2<T>(pub V3, pub T);
+
+    impl<T: FourLaneTask> NullaryFnOnce for InAvx2<T> {
+        type Output = T::Output;
+
+        #[inline(always)]
+        fn call(self) -> T::Output {
+            let Self(simd, task) = self;
+            let numbers = simd.splat_f64s(0.0);
+            task.run(Register { simd, numbers })
+        }
+    }
 }
 
 /// Runs a task in registers of AVX2, or returns the task if this processor has none.
 fn in_avx2<T: FourLaneTask>(task: T) -> Result<T::Output, T> {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-    if let Some(simd) = Level::new().as_avx2() {
-        return Ok(in_registers(simd, task));
+    if let Some(simd) = pulp::x86::V3::try_new() {
+        return Ok(simd.vectorize(avx2::InAvx2(simd, task)));
     }
     Err(task)
 }
 
-/// Runs a task in the registers of every processor of the compilation target.
-fn in_baseline<T: FourLaneTask>(task: T) -> T::Output {
-    let level = Level::new();
-    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-    if let Some(simd) = level.as_sse2() {
-        return in_registers(simd, task);
-    }
-    #[cfg(target_arch = "aarch64")]
-    if let Some(simd) = level.as_neon() {
-        return in_registers(simd, task);
-    }
-    let _ = level;
-    in_registers(Fallback::new(), task)
-}
-
 /// Runs a task on four numbers at a time, in the widest suitable registers of this processor.
 pub fn with_four_lanes<T: FourLaneTask>(task: T) -> T::Output {
-    in_avx2(task).unwrap_or_else(in_baseline)
+    in_avx2(task).unwrap_or_else(|task| task.run(wide::f64x4::ZERO))
 }
 
 impl InstructionSet {
@@ -92,7 +133,7 @@ impl InstructionSet {
     pub fn with_four_lanes<T: FourLaneTask>(self, task: T) -> Option<T::Output> {
         match self {
             Self::Best => Some(with_four_lanes(task)),
-            Self::Scalar => Some(in_baseline(task)),
+            Self::Scalar => Some(task.run(wide::f64x4::ZERO)),
             Self::Avx2 | Self::Avx512 => in_avx2(task).ok(),
         }
     }

@@ -1,6 +1,6 @@
 //! Choice of the vector registers, and tasks that run in them.
 
-use fearless_simd::{Fallback, Level, Simd};
+use pulp::{NullaryFnOnce, Scalar, Simd, WithSimd};
 
 use crate::{number::Number, registers::TwoRegisters};
 
@@ -10,11 +10,11 @@ pub enum InstructionSet {
     /// The widest registers of this processor.
     #[default]
     Best,
-    /// Plain numbers in place of registers, two each, on any processor.
+    /// One number per register, on any processor.
     Scalar,
     /// Four numbers per register, on processors with AVX2.
     Avx2,
-    /// Eight numbers per register, on processors with the AVX-512 of Ice Lake and later.
+    /// Eight numbers per register, on processors with AVX-512.
     Avx512,
 }
 
@@ -29,29 +29,46 @@ pub trait LaneTask {
     fn run<R: Number>(self, zero: R) -> Self::Output;
 }
 
-/// Runs a task with one run per lane of the registers of `S`.
-fn in_registers<T: LaneTask, S: Simd>(simd: S, task: T) -> T::Output {
-    simd.vectorize(
-        #[inline(always)]
-        || task.run(TwoRegisters::splat(simd, 0.0)),
-    )
+/// The task for [`pulp::Arch`], which chooses the registers.
+struct Dispatched<T>(T);
+
+impl<T: LaneTask> WithSimd for Dispatched<T> {
+    type Output = T::Output;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> T::Output {
+        self.0.run(TwoRegisters::splat(simd, 0.0))
+    }
 }
 
-/// Runs a task in the widest registers of this processor.
-fn in_widest<T: LaneTask>(task: T) -> T::Output {
-    let level = Level::new();
-    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-    if let Some(simd) = level.as_avx512() {
-        return in_registers(simd, task);
-    } else if let Some(simd) = level.as_avx2() {
-        return in_registers(simd, task);
+/// The task in the registers of `S`.
+struct InRegisters<T, S>(T, S);
+
+impl<T: LaneTask, S: Simd> NullaryFnOnce for InRegisters<T, S> {
+    type Output = T::Output;
+
+    #[inline(always)]
+    fn call(self) -> T::Output {
+        self.0.run(TwoRegisters::splat(self.1, 0.0))
     }
-    #[cfg(target_arch = "aarch64")]
-    if let Some(simd) = level.as_neon() {
-        return in_registers(simd, task);
+}
+
+fn in_registers<T: LaneTask, S: Simd>(simd: S, task: T) -> T::Output {
+    simd.vectorize(InRegisters(task, simd))
+}
+
+/// The task for one run.
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+struct OneLane<T>(T);
+
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+impl<T: LaneTask> NullaryFnOnce for OneLane<T> {
+    type Output = T::Output;
+
+    #[inline(always)]
+    fn call(self) -> T::Output {
+        self.0.run(0.0)
     }
-    let _ = level;
-    in_registers(Fallback::new(), task)
 }
 
 /// Runs a task for one run, with f64 numbers.
@@ -60,11 +77,8 @@ fn in_widest<T: LaneTask>(task: T) -> T::Output {
 /// operand need not be copied before it is overwritten. Products and sums are not contracted: the bits are the same.
 pub fn with_one_lane<T: LaneTask>(task: T) -> T::Output {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-    if let Some(simd) = Level::new().as_avx2() {
-        return simd.vectorize(
-            #[inline(always)]
-            || task.run(0.0),
-        );
+    if let Some(simd) = pulp::x86::V3::try_new() {
+        return simd.vectorize(OneLane(task));
     }
     task.run(0.0)
 }
@@ -84,12 +98,12 @@ impl InstructionSet {
     /// Runs a task with one run per lane; `None` if this processor does not have these registers.
     pub fn with_lanes<T: LaneTask>(self, task: T) -> Option<T::Output> {
         match self {
-            Self::Best => Some(in_widest(task)),
-            Self::Scalar => Some(in_registers(Fallback::new(), task)),
+            Self::Best => Some(pulp::Arch::new().dispatch(Dispatched(task))),
+            Self::Scalar => Some(in_registers(Scalar, task)),
             #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-            Self::Avx2 => Some(in_registers(Level::new().as_avx2()?, task)),
+            Self::Avx2 => Some(in_registers(pulp::x86::V3::try_new()?, task)),
             #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-            Self::Avx512 => Some(in_registers(Level::new().as_avx512()?, task)),
+            Self::Avx512 => Some(in_registers(pulp::x86::V4::try_new()?, task)),
             #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
             Self::Avx2 | Self::Avx512 => None,
         }

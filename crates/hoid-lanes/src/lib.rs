@@ -9,7 +9,7 @@
 //! The same holds for a sum over a record, `s(t) = s(t-1) + a(t) b(t)`: four partial sums, each of every fourth term,
 //! are independent of each other.
 //!
-//! The registers are chosen at run time (AVX-512, AVX2, else plain numbers; Neon on ARM). The operations on each lane
+//! The registers are chosen at run time (AVX-512, AVX2, else scalar ones; Neon on ARM). The operations on each lane
 //! are those of the run alone, in their order and without contraction (no fused multiply-add). The result is therefore
 //! independent of the registers and of the other lanes, to the last bit.
 //!

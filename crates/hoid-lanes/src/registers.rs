@@ -5,7 +5,7 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use fearless_simd::{Simd, SimdBase};
+use pulp::Simd;
 
 use crate::number::Number;
 
@@ -18,22 +18,20 @@ pub(crate) struct TwoRegisters<S: Simd> {
 
 impl<S: Simd> TwoRegisters<S> {
     /// Number of lanes.
-    const LANES: usize = 2 * Self::WIDTH;
-    /// Number of lanes of one register.
-    const WIDTH: usize = S::f64s::LEN;
+    const LANES: usize = 2 * S::F64_LANES;
 
     /// Returns the same number in all lanes.
     #[inline(always)]
     pub(crate) fn splat(simd: S, value: f64) -> Self {
         Self {
             simd,
-            registers: [S::f64s::splat(simd, value); 2],
+            registers: [simd.splat_f64s(value); 2],
         }
     }
 }
 
 macro_rules! operations {
-    ($($name:ident, $method:ident);+) => {$(
+    ($($name:ident, $method:ident, $of_simd:ident);+) => {$(
         impl<S: Simd> $name for TwoRegisters<S> {
             type Output = Self;
 
@@ -43,13 +41,13 @@ macro_rules! operations {
                 let [c, d] = other.registers;
                 Self {
                     simd: self.simd,
-                    registers: [a.$method(c), b.$method(d)],
+                    registers: [self.simd.$of_simd(a, c), self.simd.$of_simd(b, d)],
                 }
             }
         }
     )+};
 }
-operations!(Add, add; Sub, sub; Mul, mul; Div, div);
+operations!(Add, add, add_f64s; Sub, sub, sub_f64s; Mul, mul, mul_f64s; Div, div, div_f64s);
 
 impl<S: Simd> Neg for TwoRegisters<S> {
     type Output = Self;
@@ -58,7 +56,7 @@ impl<S: Simd> Neg for TwoRegisters<S> {
     fn neg(self) -> Self {
         let [a, b] = self.registers;
         Self {
-            registers: [-a, -b],
+            registers: [self.simd.neg_f64s(a), self.simd.neg_f64s(b)],
             ..self
         }
     }
@@ -77,27 +75,26 @@ impl<S: Simd> Number for TwoRegisters<S> {
 
     #[inline(always)]
     fn lane(self, lane: usize) -> f64 {
-        self.registers[lane / Self::WIDTH][lane % Self::WIDTH]
+        pulp::bytemuck::cast_slice::<S::f64s, f64>(&self.registers)[lane]
     }
 
     #[inline(always)]
     fn set_lane(&mut self, lane: usize, value: f64) {
-        self.registers[lane / Self::WIDTH][lane % Self::WIDTH] = value;
+        pulp::bytemuck::cast_slice_mut::<S::f64s, f64>(&mut self.registers)[lane] = value;
     }
 
     #[inline(always)]
     fn load(self, values: &[f64]) -> Self {
-        let (first, second) = values[..Self::LANES].split_at(Self::WIDTH);
+        let (all, _) = S::as_simd_f64s(&values[..Self::LANES]);
         Self {
-            registers: [first, second].map(|half| S::f64s::from_slice(self.simd, half)),
+            registers: [all[0], all[1]],
             ..self
         }
     }
 
     #[inline(always)]
     fn store(self, values: &mut [f64]) {
-        let (first, second) = values[..Self::LANES].split_at_mut(Self::WIDTH);
-        self.registers[0].store_slice(first);
-        self.registers[1].store_slice(second);
+        let (all, _) = S::as_mut_simd_f64s(&mut values[..Self::LANES]);
+        [all[0], all[1]] = self.registers;
     }
 }
