@@ -35,13 +35,15 @@ pub(super) fn of_control(
             .map_or_else(String::new, |finding| finding.message));
     }
     let ts_s = record.sample_time().s();
-    let samples = (-found.delay_s / ts_s).round();
+    // Zero without a sign.
+    let samples = (-found.delay_s / ts_s).round() + 0.0;
+    let plural = if samples == 1.0 { "" } else { "s" };
     Ok(Lag {
         samples,
         seconds: samples * ts_s,
         words: format!(
-            "e returns from u by the controlled element with the control {samples} samples late; {:.2} % of the power \
-             is left",
+            "e returns from u by the controlled element with the control {samples} sample{plural} late; {:.2} % of the \
+             power is left",
             100.0 * found.unexplained
         ),
     })
