@@ -1,0 +1,229 @@
+//! Least squares of the equations of the loop, with the delay by a scan.
+
+use hoid_model::Complex64;
+
+use super::spectra::Spectra;
+use crate::linalg::least_squares::{LeastSquares, add_scaled, dot};
+
+/// Range of the delay of the element, s, and the step of the scan.
+const DELAYS_S: (f64, f64, f64) = (-0.05, 0.3, 0.01);
+/// Half width of the smoothing of the residual spectrum, as a logarithm of the frequency.
+const SMOOTHED: f64 = 0.35;
+/// Rounds of weights.
+const ROUNDS: usize = 3;
+
+/// An element of `m` zeros and `n` poles by least squares; coefficients by descending powers of s.
+pub(super) struct Fitted {
+    pub(super) num: Vec<f64>,
+    pub(super) den: Vec<f64>,
+    pub(super) delay_s: f64,
+    pub(super) unexplained: f64,
+}
+
+impl Fitted {
+    pub(super) fn of(spectra: &[Spectra], m: usize, n: usize, sample_time_s: f64) -> Option<Self> {
+        let mut weights: Vec<Vec<f64>> = spectra.iter().map(|s| vec![1.0; s.omega.len()]).collect();
+        let mut num = vec![1.0];
+        let mut best = None;
+        for round in 0..ROUNDS {
+            let rows: Vec<Rows> = (spectra.iter().zip(&weights))
+                .map(|(s, w)| Rows::of(s, w, &num, m, n))
+                .collect();
+            let (from, to, step) = DELAYS_S;
+            let scan = (0..=((to - from) / step).round() as usize).map(|k| from + k as f64 * step);
+            let found = least(scan.flat_map(|delay| Solved::all(&rows, delay)))?;
+            let near = (-4..=4).map(|k| found.delay_s + 0.25 * f64::from(k) * step.min(sample_time_s));
+            let found = least(near.flat_map(|delay| Solved::all(&rows, delay)))?;
+            num = found.theta[n..=n + m].iter().rev().copied().collect();
+            if round + 1 < ROUNDS {
+                let mut rest = found.residuals.as_slice();
+                for (w, s) in weights.iter_mut().zip(spectra) {
+                    let (own, after) = rest.split_at(2 * s.omega.len());
+                    rest = after;
+                    smooth(w, own, &s.omega, found.power);
+                }
+            }
+            best = Some(found);
+        }
+        let found = best?;
+        let descending = |range: std::ops::Range<usize>| found.theta[range].iter().rev().copied();
+        Some(Self {
+            den: [1.0].into_iter().chain(descending(0..n)).collect(),
+            num: descending(n..n + m + 1).collect(),
+            delay_s: found.delay_s,
+            unexplained: found.sum_of_squares / found.power,
+        })
+    }
+}
+
+/// The equations of one record: real and imaginary parts of all frequencies, without their components along T.
+struct Rows<'a> {
+    spectra: &'a Spectra,
+    /// Factor of each frequency: weight over `B h`.
+    factor: Vec<Complex64>,
+    /// Orthonormal columns of T.
+    transient: Vec<Vec<f64>>,
+    m: usize,
+    /// Columns that do not depend on the delay: of A, then of C; and the right-hand side `s^n E`.
+    of_e: Vec<Vec<f64>>,
+    of_targets: Vec<Vec<f64>>,
+    right: Vec<f64>,
+}
+
+impl<'a> Rows<'a> {
+    fn of(spectra: &'a Spectra, weights: &[f64], num: &[f64], m: usize, n: usize) -> Self {
+        let s = |k: usize| Complex64::new(0.0, spectra.omega[k]);
+        let all = 0..spectra.omega.len();
+        let factor: Vec<Complex64> = all
+            .clone()
+            .map(|k| {
+                let b = num.iter().fold(Complex64::new(0.0, 0.0), |sum, c| sum * s(k) + c);
+                weights[k] / (b * spectra.hold[k])
+            })
+            .collect();
+        let powers = |of: &[Complex64], i: usize| -> Vec<f64> {
+            let value = |k: usize| of[k] * factor[k] * s(k).powu(i as u32);
+            stacked(all.clone().map(value))
+        };
+        let ones = vec![Complex64::new(1.0, 0.0); spectra.omega.len()];
+        let mut transient: Vec<Vec<f64>> = Vec::new();
+        for i in 0..=n + 1 {
+            let mut column = powers(&ones, i);
+            let before = dot(&column, &column).sqrt();
+            remove(&mut column, &transient);
+            remove(&mut column, &transient);
+            let norm = dot(&column, &column).sqrt();
+            if norm > 1e-9 * before {
+                column.iter_mut().for_each(|v| *v /= norm);
+                transient.push(column);
+            }
+        }
+        let free = |of: &[Complex64], i: usize| {
+            let mut column = powers(of, i);
+            remove(&mut column, &transient);
+            column
+        };
+        Self {
+            m,
+            of_e: (0..n).map(|i| free(&spectra.e, i)).collect(),
+            of_targets: spectra
+                .targets
+                .iter()
+                .flat_map(|target| (0..=n).map(|i| free(target, i)).collect::<Vec<_>>())
+                .collect(),
+            right: free(&spectra.e, n),
+            spectra,
+            factor,
+            transient,
+        }
+    }
+
+    /// Columns of B and of `B kappa` at the delays of u and of the disturbances.
+    fn of_inputs(&self, delay_s: f64, of_disturbances_s: f64) -> Vec<Vec<f64>> {
+        let disturbances = self.spectra.disturbances.iter().map(|d| (d, of_disturbances_s));
+        let inputs = [(&self.spectra.u, delay_s)].into_iter().chain(disturbances);
+        let column = |of: &[Complex64], delay_s: f64, i: usize| {
+            let value = |(k, &omega): (usize, &f64)| {
+                let s = Complex64::new(0.0, omega);
+                of[k] * self.spectra.hold[k] * self.factor[k] * s.powu(i as u32) * (-s * delay_s).exp()
+            };
+            let mut column = stacked(self.spectra.omega.iter().enumerate().map(value));
+            remove(&mut column, &self.transient);
+            column
+        };
+        inputs
+            .flat_map(|(of, delay_s)| (0..=self.m).map(move |i| (of, delay_s, i)))
+            .map(|(of, delay_s, i)| column(of, delay_s, i))
+            .collect()
+    }
+}
+
+/// Real parts, then imaginary parts.
+fn stacked(values: impl Iterator<Item = Complex64> + Clone) -> Vec<f64> {
+    values.clone().map(|v| v.re).chain(values.map(|v| v.im)).collect()
+}
+
+/// Removes the components along orthonormal columns.
+fn remove(column: &mut [f64], orthonormal: &[Vec<f64>]) {
+    for q in orthonormal {
+        let along = dot(q, column);
+        add_scaled(column, -along, q);
+    }
+}
+
+/// The least-squares solution of all records at a delay.
+struct Solved {
+    /// `a_0 .. a_{n-1}`, `b_0 .. b_m` of u, then the others.
+    theta: Vec<f64>,
+    delay_s: f64,
+    sum_of_squares: f64,
+    /// Power of `B (U + kappa D)` and the residuals, of which the sum of squares is unexplained.
+    power: f64,
+    residuals: Vec<f64>,
+}
+
+impl Solved {
+    /// The solutions with the disturbances as late as u, and on time.
+    fn all(rows: &[Rows<'_>], delay_s: f64) -> impl Iterator<Item = Self> {
+        let disturbed = rows.iter().any(|rows| !rows.spectra.disturbances.is_empty());
+        let on_time = (disturbed && delay_s != 0.0).then_some(0.0);
+        let cases = [Some(delay_s), on_time].into_iter().flatten();
+        cases.filter_map(move |of_disturbances| Self::of(rows, delay_s, of_disturbances))
+    }
+
+    fn of(rows: &[Rows<'_>], delay_s: f64, of_disturbances_s: f64) -> Option<Self> {
+        let blocks: Vec<Vec<Vec<f64>>> = rows
+            .iter()
+            .map(|rows| {
+                let negative = rows.of_e.iter().map(|c| c.iter().map(|v| -v).collect::<Vec<_>>());
+                let inputs = rows.of_inputs(delay_s, of_disturbances_s);
+                let inputs = inputs.into_iter().map(|c| c.iter().map(|v| -v).collect());
+                negative.chain(inputs).chain(rows.of_targets.iter().cloned()).collect()
+            })
+            .collect();
+        let p = blocks.first()?.len();
+        let column = |j: usize| -> Vec<f64> { blocks.iter().flat_map(|block| block[j].iter().copied()).collect() };
+        let columns: Vec<Vec<f64>> = (0..p).map(column).collect();
+        let right: Vec<f64> = rows.iter().flat_map(|rows| rows.right.iter().copied()).collect();
+        let freedom: usize = p + rows.iter().map(|rows| rows.transient.len()).sum::<usize>();
+        if right.len() < 3 * freedom || dot(&right, &right) == 0.0 {
+            return None;
+        }
+        let solved = LeastSquares::factor(&mut columns.concat(), &mut right.clone());
+        if !solved.has_full_rank() {
+            return None;
+        }
+        let theta = solved.solution();
+        let inputs = rows[0].of_e.len()..p - rows[0].of_targets.len();
+        let mut residuals = right;
+        (0..p).for_each(|j| add_scaled(&mut residuals, -theta[j], &columns[j]));
+        let mut power = residuals.clone();
+        inputs.for_each(|j| add_scaled(&mut power, theta[j], &columns[j]));
+        Some(Self {
+            sum_of_squares: dot(&residuals, &residuals),
+            power: dot(&power, &power),
+            theta,
+            delay_s,
+            residuals,
+        })
+    }
+}
+
+fn least(all: impl Iterator<Item = Solved>) -> Option<Solved> {
+    all.min_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares))
+}
+
+/// Weights from the smoothed spectrum of the residuals, which contain the weights before. Rounding has a floor, so
+/// that exact data keep all frequencies.
+fn smooth(weights: &mut [f64], residuals: &[f64], omega: &[f64], power: f64) {
+    let n = omega.len();
+    let own: Vec<f64> = (0..n)
+        .map(|k| (residuals[k].powi(2) + residuals[n + k].powi(2)) / weights[k].powi(2))
+        .collect();
+    let floor = 1e-9 * power / n as f64;
+    for (weight, at) in weights.iter_mut().zip(omega) {
+        let near = (0..n).filter(|&k| (omega[k] / at).ln().abs() < SMOOTHED);
+        let (sum, count) = near.fold((0.0, 0.0), |(sum, count), k| (sum + own[k], count + 1.0));
+        *weight = 1.0 / (sum / count + floor).sqrt();
+    }
+}

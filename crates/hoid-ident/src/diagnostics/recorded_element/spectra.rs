@@ -1,0 +1,98 @@
+//! Fourier coefficients of the signals of a loop, and which of them enter it from outside.
+
+use std::f64::consts::PI;
+
+use hoid_model::{Complex64, Record};
+
+use crate::{
+    diagnostics::other_inputs::TARGETS,
+    frequency::{COMMON_EXCITATIONS, spectrum::coefficients},
+};
+
+/// Names of channels that hold a disturbance at u.
+const DISTURBANCES: [&str; 3] = ["d", "f_d", "disturbance"];
+/// Frequencies of the test, rad/s: those at which people move u.
+const BAND_RAD_S: (f64, f64) = (0.3, 12.0);
+/// Number of frequencies above which more of a record, and further records, add nothing.
+pub(super) const MOST_FREQUENCIES: usize = 1000;
+
+/// Names of the channels that enter the loop from outside.
+pub(super) struct Exogenous {
+    targets: Vec<String>,
+    disturbances: Vec<String>,
+}
+
+impl Exogenous {
+    /// The channels with names of targets and of disturbances that all records have. Other names may be either.
+    pub(super) fn of(records: &[Record], excitation: Option<&str>) -> Self {
+        let moves = |name: &&str| {
+            let is_signal = |record: &Record| record.channels().take(2).any(|channel| channel.name == *name);
+            let varies = |record: &Record| {
+                let values = record.channel(name)?;
+                Some(values.iter().any(|value| *value != values[0]))
+            };
+            records.iter().all(|r| !is_signal(r) && varies(r).is_some())
+                && records.iter().any(|r| varies(r) == Some(true))
+        };
+        let either = COMMON_EXCITATIONS.into_iter().chain(excitation);
+        let of = |known: &[&str], others: &[&str]| -> Vec<String> {
+            let is_other = |name: &&str| !known.contains(name) && !others.contains(name);
+            let mut names: Vec<&str> = known.iter().copied().chain(either.clone().filter(is_other)).collect();
+            names.dedup();
+            names.into_iter().filter(moves).map(str::to_owned).collect()
+        };
+        Self {
+            targets: of(&TARGETS, &DISTURBANCES),
+            disturbances: of(&DISTURBANCES, &TARGETS),
+        }
+    }
+}
+
+/// Fourier coefficients of one record in the band.
+pub(super) struct Spectra {
+    pub(super) omega: Vec<f64>,
+    pub(super) e: Vec<Complex64>,
+    pub(super) u: Vec<Complex64>,
+    pub(super) targets: Vec<Vec<Complex64>>,
+    pub(super) disturbances: Vec<Vec<Complex64>>,
+    /// The hold of u.
+    pub(super) hold: Vec<Complex64>,
+}
+
+impl Spectra {
+    pub(super) fn of(record: &Record, exogenous: &Exogenous) -> Option<Self> {
+        let ts = record.sample_time().s();
+        let most = (2.0 * PI * MOST_FREQUENCIES as f64 / (BAND_RAD_S.1 * ts)) as usize;
+        let samples = record.len().min(most);
+        let step = 2.0 * PI / (samples as f64 * ts);
+        let highest = BAND_RAD_S.1.min(0.4 * PI / ts);
+        let first = ((BAND_RAD_S.0 / step).ceil() as usize).max(2);
+        let bins = first..=(highest / step).floor() as usize;
+        let of = |values: &[f64]| -> Option<Vec<Complex64>> {
+            let all = values[..samples]
+                .iter()
+                .all(|v| v.is_finite())
+                .then(|| coefficients(&values[..samples]))?;
+            all.get(bins.clone()).map(<[Complex64]>::to_vec)
+        };
+        let each = |names: &[String]| {
+            names
+                .iter()
+                .map(|name| of(record.channel(name)?))
+                .collect::<Option<Vec<_>>>()
+        };
+        let omega: Vec<f64> = bins.clone().map(|k| k as f64 * step).collect();
+        let hold = |omega: &f64| {
+            let half = 0.5 * omega * ts;
+            Complex64::from_polar(half.sin() / half, -half)
+        };
+        Some(Self {
+            e: of(record.input())?,
+            u: of(record.output())?,
+            targets: each(&exogenous.targets)?,
+            disturbances: each(&exogenous.disturbances)?,
+            hold: omega.iter().map(hold).collect(),
+            omega,
+        })
+    }
+}
