@@ -50,7 +50,7 @@ pub enum AnalysisError {
     /// Options that contradict each other or the model.
     #[error("{reason}")]
     Options {
-        /// What was found, what was expected, and the remedy.
+        /// The value found, the value expected, and the remedy.
         reason: String,
     },
     /// A text that is not a result.
@@ -58,7 +58,7 @@ pub enum AnalysisError {
         "this is not a result of a fit: {found}; expected what to_json of this version wrote, or identify --json printed"
     )]
     NotAResult {
-        /// What was found.
+        /// The value found.
         found: String,
     },
     /// An option that does not fit the estimator, or does not have this value.
@@ -66,7 +66,7 @@ pub enum AnalysisError {
     Option {
         /// Its name in the registry.
         name: &'static str,
-        /// What was found, what was expected, and the remedy.
+        /// The value found, the value expected, and the remedy.
         reason: String,
     },
     /// An option of other estimators.

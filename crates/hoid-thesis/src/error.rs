@@ -28,7 +28,7 @@ pub enum ThesisError {
     Recordings {
         /// The manifest.
         place: String,
-        /// What is wrong, and the remedy.
+        /// The fault, and the remedy.
         reason: String,
     },
     /// Tables that cannot be read, or a page that cannot be written.

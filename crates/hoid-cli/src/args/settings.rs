@@ -21,7 +21,7 @@ pub struct Recursive;
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Batch;
 
-/// Who has options.
+/// Commands and methods that have options.
 pub trait Registry {
     /// The available items, in the order of help.
     fn specs() -> Vec<MethodSpec>;

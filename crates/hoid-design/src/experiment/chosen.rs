@@ -19,7 +19,7 @@ pub(super) struct Chosen {
     pub findings: Vec<Finding>,
 }
 
-/// What is given next to the people.
+/// Options given together with the people.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Given<'a> {
     pub controlled_element: Option<&'a ContinuousTransferFunction>,

@@ -45,7 +45,7 @@ pub enum DesignError {
     /// A quantity with a number that cannot be read.
     #[error("{found:?} is no {what}; write NAME=5% or NAME=0.05, as tau_e=5%")]
     Unreadable {
-        /// What was expected.
+        /// The value expected.
         what: &'static str,
         /// The text found.
         found: String,

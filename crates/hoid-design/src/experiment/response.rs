@@ -91,7 +91,7 @@ fn expected(omega_rad_s: f64, value: Complex64, [gain, phase]: [f64; 2]) -> Expe
     }
 }
 
-/// What has a response.
+/// A model with a frequency response.
 trait HasResponse {
     fn response(&mut self) -> &mut ExpectedResponse;
 }

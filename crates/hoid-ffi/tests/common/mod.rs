@@ -14,7 +14,7 @@ use hoid_model::{
 };
 use hoid_sim::{RunSeed, Simulator};
 
-/// What the tests run on: 82 s of C4, in which the person changes.
+/// Data of the tests: 82 s of C4, in which the person changes.
 pub fn record() -> Record {
     let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();
     let seed = RunSeed {

@@ -28,7 +28,7 @@ const ON_CIRCLE: f64 = 1.0 - 1e-4;
 /// Distance below which two roots cancel each other.
 const CANCELS: f64 = 0.01;
 
-/// What the starts of one system came to.
+/// Results of the starts of one system.
 struct Outcome {
     number: u64,
     own: Option<Fit>,

@@ -1,6 +1,6 @@
 //! Random Box-Jenkins systems with short records in an open loop.
 //!
-//! What a textbook would pick: nb = 3, nf = 2, nk = 1 .. 3, nc and nd 0 .. 2, 300 samples.
+//! Systems with the orders of textbooks: nb = 3, nf = 2, nk = 1 .. 3, nc and nd 0 .. 2, 300 samples.
 //! Half of the systems have two real poles, most of them slow (0.8 to 0.99), half a pair; the noise
 //! has any colour with roots up to 0.95. The ratio of the variances of noise-free output and noise
 //! lies between 1 and 10, and the input is white, band-limited or a binary sequence of steps.

@@ -51,7 +51,7 @@ fn trial(text: &str) -> Record {
     .unwrap()
 }
 
-/// What states that it has converged is not worse than the prediction error method by much: on the
+/// A method that reports convergence is not worse than the prediction error method by much: on the
 /// border of stability it once was, by half of the loss.
 #[test]
 #[ignore = "minutes; prints the table of all cells"]

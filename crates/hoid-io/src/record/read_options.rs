@@ -20,7 +20,7 @@ pub struct Repair {
     pub fill: bool,
 }
 
-/// What is done with a column that lacks a value in some rows.
+/// Treatment of a column that lacks a value in some rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sparse {
     /// The last value is held until the next.

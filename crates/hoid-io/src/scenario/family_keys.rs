@@ -29,7 +29,7 @@ pub(super) struct FamilyFile {
     pub(super) last: Option<FamilyStateTable>,
     pub(super) schedule: Option<ScheduleTable>,
     pub(super) target: Option<ExcitationTable>,
-    /// What the person does about a target that they see.
+    /// Response of the person to a target that they see.
     pub(super) feedforward: Option<FeedforwardTable>,
     pub(super) disturbance: Option<ExcitationTable>,
     #[serde(default)]

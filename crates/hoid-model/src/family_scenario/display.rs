@@ -1,4 +1,4 @@
-//! What a person sees of the task.
+//! The display: the signals of the task that a person sees.
 
 use serde::{Deserialize, Serialize};
 

@@ -139,7 +139,7 @@ fn what_cannot_be_decimated_is_said() {
     assert!(found.input().is_empty() && found.output().iter().all(|u| (u - 1.0).abs() < 1e-12));
 }
 
-/// What a stream gives of these samples.
+/// Output of a stream for these samples.
 fn streamed(hz: f64, factor: usize, samples: impl Iterator<Item = (f64, f64)>) -> Vec<[f64; 2]> {
     let mut decimator = Decimator::new(factor, SampleTime::new(1.0 / hz).unwrap(), [true, false]).unwrap();
     samples.filter_map(|(e, u)| decimator.take([e, u])).collect()

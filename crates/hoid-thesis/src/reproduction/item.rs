@@ -34,7 +34,7 @@ pub(super) struct SharedRuns {
 /// Makes shared runs.
 type MakeRuns = Arc<dyn Fn(&Watch<'_>) -> Result<Vec<String>, ThesisError> + Send + Sync>;
 
-/// What follows the making of runs.
+/// Steps after the runs are made.
 pub(super) struct Watch<'a> {
     /// Called with a number of completed estimates.
     pub done: &'a (dyn Fn(u64) + Sync),

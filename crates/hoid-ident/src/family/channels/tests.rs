@@ -35,7 +35,7 @@ fn run(operator: &FamilyOperator, target: Option<&FamilyOperator>, preview: usiz
     task.run(operator, target, seed)
 }
 
-/// What the person does.
+/// Responses of the person.
 struct Task {
     /// Samples of the target that are shown ahead.
     preview: usize,

@@ -95,7 +95,7 @@ impl Source for CsvSource<'_> {
     }
 }
 
-/// What a text holds, and where its rows are.
+/// The columns of a text, and the positions of its rows.
 pub(super) struct Parsed {
     pub(super) columns: Vec<Column>,
     pub(super) rows: usize,
