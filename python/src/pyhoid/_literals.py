@@ -27,11 +27,11 @@ BatchMethod = Literal["pem", "iv4", "sriv", "rivbj"]
 #: What chooses between candidates.
 Criterion = Literal["loss", "aic", "aicc", "bic", "fpe", "mdl", "yic"]
 
-#: What is done about faults of records.
+#: Treatment of faults of records.
 Faults = Literal["bridge", "cut", "report", "keep"]
 
-#: What is taken out of input and output.
+#: Trend taken out of input and output.
 Detrending = Literal["none", "mean", "linear"]
 
-#: What is done with a column that lacks a value in some rows.
+#: Treatment of a column that lacks a value in some rows.
 Sparse = Literal["hold", "linear", "drop"]
