@@ -51,40 +51,7 @@ start_span_s = [0.0, 30.72]
 track_delay_s = [0.2, 0.4]
 "#;
 
-const MANIFEST: &str = r#"
-name = "tracking"
-
-[read]
-input = "r-y"
-output = "u"
-from_s = 5.0
-to_s = 45.0
-
-[prepare]
-offset = { u = 1 }
-
-[analysis]
-windows_s = [[5.0, 25.0], [25.0, 45.0]]
-nd = [1, 4]
-methods = ["rls", "rpem"]
-
-[conditions.fo]
-controlled_element = "1/1,0"
-excitation = "d"
-
-[[runs]]
-file = "P03_fo_03.csv"
-subject = "P03"
-condition = "fo"
-run = "3"
-counts = true
-
-[[runs]]
-file = "P04_fo_01.csv"
-subject = "P04"
-condition = "fo"
-run = "1"
-"#;
+const MANIFEST: &str = include_str!("../../../fixtures/group/tracking.toml");
 
 /// Values in wrong places.
 const VALUES: [&str; 30] = [

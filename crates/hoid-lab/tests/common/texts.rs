@@ -22,33 +22,7 @@ const SCENARIOS: [&str; 3] = [
     include_str!("../../../../fixtures/scenario/pursuit.toml"),
 ];
 
-const MANIFEST: &str = r#"
-name = "tracking"
-
-[read]
-input = "r-y"
-output = "u"
-from_s = 5.0
-to_s = 45.0
-
-[prepare]
-offset = { u = 1 }
-
-[analysis]
-windows_s = [[5.0, 25.0], [25.0, 45.0]]
-nd = [1, 4]
-methods = ["rls", "rpem"]
-
-[conditions.fo]
-controlled_element = "1/1,0"
-excitation = "d"
-
-[[runs]]
-file = "P03_fo_03.csv"
-subject = "P03"
-condition = "fo"
-run = "3"
-"#;
+const MANIFEST: &str = include_str!("../../../../fixtures/group/tracking.toml");
 
 /// Reads a text, which may lie at a path, as far as a command does before it computes; true if it is accepted.
 type Reader = fn(&str, &Path) -> bool;
