@@ -3,7 +3,8 @@
 //! The options are one object with the keywords of `pyhoid.Tracker`: `structure`, `na` to `nk` (a
 //! number, or a pair that is searched on the warm-up), `criterion`, `start` (coefficients by name, or
 //! "nothing"), `largest`, `at`, `controlled_element` ("90/(s(s+6))", or a pair of coefficients),
-//! `warm_up` in s, and the options of the method, whose values are those of the command line: a
+//! `decimate` ("auto", "off" or a factor: rates above 200 Hz are decimated to about 100 Hz by default), `warm_up` in s,
+//! and the options of the method, whose values are those of the command line: a
 //! number, a text, true, a pair, values by name. `prior` may be a fit itself, as `hoid identify
 //! --json` prints it, or the name of its file.
 
@@ -12,17 +13,13 @@ use std::{ops::RangeInclusive, path::Path};
 use hoid_ident::{NamedOrders, order_selection::Criterion};
 use hoid_io::{FitFile, is_fit_file, parse_fit, read_fit};
 use hoid_model::{
-    ContinuousTransferFunction, FittedOperator, MAX_DELAY, MAX_ORDER, NamedChoice, SampleTime, Structure,
+    ContinuousTransferFunction, Decimation, FittedOperator, MAX_DELAY, MAX_ORDER, ModelError, NamedChoice, SampleTime,
+    Structure,
 };
-use hoid_track::{Method, RequestedStart, TrackOptions, TrackPlan, TrackRequest};
+use hoid_track::{DEFAULT_WARM_UP_S, Live, Method, RequestedStart, TrackOptions, TrackRequest};
 use serde_json::{Map, Value};
 
 use crate::status::Failure;
-
-/// Length of the warm-up of methods that have one, s.
-const DEFAULT_WARM_UP_S: f64 = 20.0;
-/// Longest warm-up, samples.
-const LONGEST_WARM_UP: f64 = 1e7;
 
 /// The request, as it is saved.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,16 +33,9 @@ pub(crate) struct TrackerRequest {
     pub fit: Option<String>,
 }
 
-/// Meaning of it.
-pub(crate) struct ResolvedTracker {
-    pub plan: TrackPlan,
-    pub sample_time: SampleTime,
-    /// Samples of the warm-up.
-    pub warm_up: usize,
-}
-
 impl TrackerRequest {
-    pub fn resolve(&self) -> Result<ResolvedTracker, Failure> {
+    /// The recursion at its start.
+    pub fn live(&self) -> Result<Live, Failure> {
         let sample_time = SampleTime::new(self.sample_time_s)?;
         let mut options = object(self.options.as_deref().unwrap_or("{}"))?;
         let mut method = match &self.method {
@@ -58,6 +48,7 @@ impl TrackerRequest {
         let at_rad_s = taken(&mut options, "at", numbers)?;
         let controlled_element = taken(&mut options, "controlled_element", element)?;
         let start = taken(&mut options, "start", start)?;
+        let decimation = taken(&mut options, "decimate", decimation)?.unwrap_or_default();
         let warm_up_s = taken(&mut options, "warm_up", number)?.unwrap_or(DEFAULT_WARM_UP_S);
         let mut orders = NamedOrders::new();
         for name in ["na", "nb", "nc", "nd", "nf", "nk"] {
@@ -66,10 +57,6 @@ impl TrackerRequest {
             }
         }
         set(&mut method, options, self.fit.as_deref())?;
-        if method.smooths() {
-            return Err(Failure::option("smooth: a stream has no future samples; drop it"));
-        }
-
         let asked = TrackRequest {
             structure,
             orders,
@@ -80,17 +67,7 @@ impl TrackerRequest {
             controlled_element,
             ..TrackRequest::of(method)
         };
-        let warm_up = (warm_up_s / sample_time.s()).round();
-        if !(1.0..=LONGEST_WARM_UP).contains(&warm_up) {
-            return Err(Failure::option(format!(
-                "warm_up is {warm_up_s} s, expected a time of one sample to 10 million"
-            )));
-        }
-        Ok(ResolvedTracker {
-            plan: asked.plan(sample_time)?,
-            sample_time,
-            warm_up: warm_up as usize,
-        })
+        Ok(Live::new(&asked, sample_time, decimation, warm_up_s)?)
     }
 }
 
@@ -125,7 +102,7 @@ fn set(method: &mut Method, mut options: Map<String, Value>, fit: Option<&str>) 
         let own: Vec<&str> = method.settings().list().iter().map(|own| own.name).collect();
         return Err(Failure::option(format!(
             "there is no option {unknown}; there is structure, na to nk, criterion, start, largest, at, \
-             controlled_element, warm_up, and for {method} {}",
+             controlled_element, decimate, warm_up, and for {method} {}",
             own.join(", ")
         )));
     }
@@ -166,6 +143,11 @@ fn taken<T>(
 fn choice<T: NamedChoice>(value: &Value) -> Result<T, String> {
     let name = value.as_str().ok_or("its name as a text")?;
     T::of_name(name).map_err(|error| error.to_string())
+}
+
+fn decimation(value: &Value) -> Result<Decimation, String> {
+    let text = text(value).unwrap_or_default();
+    text.parse().map_err(|error: ModelError| error.to_string())
 }
 
 fn number(value: &Value) -> Result<f64, String> {
@@ -242,37 +224,42 @@ fn text(value: &Value) -> Option<String> {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use hoid_track::Stage;
+
     use super::*;
 
-    fn resolved(method: &str, options: &str) -> Result<ResolvedTracker, Failure> {
+    fn live(method: &str, options: &str) -> Result<Live, Failure> {
         let asked = TrackerRequest {
             method: Some(method.to_owned()),
             sample_time_s: 0.01,
             options: Some(options.to_owned()),
             fit: None,
         };
-        asked.resolve()
+        asked.live()
     }
 
     #[test]
     fn options_are_those_of_python() {
-        let found = resolved(
+        let found = live(
             "rpem",
             r#"{"structure": "bj", "nk": 29, "nd": [1, 2], "memory": 256, "memory_of": {"b": "inf"}, "largest": 50,
                 "at": [1, 2.5], "controlled_element": "90/(s(s+6))", "warm_up": 10, "forgetting": "exponential",
                 "criterion": "aicc", "limit": null}"#,
         )
         .unwrap();
-        let options = found.plan.options();
-        assert_eq!((options.orders.nk, options.orders.nd, found.warm_up), (29, 2, 1000));
+        let options = found.plan().options();
+        let Stage::Collecting(warm_up) = found.stage() else {
+            panic!("no warm-up")
+        };
+        assert_eq!((options.orders.nk, options.orders.nd, warm_up.needed), (29, 2, 1000));
         assert_eq!((options.largest, options.at_rad_s.clone()), (50.0, vec![1.0, 2.5]));
         let memory = options.method.settings().get("memory_of").unwrap();
         assert_eq!(memory, "b=inf");
-        assert!(!found.plan.is_settled());
-        let pair = resolved("adaptive", r#"{"controlled_element": [[90], [1, 6, 0]]}"#).unwrap();
-        assert_eq!(pair.plan.options().controlled_element, options.controlled_element);
-        let none = resolved("adaptive", " ").unwrap();
-        assert_eq!(none.plan.options().method, Method::adaptive());
+        assert!(!found.plan().is_settled());
+        let pair = live("adaptive", r#"{"controlled_element": [[90], [1, 6, 0]]}"#).unwrap();
+        assert_eq!(pair.plan().options().controlled_element, options.controlled_element);
+        let none = live("adaptive", " ").unwrap();
+        assert_eq!(none.plan().options().method, Method::adaptive());
     }
 
     #[test]
@@ -298,7 +285,7 @@ mod tests {
                 "no form of an operator",
             ),
         ] {
-            let failure = resolved(method, options).err().unwrap();
+            let failure = live(method, options).err().unwrap();
             assert!(failure.text.contains(reason), "{options}: {}", failure.text);
         }
         let mut asked = TrackerRequest {
@@ -307,8 +294,8 @@ mod tests {
             options: None,
             fit: None,
         };
-        assert!(asked.resolve().is_err());
+        assert!(asked.live().is_err());
         asked.sample_time_s = 0.01;
-        assert!(asked.resolve().is_ok());
+        assert!(asked.live().is_ok());
     }
 }

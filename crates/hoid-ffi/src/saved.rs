@@ -4,7 +4,6 @@
 //! [`hoid_track::Live::saved`] (`packed`).
 
 use hoid_model::Orders;
-use hoid_track::Live;
 use serde_json::{Value, json};
 
 use crate::{
@@ -52,10 +51,10 @@ impl Session {
             options: text("options"),
             fit: text("fit"),
         };
-        let live = |understood: &crate::options::ResolvedTracker| {
-            Live::restored(&understood.plan, orders, &numbers, understood.sample_time)
-        };
-        Self::of(asked, live).map_err(|failure| Failure::new(HOID_BAD_STATE, failure.text))
+        let of_state = |failure: Failure| Failure::new(HOID_BAD_STATE, failure.text);
+        let mut session = Self::of(asked).map_err(of_state)?;
+        session.restore(orders, &numbers).map_err(of_state)?;
+        Ok(session)
     }
 }
 
@@ -105,20 +104,24 @@ mod tests {
         let samples = samples();
         let [taken, all] = TAKEN;
         // The second is an earlier name, as it is in what was saved under it.
-        let of_bank = [("adaptive", None), ("population", None)];
-        let at_work = [("rpem", Some(AT_ONCE))];
-        let warm = [
-            ("rpem", Some("{\"nk\": 29, \"nd\": 1, \"warm_up\": 20}")),
-            ("rpem", Some("{\"nk\": 29, \"nd\": [1, 2], \"warm_up\": 10}")),
+        let of_bank = [
+            ("adaptive", None, 0.01),
+            ("population", None, 0.01),
+            ("adaptive", None, 0.001),
         ];
-        let warming = [("rpem", Some("{\"nk\": 29, \"nd\": 1, \"warm_up\": 1}"))];
+        let at_work = [("rpem", Some(AT_ONCE), 0.01)];
+        let warm = [
+            ("rpem", Some("{\"nk\": 29, \"nd\": 1, \"warm_up\": 20}"), 0.01),
+            ("rpem", Some("{\"nk\": 29, \"nd\": [1, 2], \"warm_up\": 10}"), 0.01),
+        ];
+        let warming = [("rpem", Some("{\"nk\": 29, \"nd\": 1, \"warm_up\": 1}"), 0.01)];
         let cases = if cfg!(miri) {
             [&at_work[..], &warming].concat()
         } else {
             [&of_bank[..], &at_work, &warm, &warming].concat()
         };
-        for (method, options) in cases {
-            let mut first = Session::new(Some(method), 0.01, options, None).unwrap();
+        for (method, options, sample_time_s) in cases {
+            let mut first = Session::new(Some(method), sample_time_s, options, None).unwrap();
             for sample in &samples[..taken] {
                 first.take(*sample, true);
             }

@@ -3,12 +3,11 @@
 
 use std::ffi::{CStr, CString};
 
-use hoid_ident::IdentError;
-use hoid_model::{VerdictLevel, uncertainty::Estimate};
-use hoid_track::{Change, Counts, Live, Outcome, Sample, TrackPlan, Tracker};
+use hoid_model::{Orders, VerdictLevel, uncertainty::Estimate};
+use hoid_track::{Change, Live, Outcome, Sample, Stage, Tracker};
 
 use crate::{
-    options::{ResolvedTracker, TrackerRequest},
+    options::TrackerRequest,
     status::Failure,
     types::{HOID_SHIFTS, HoidChange, HoidCounts, HoidEstimate, HoidOutcome, HoidShift},
 };
@@ -28,8 +27,6 @@ const SHIFTED: [&CStr; HOID_SHIFTS] = [c"K_e", c"K_e_dot", c"omega_nm", c"zeta_n
 /// A tracker and the prior knowledge of it.
 pub(crate) struct Session {
     asked: TrackerRequest,
-    plan: TrackPlan,
-    sample_time: hoid_model::SampleTime,
     live: Live,
     /// Names of the coefficients, once there are some.
     names: Vec<CString>,
@@ -49,26 +46,25 @@ impl Session {
             options: options.map(str::to_owned),
             fit: fit.map(str::to_owned),
         };
-        Self::of(asked, |understood| {
-            Live::new(understood.plan.options(), understood.warm_up, understood.sample_time)
-        })
+        Self::of(asked)
     }
 
-    /// With the recursion that `live` makes.
-    pub fn of(
-        asked: TrackerRequest,
-        live: impl FnOnce(&ResolvedTracker) -> Result<Live, IdentError>,
-    ) -> Result<Self, Failure> {
-        let understood = asked.resolve()?;
+    /// As requested, at its start.
+    pub fn of(asked: TrackerRequest) -> Result<Self, Failure> {
         let mut session = Self {
-            live: live(&understood)?,
+            live: asked.live()?,
             asked,
-            plan: understood.plan,
-            sample_time: understood.sample_time,
             names: Vec::new(),
         };
         session.name();
         Ok(session)
+    }
+
+    /// Restores the recursion from what was saved of it.
+    pub fn restore(&mut self, orders: Option<Orders>, numbers: &[f64]) -> Result<(), Failure> {
+        self.live.restore(orders, numbers)?;
+        self.name();
+        Ok(())
     }
 
     /// Components of it, and its recursion to be saved.
@@ -77,7 +73,7 @@ impl Session {
     }
 
     fn name(&mut self) {
-        if let Live::Tracking(tracker) = &self.live {
+        if let Some(tracker) = self.live.tracker() {
             let names = tracker.parameter_names();
             self.names = names.into_iter().filter_map(|name| CString::new(name).ok()).collect();
         }
@@ -85,9 +81,9 @@ impl Session {
 
     /// The tracker; while there is none, how far the warm-up is.
     pub fn tracker(&self) -> Result<&Tracker, Failure> {
-        match &self.live {
-            Live::Tracking(tracker) => Ok(tracker),
-            Live::Collecting(warm_up) => {
+        match self.live.stage() {
+            Stage::Tracking(tracker) => Ok(tracker),
+            Stage::Collecting(warm_up) => {
                 let trouble = warm_up.trouble.as_deref().map_or(String::new(), |t| format!("; {t}"));
                 Err(Failure::nothing(format!(
                     "the tracker is warming up: it has {} of {} samples{trouble}",
@@ -99,17 +95,11 @@ impl Session {
 
     /// Takes a sample. With `moves` false the filters follow and the estimate stays.
     pub fn take(&mut self, sample: Sample, moves: bool) -> HoidOutcome {
-        let outcome: Option<Outcome> = match &mut self.live {
-            Live::Tracking(tracker) if !moves => Some(tracker.update(sample, false)),
-            live => {
-                let plan = &self.plan;
-                let taken = live.update(sample, &|record| plan.choose(record, &|| {}));
-                if taken.started.is_some() {
-                    self.name();
-                }
-                taken.outcome
-            }
-        };
+        let taken = (self.live).update(sample, moves, &|plan, record| plan.choose(record, &|| {}));
+        if taken.started.is_some() {
+            self.name();
+        }
+        let outcome = taken.outcome;
         let tracker = self.tracker().ok();
         let told = |of: fn(&Outcome) -> bool| i32::from(outcome.as_ref().is_some_and(of));
         HoidOutcome {
@@ -118,7 +108,7 @@ impl Session {
             skipped: told(|o| o.skipped),
             held: told(|o| o.held),
             shortened: told(|o| o.shortened),
-            changed: i32::from(tracker.is_some_and(|tracker| tracker.change().is_some())),
+            changed: i32::from(!taken.between && tracker.is_some_and(|tracker| tracker.change().is_some())),
         }
     }
 
@@ -203,13 +193,7 @@ impl Session {
 
     /// Samples so far.
     pub fn counts(&self) -> HoidCounts {
-        let counts = match &self.live {
-            Live::Tracking(tracker) => tracker.counts(),
-            Live::Collecting(warm_up) => Counts {
-                samples: warm_up.collected as u64,
-                ..Counts::default()
-            },
-        };
+        let counts = self.live.counts();
         HoidCounts {
             samples: counts.samples,
             skipped: counts.skipped,
@@ -221,7 +205,7 @@ impl Session {
 
     /// Sample time, s.
     pub fn sample_time_s(&self) -> f64 {
-        self.sample_time.s()
+        self.live.sample_time().s()
     }
 }
 

@@ -19,7 +19,7 @@ use std::{
 
 use hoid_ident::order_selection::{Criterion, default_operator_ranges};
 use hoid_model::{Complex64, ContinuousTransferFunction, SampleTime, uncertainty::Estimate};
-use hoid_track::{Live, Response, Sample, TrackOptions, TrackPlan};
+use hoid_track::{DEFAULT_WARM_UP_S, Live, Response, Sample, Stage, TrackOptions, TrackPlan, Tracker};
 use serde::Serialize;
 
 use crate::{
@@ -30,8 +30,6 @@ use crate::{
     task::{TICK_S, TICKS_PER_SAMPLE},
 };
 
-/// Warm-up of methods that need one, s.
-const WARM_UP_S: f64 = 20.0;
 /// Initial delay of a method, samples of 10 ms.
 const DEFAULT_NK: usize = 21;
 /// Frequency range of the search for the crossover, rad/s, and its number of geometric steps.
@@ -75,7 +73,6 @@ pub type Samples = Vec<Sample>;
 /// The recursion of one run.
 pub struct LiveRun {
     live: Live,
-    plan: TrackPlan,
     lags: LagFits,
     course: Course,
     t_s: f64,
@@ -94,8 +91,7 @@ impl LiveRun {
         let ranges = default_operator_ranges(options.structure, ts);
         let plan = TrackPlan::new(options, ranges, Criterion::Bic, ts)?;
         Ok(Self {
-            live: Live::new(plan.options(), (WARM_UP_S / ts.s()).round() as usize, ts)?,
-            plan,
+            live: Live::of_plan(plan, DEFAULT_WARM_UP_S)?,
             lags: LagFits::new(ts),
             t_s: -course.times_s().0,
             course,
@@ -107,11 +103,9 @@ impl LiveRun {
     pub fn take(&mut self, samples: &[Sample]) -> LiveLine {
         let mut changed_s = None;
         for sample in samples {
-            let plan = &self.plan;
-            self.live.update(*sample, &|record| plan.choose(record, &|| ()));
-            if let Live::Tracking(tracker) = &self.live
-                && let Some(change) = tracker.change()
-            {
+            self.live
+                .update(*sample, true, &|plan, record| plan.choose(record, &|| ()));
+            if let Some(change) = self.live.tracker().and_then(Tracker::change) {
                 let at_s = self.t_s - change.seconds_ago;
                 changed_s = Some(at_s);
                 self.lags.changed(at_s);
@@ -132,11 +126,13 @@ impl LiveRun {
             Lag::NotDetermined => line.lag_waiting = Some("not determined"),
             Lag::Known(lag) => line.lag_s = reported(lag),
         }
-        let tracker = match &self.live {
-            Live::Tracking(tracker) => tracker,
-            Live::Collecting(warm_up) => {
+        let tracker = match self.live.stage() {
+            Stage::Tracking(tracker) => tracker,
+            Stage::Collecting(warm_up) => {
                 let left = warm_up.needed.saturating_sub(warm_up.collected) as f64 * self.ts.s();
-                line.waiting = Some(format!("the first {WARM_UP_S} s are collected, {left:.0} s to go"));
+                line.waiting = Some(format!(
+                    "the first {DEFAULT_WARM_UP_S} s are collected, {left:.0} s to go"
+                ));
                 return line;
             }
         };

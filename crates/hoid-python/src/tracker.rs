@@ -1,8 +1,8 @@
 //! `pyhoid.Tracker`: a recursive estimate, online.
 
-use hoid_ident::{Choice, IdentError};
-use hoid_model::{Decimation, Decimator, Orders, Record, SampleTime};
-use hoid_track::{Counts, Live, Sample, TrackPlan, Tracker, opened, sealed};
+use hoid_ident::Choice;
+use hoid_model::{Decimation, Orders, SampleTime};
+use hoid_track::{Live, Sample, Stage, Tracker};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::{prelude::*, types::PyDict};
 
@@ -13,9 +13,6 @@ use crate::{
     fit::PyFit,
     recursion,
 };
-
-/// Maximum length of the warm-up, samples.
-const LONGEST_WARM_UP: usize = 10_000_000;
 
 /// The state of a tracker, to restore it: orders, numbers of the tracker, numbers of the warm-up.
 type Saved<'py> = (Option<Bound<'py, PyDict>>, Bound<'py, PyArray1<f64>>);
@@ -29,63 +26,23 @@ type OpenLoopParts = (
 /// The package derives `pyhoid.Tracker` from it.
 #[pyclass(name = "Tracker", module = "pyhoid._pyhoid", subclass)]
 pub struct PyTracker {
-    plan: TrackPlan,
     live: Live,
     choice: Option<Choice>,
-    sample_time: SampleTime,
-    /// Decimator of error, control and target.
-    decimator: Option<Decimator<3>>,
-}
-
-/// Searches the open orders on the start record, and runs the filters over it.
-fn started(plan: &TrackPlan, record: &Record) -> Result<(Tracker, Option<Choice>), IdentError> {
-    let (options, choice) = plan.choose(record, &|| {})?;
-    let mut tracker = Tracker::new(&options, Some(record), record.sample_time())?;
-    let reference = record.channel("f_t");
-    for k in 0..record.len() {
-        let sample = Sample {
-            e: record.input().get(k).copied().unwrap_or(0.0),
-            u: record.output()[k],
-            reference: reference.map(|r| r[k]),
-        };
-        tracker.update(sample, false);
-    }
-    Ok((tracker, choice))
 }
 
 impl PyTracker {
     fn tracker(&self) -> Outcome<&Tracker> {
-        match &self.live {
-            Live::Tracking(tracker) => Ok(tracker),
-            Live::Collecting(warm_up) => Err(bad_option(format!(
+        match self.live.stage() {
+            Stage::Tracking(tracker) => Ok(tracker),
+            Stage::Collecting(warm_up) => Err(bad_option(format!(
                 "the tracker is warming up: it has {} of {} samples; check .ready first",
                 warm_up.collected, warm_up.needed
             ))),
         }
     }
 
-    /// The sample time that is tracked.
-    fn tracked(&self) -> SampleTime {
-        self.decimator.as_ref().map_or(self.sample_time, Decimator::sample_time)
-    }
-
     fn take(&mut self, sample: Sample, update: bool) -> f64 {
-        let sample = match &mut self.decimator {
-            None => sample,
-            Some(decimator) => match decimator.take([sample.e, sample.u, sample.reference.unwrap_or(f64::NAN)]) {
-                Some([e, u, f_t]) => Sample {
-                    e,
-                    u,
-                    reference: Some(f_t).filter(|f| f.is_finite()),
-                },
-                None => return f64::NAN,
-            },
-        };
-        if let (Live::Tracking(tracker), false) = (&mut self.live, update) {
-            return tracker.update(sample, false).innovation.unwrap_or(f64::NAN);
-        }
-        let plan = &self.plan;
-        let taken = self.live.update(sample, &|record| plan.choose(record, &|| {}));
+        let taken = (self.live).update(sample, update, &|plan, record| plan.choose(record, &|| {}));
         if let Some((_, choice)) = taken.started {
             self.choice = choice;
         }
@@ -101,7 +58,7 @@ impl PyTracker {
         py: Python<'_>,
         options: &Bound<'_, PyDict>,
         sample_time: f64,
-        warm_up: usize,
+        warm_up: f64,
         record: Option<Bound<'_, PyAny>>,
     ) -> Outcome<Self> {
         let sample_time = SampleTime::new(sample_time)?;
@@ -110,71 +67,23 @@ impl PyTracker {
             None => Decimation::Off,
         };
         let asked = recursion::request(options)?;
-        let decimation = if asked.counts_samples() {
-            decimation.when_named()
-        } else {
-            decimation
-        };
-        let factor = decimation.factor(sample_time);
-        let decimator = match factor {
-            1 => None,
-            factor => Some(Decimator::new(factor, sample_time, [true, false, false])?),
-        };
-        let tracked = decimator.as_ref().map_or(sample_time, Decimator::sample_time);
-        let warm_up = if factor > 1 { (warm_up / factor).max(1) } else { warm_up };
-        let plan = asked.plan(tracked)?;
-        if plan.options().method.smooths() {
-            return Err(bad_option(
-                "smooth belongs to pyhoid.track: a stream has no future samples",
-            ));
-        }
-        if !(1..=LONGEST_WARM_UP).contains(&warm_up) {
-            return Err(bad_option(
-                "warm_up: expected a time in s of one sample to 10 million samples",
-            ));
-        }
+        let mut live = Live::new(&asked, sample_time, decimation, warm_up)?;
+        let mut choice = None;
         if let Some(record) = record {
             let record = arrays::record(&record, Wanted::Only(&["f_t"]))?;
-            if !record.sample_time().matches(sample_time) {
-                return Err(bad_option(format!(
-                    "the start record has a sample time of {} s, the tracker one of {} s",
-                    record.sample_time().s(),
-                    sample_time.s()
-                )));
-            }
-            let (tracker, choice) = py.detach(|| {
-                let record = if factor > 1 {
-                    record.decimated(factor)?.0
-                } else {
-                    record
-                };
-                started(&plan, &record)
-            })?;
-            return Ok(Self {
-                plan,
-                live: Live::Tracking(Box::new(tracker)),
-                choice,
-                sample_time,
-                decimator,
-            });
+            choice = py.detach(|| live.start_from(record))?;
         }
-        Ok(Self {
-            live: Live::new(plan.options(), warm_up, tracked)?,
-            plan,
-            choice: None,
-            sample_time,
-            decimator,
-        })
+        Ok(Self { live, choice })
     }
 
     /// Takes one sample. Returns the innovation: NaN at a fault and during the warm-up.
     #[pyo3(signature = (e, u, f_t=None, update=true))]
     fn step(&mut self, py: Python<'_>, e: f64, u: f64, f_t: Option<f64>, update: bool) -> f64 {
         let sample = Sample { e, u, reference: f_t };
-        match self.live {
-            Live::Tracking(_) => self.take(sample, update),
+        match self.live.stage() {
+            Stage::Tracking(_) => self.take(sample, update),
             // The last sample of the warm-up starts the fit.
-            Live::Collecting(_) => py.detach(|| self.take(sample, update)),
+            Stage::Collecting(_) => py.detach(|| self.take(sample, update)),
         }
     }
 
@@ -221,37 +130,37 @@ impl PyTracker {
     /// True once there is an estimate.
     #[getter]
     fn ready(&self) -> bool {
-        matches!(self.live, Live::Tracking(_))
+        self.live.tracker().is_some()
     }
 
     /// Why the last start fit failed, or why the warm-up started again.
     #[getter]
     fn trouble(&self) -> Option<String> {
-        match &self.live {
-            Live::Tracking(tracker) => tracker.failures().map(|(_, reason)| reason),
-            Live::Collecting(warm_up) => warm_up.trouble.clone(),
+        match self.live.stage() {
+            Stage::Tracking(tracker) => tracker.failures().map(|(_, reason)| reason),
+            Stage::Collecting(warm_up) => warm_up.trouble.clone(),
         }
     }
 
     #[getter]
     fn sample_time(&self) -> f64 {
-        self.sample_time.s()
+        self.live.sample_time().s()
     }
 
     /// How a high rate is lowered; None if it is not.
     #[getter]
     fn decimation(&self) -> Option<String> {
-        self.decimator.as_ref().map(|decimator| decimator.done().to_string())
+        self.live.decimated().map(|done| done.to_string())
     }
 
     #[getter]
     fn method(&self) -> &'static str {
-        self.plan.options().method.name()
+        self.live.plan().options().method.name()
     }
 
     #[getter]
     fn structure(&self) -> &'static str {
-        self.plan.options().structure.name()
+        self.live.plan().options().structure.name()
     }
 
     #[getter]
@@ -294,13 +203,13 @@ impl PyTracker {
     /// The settings of responses: frequencies in rad/s.
     #[getter]
     fn at(&self) -> Vec<f64> {
-        self.plan.options().at_rad_s.clone()
+        self.live.plan().options().at_rad_s.clone()
     }
 
     /// The controlled element.
     #[getter]
     fn controlled_element(&self) -> Option<String> {
-        let element = self.plan.options().controlled_element.as_ref();
+        let element = self.live.plan().options().controlled_element.as_ref();
         element.map(ToString::to_string)
     }
 
@@ -343,13 +252,7 @@ impl PyTracker {
     #[getter]
     fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
-        let counts = match &self.live {
-            Live::Tracking(tracker) => tracker.counts(),
-            Live::Collecting(warm_up) => Counts {
-                samples: warm_up.collected as u64,
-                ..Counts::default()
-            },
-        };
+        let counts = self.live.counts();
         all.set_item("samples", counts.samples)?;
         all.set_item("skipped", counts.skipped)?;
         all.set_item("held", counts.held)?;
@@ -361,37 +264,30 @@ impl PyTracker {
     /// Event of the guard at the last sample, its times in s before that sample.
     #[getter]
     fn event<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Live::Tracking(tracker) = &self.live else {
+        let Some(tracker) = self.live.tracker() else {
             return Ok(None);
         };
-        let event = tracker.event().map(|event| event.at(0.0, self.tracked()));
+        let tracked = self.live.plan().sample_time();
+        let event = tracker.event().map(|event| event.at(0.0, tracked));
         event.map(|fault| figures::track_fault(py, &fault)).transpose()
     }
 
     /// True while the guard lets the estimate stay constant.
     #[getter]
     fn paused(&self) -> bool {
-        matches!(&self.live, Live::Tracking(tracker) if tracker.is_paused())
+        self.live.tracker().is_some_and(Tracker::is_paused)
     }
 
     /// The batch fit that the tracker started from; None with a given start, or from a pickle.
     #[getter]
     fn start(&self) -> Option<PyFit> {
-        let Live::Tracking(tracker) = &self.live else {
-            return None;
-        };
-        Some(PyFit::new(tracker.start()?.clone(), self.choice.clone(), 1))
+        let start = self.live.tracker()?.start()?.clone();
+        Some(PyFit::new(start, self.choice.clone(), 1))
     }
 
     /// The orders, once there is a tracker, and all that changes as numbers.
     fn saved<'py>(&mut self, py: Python<'py>) -> PyResult<Saved<'py>> {
-        let (orders, mut numbers) = self.live.saved();
-        if let Some(decimator) = &mut self.decimator {
-            let of_tracker = numbers.len();
-            numbers.extend(decimator.saved());
-            numbers = sealed(numbers);
-            numbers.push(of_tracker as f64);
-        }
+        let (orders, numbers) = self.live.saved();
         let orders = orders.map(|orders| figures::orders(py, &orders)).transpose()?;
         Ok((orders, array(py, numbers)))
     }
@@ -402,18 +298,7 @@ impl PyTracker {
         orders: Option<std::collections::BTreeMap<String, usize>>,
         numbers: PyReadonlyArray1<'_, f64>,
     ) -> Outcome<()> {
-        let mut numbers = numbers.as_slice().map_err(PyErr::from)?;
-        let tracked = self.tracked();
-        if let Some(decimator) = &mut self.decimator {
-            let wrong = || bad_option("the saved tracker is of another rate, or was changed since; save it again");
-            let (of_tracker, all) = numbers.split_last().ok_or_else(wrong)?;
-            let all = opened(all).ok_or_else(wrong)?;
-            let (tracker, of_decimator) = all.split_at_checked(*of_tracker as usize).ok_or_else(wrong)?;
-            if !decimator.restore(of_decimator) {
-                return Err(wrong());
-            }
-            numbers = tracker;
-        }
+        let numbers = numbers.as_slice().map_err(PyErr::from)?;
         let orders = match orders {
             None => None,
             Some(orders) => {
@@ -431,7 +316,6 @@ impl PyTracker {
                 })
             }
         };
-        self.live = Live::restored(&self.plan, orders, numbers, tracked)?;
-        Ok(())
+        Ok(self.live.restore(orders, numbers)?)
     }
 }

@@ -9,7 +9,7 @@ use hoid_model::{
     scenario::{Condition, Scenario},
 };
 use hoid_sim::{RunSeed, Simulator};
-use hoid_track::{Live, Method, Sample, TrackOptions, Tracker, WarmUp};
+use hoid_track::{Method, Sample, Stage, TrackOptions, Tracker, WarmUp};
 use proptest::{collection::vec, prelude::*, sample::Index, test_runner::RngSeed};
 
 /// Options with the numbers of a tracker that has run, method by method; and those of a warm-up.
@@ -56,12 +56,12 @@ fn saved() -> &'static Saved {
             let numbers = tracker.saved();
             (options, numbers)
         };
-        let mut live = Live::new(&of(hoid_survey::physical()), 2000, record.sample_time()).unwrap();
+        let mut live = Stage::new(&of(hoid_survey::physical()), 2000, record.sample_time()).unwrap();
         let keep = of(hoid_survey::physical());
         for k in 0..100 {
-            live.update(sample(k), &|_| Ok((keep.clone(), None)));
+            live.update(sample(k), true, &|_| Ok((keep.clone(), None)));
         }
-        let Live::Collecting(mut warm_up) = live else {
+        let Stage::Collecting(mut warm_up) = live else {
             panic!("the warm-up is over")
         };
         Saved {

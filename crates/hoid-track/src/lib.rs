@@ -37,7 +37,7 @@
 //! | `response` | [`Response`]: gain and phase of an estimate at a frequency |
 //! | `open_loop` | [`OpenLoop`]: crossover and phase margin of an estimate with the controlled element |
 //! | `tracker`, `outcome`, `saved` | [`Tracker`]: one sample at a time; a tracker as numbers, to continue elsewhere |
-//! | `live` | [`Live`]: the warm-up of a stream, then its tracker |
+//! | `live`, `stage` | [`Live`]: a stream, at a lower rate if its own is high; [`Stage`]: its warm-up, then its tracker |
 //! | `guard` | samples and spans that no tracking makes, kept from the recursion |
 //! | `stationary` | what a recursion without a guard does while nothing arrives |
 //! | `idle` | what was recorded before a run started |
@@ -91,6 +91,7 @@ mod saved;
 mod seal;
 mod setup;
 mod shared_options;
+mod stage;
 mod start;
 mod start_noise;
 mod stationary;
@@ -106,7 +107,7 @@ pub use determined::Determined;
 pub use forgetting::ForgettingRule;
 pub use guard::{GuardAction, GuardChannel, GuardChoice, GuardEvent, GuardKind, GuardOptions, TrackFault};
 pub use idle::{default_start_span, idle_head};
-pub use live::{Choose, Live, LiveOutcome, WarmUp};
+pub use live::{ChooseOrders, DEFAULT_WARM_UP_S, Live};
 pub use memory::{CommonMemory, Memory, MemoryOptions};
 pub use method::RecursiveMethod;
 pub use methods::{AdaptiveOptions, Method, RlsOptions, RpemOptions};
@@ -122,6 +123,7 @@ pub use response::Response;
 pub use seal::{opened, sealed};
 pub use setup::StartAt;
 pub use shared_options::{BoundOptions, DelayOptions, GainOptions, StabilityOptions, WindupGuard};
+pub use stage::{Choose, LiveOutcome, Stage, WarmUp};
 pub use trace::{OPERATOR_COLUMNS, Trace};
 pub use tracker::Tracker;
 pub use validation::{COVARIANCES, CovarianceChoice, CovarianceUpdates, choose_covariance, track_validated};

@@ -1,267 +1,336 @@
-//! The recursion of a stream: the warm-up for the start fit, then the tracker.
+//! A live recursion at the rate of its samples: a high rate is filtered and decimated, then the warm-up of a start fit,
+//! then the tracker.
+//!
+//! Rates above 200 Hz are decimated to about 100 Hz ([`Decimation::Auto`]), unless the request counts samples. The
+//! estimate is then [`Live::behind_s`] later than the sample that was taken.
 
-use std::collections::VecDeque;
-
-use hoid_core::state::{State, visit_all};
-use hoid_model::{Channel, Orders, Record, SampleTime};
+use hoid_model::{Decimated, Decimation, Decimator, Orders, Record, SampleTime};
 
 use crate::{
-    Outcome, Sample, StartAt, TrackOptions, TrackPlan, Tracker,
-    idle::idle_head,
+    Counts, LiveOutcome, Sample, Stage, TrackOptions, TrackPlan, TrackRequest, Tracker,
     seal::{opened, sealed},
 };
 use hoid_ident::{Choice, IdentError};
 
-/// Computes the options from a record of the warm-up, with the searched values.
-pub type Choose<'a> = &'a dyn Fn(&Record) -> Result<(TrackOptions, Option<Choice>), IdentError>;
+/// Default length of the warm-up of methods that have one, s.
+pub const DEFAULT_WARM_UP_S: f64 = 20.0;
+/// Longest warm-up, samples.
+const LONGEST_WARM_UP: f64 = 1e7;
 
-/// Share of the warm-up that is collected in addition after a failed fit.
-const QUARTER: usize = 4;
-/// Length that is kept of a warm-up that continues, as a multiple of its length.
-const KEPT: usize = 2;
-/// Longest run of faulty samples within a warm-up, s; after a longer one the warm-up restarts.
-const LONGEST_FAULT_S: f64 = 1.0;
+/// Searches the open orders of a plan on the record of the warm-up.
+pub type ChooseOrders<'a> = &'a dyn Fn(&TrackPlan, &Record) -> Result<(TrackOptions, Option<Choice>), IdentError>;
 
-/// State of a live recursion.
+/// A live recursion.
 #[derive(Debug)]
-pub enum Live {
-    /// The samples of the start fit are being collected.
-    Collecting(WarmUp),
-    /// The tracker is running.
-    Tracking(Box<Tracker>),
-}
-
-/// Result of a sample.
-#[derive(Debug, Default)]
-pub struct LiveOutcome {
-    /// Outcome of the tracker, once there is one.
-    pub outcome: Option<Outcome>,
-    /// Options and search of a start fit that was made at this sample.
-    pub started: Option<(TrackOptions, Option<Choice>)>,
+pub struct Live {
+    plan: TrackPlan,
+    /// Sample time of the stream.
+    sample_time: SampleTime,
+    /// Decimator of e, u and the external signal.
+    decimator: Option<Decimator<3>>,
+    stage: Stage,
 }
 
 impl Live {
-    /// Builds a recursion that starts at once if its start is given, else after a warm-up of a given number of
-    /// samples.
+    /// Builds the requested recursion for samples of a rate.
     ///
     /// # Errors
-    /// [`IdentError`] for a start that cannot be used.
-    pub fn new(options: &TrackOptions, warm_up: usize, sample_time: SampleTime) -> Result<Self, IdentError> {
-        Ok(match options.start {
-            StartAt::Span(_) if !options.method.starts_itself() => Self::Collecting(WarmUp::new(warm_up, sample_time)),
-            _ => Self::Tracking(Box::new(Tracker::new(options, None, sample_time)?)),
+    /// [`IdentError`] for options that contradict each other, a warm-up that is no time, and a method that smooths.
+    pub fn new(
+        asked: &TrackRequest,
+        sample_time: SampleTime,
+        decimation: Decimation,
+        warm_up_s: f64,
+    ) -> Result<Self, IdentError> {
+        let decimation = if asked.counts_samples() {
+            decimation.when_named()
+        } else {
+            decimation
+        };
+        let decimator = match decimation.factor(sample_time) {
+            1 => None,
+            factor => Some(Decimator::new(factor, sample_time, [true, false, false])?),
+        };
+        let tracked = decimator.as_ref().map_or(sample_time, Decimator::sample_time);
+        Ok(Self {
+            sample_time,
+            decimator,
+            ..Self::of_plan(asked.plan(tracked)?, warm_up_s)?
         })
     }
 
-    /// Returns everything that changes as numbers, and the orders once there is a tracker, for [`Live::restored`]. The
-    /// recursion does not change.
-    pub fn saved(&mut self) -> (Option<Orders>, Vec<f64>) {
-        match self {
-            Self::Tracking(tracker) => (Some(tracker.options().orders), tracker.saved()),
-            Self::Collecting(warm_up) => (None, warm_up.saved()),
-        }
-    }
-
-    /// Restores the recursion that [`Live::saved`] returned, from its plan.
+    /// Builds the recursion of a plan, at the rate of the plan.
     ///
     /// # Errors
-    /// [`IdentError::BadStart`] for numbers of another recursion, and for numbers that were changed or cut; the errors
-    /// of [`Tracker::new`].
-    pub fn restored(
-        plan: &TrackPlan,
-        orders: Option<Orders>,
-        numbers: &[f64],
-        sample_time: SampleTime,
-    ) -> Result<Self, IdentError> {
-        let Some(orders) = orders else {
-            let warm_up = WarmUp::restored(sample_time, numbers).ok_or_else(|| IdentError::BadStart {
-                reason: "the numbers of the saved warm-up were changed or cut since; save it again".to_owned(),
-            })?;
-            return Ok(Self::Collecting(warm_up));
+    /// As [`Live::new`].
+    pub fn of_plan(plan: TrackPlan, warm_up_s: f64) -> Result<Self, IdentError> {
+        let bad = |option: &str, found: String, expected: &str| IdentError::BadOption {
+            option: option.to_owned(),
+            found,
+            expected: expected.to_owned(),
         };
-        let tracker = Tracker::restored(&plan.with_orders(orders), sample_time, numbers)?;
-        Ok(Self::Tracking(Box::new(tracker)))
+        if plan.options().method.smooths() {
+            return Err(bad(
+                "smooth",
+                "a stream, which has no future samples".to_owned(),
+                "a recording",
+            ));
+        }
+        let sample_time = plan.sample_time();
+        let samples = (warm_up_s / sample_time.s()).round();
+        if !(1.0..=LONGEST_WARM_UP).contains(&samples) {
+            return Err(bad(
+                "warm_up",
+                format!("{warm_up_s} s"),
+                "a time of one sample to 10 million",
+            ));
+        }
+        Ok(Self {
+            stage: Stage::new(plan.options(), samples as usize, sample_time)?,
+            plan,
+            sample_time,
+            decimator: None,
+        })
     }
 
-    /// Takes a sample; NaN marks faulty or missing values. The fit of the warm-up is made at its last sample, with the
-    /// options that `choose` returns for it.
-    pub fn update(&mut self, sample: Sample, choose: Choose<'_>) -> LiveOutcome {
-        let warm_up = match self {
-            Self::Tracking(tracker) => {
-                return LiveOutcome {
-                    outcome: Some(tracker.update(sample, true)),
-                    started: None,
-                };
-            }
-            Self::Collecting(warm_up) => warm_up,
+    /// Starts from a record at the rate of the stream in place of the warm-up; returns the search of open orders.
+    ///
+    /// # Errors
+    /// [`IdentError`] for a record of another rate, and the errors of the start fit.
+    pub fn start_from(&mut self, record: Record) -> Result<Option<Choice>, IdentError> {
+        if !record.sample_time().matches(self.sample_time) {
+            return Err(IdentError::BadStart {
+                reason: format!(
+                    "the start record has a sample time of {} s, the tracker one of {} s",
+                    record.sample_time().s(),
+                    self.sample_time.s()
+                ),
+            });
+        }
+        let record = match &self.decimator {
+            Some(decimator) => record.decimated(decimator.done().factor)?.0,
+            None => record,
         };
-        warm_up.collect(sample);
-        if warm_up.collected < warm_up.needed {
-            return LiveOutcome::default();
+        let (options, choice) = self.plan.choose(&record, &|| {})?;
+        let mut tracker = Tracker::new(&options, Some(&record), record.sample_time())?;
+        let reference = record.channel("f_t");
+        for (k, u) in record.output().iter().enumerate() {
+            let sample = Sample {
+                e: record.input().get(k).copied().unwrap_or(0.0),
+                u: *u,
+                reference: reference.and_then(|r| r.get(k)).copied(),
+            };
+            tracker.update(sample, false);
         }
-        if warm_up.leave_out_idle() {
-            return LiveOutcome::default();
-        }
-        match warm_up.start(choose) {
-            Ok((tracker, choice)) => {
-                let options = tracker.options().clone();
-                *self = Self::Tracking(Box::new(tracker));
-                LiveOutcome {
-                    outcome: None,
-                    started: Some((options, choice)),
+        self.stage = Stage::Tracking(Box::new(tracker));
+        Ok(choice)
+    }
+
+    /// Takes a sample; NaN marks faulty or missing values. If `moves` is false a tracker only updates its filters.
+    /// `choose` searches open orders at the end of the warm-up.
+    pub fn update(&mut self, sample: Sample, moves: bool, choose: ChooseOrders<'_>) -> LiveOutcome {
+        let sample = match &mut self.decimator {
+            None => sample,
+            Some(decimator) => {
+                let Some([e, u, f_t]) = decimator.take([sample.e, sample.u, sample.reference.unwrap_or(f64::NAN)])
+                else {
+                    return LiveOutcome {
+                        between: true,
+                        ..LiveOutcome::default()
+                    };
+                };
+                Sample {
+                    e,
+                    u,
+                    reference: Some(f_t).filter(|f| f.is_finite()),
                 }
             }
-            Err(error) => {
-                warm_up.needed = warm_up.collected + (warm_up.length / QUARTER).max(1);
-                warm_up.trouble = Some(error.to_string());
-                LiveOutcome::default()
+        };
+        let plan = &self.plan;
+        self.stage.update(sample, moves, &|record| choose(plan, record))
+    }
+
+    /// Returns the plan, at the rate that is tracked.
+    pub fn plan(&self) -> &TrackPlan {
+        &self.plan
+    }
+
+    /// Returns the stage: warm-up or tracker.
+    pub fn stage(&self) -> &Stage {
+        &self.stage
+    }
+
+    /// Returns the tracker, once there is one.
+    pub fn tracker(&self) -> Option<&Tracker> {
+        match &self.stage {
+            Stage::Tracking(tracker) => Some(tracker),
+            Stage::Collecting(_) => None,
+        }
+    }
+
+    /// Returns the counts of the recursion; those of the warm-up count its samples.
+    pub fn counts(&self) -> Counts {
+        match &self.stage {
+            Stage::Tracking(tracker) => tracker.counts(),
+            Stage::Collecting(warm_up) => Counts {
+                samples: warm_up.collected as u64,
+                ..Counts::default()
+            },
+        }
+    }
+
+    /// Returns the sample time of the stream.
+    pub fn sample_time(&self) -> SampleTime {
+        self.sample_time
+    }
+
+    /// Returns the decimation, if there is one.
+    pub fn decimated(&self) -> Option<Decimated> {
+        self.decimator.as_ref().map(Decimator::done)
+    }
+
+    /// Returns the time by which the tracked sample is earlier than the one that was taken, s.
+    pub fn behind_s(&self) -> f64 {
+        let samples = self.decimator.as_ref().map_or(0, Decimator::lag_samples);
+        samples as f64 * self.sample_time.s()
+    }
+
+    /// Returns everything that changes as numbers, and the orders once there is a tracker, for [`Live::restore`]. The
+    /// recursion does not change.
+    pub fn saved(&mut self) -> (Option<Orders>, Vec<f64>) {
+        let (orders, mut numbers) = self.stage.saved();
+        if let Some(decimator) = &mut self.decimator {
+            let of_stage = numbers.len();
+            numbers.extend(decimator.saved());
+            numbers.push(of_stage as f64);
+            numbers = sealed(numbers);
+        }
+        (orders, numbers)
+    }
+
+    /// Restores the state that [`Live::saved`] returned, into a recursion of the same request.
+    ///
+    /// # Errors
+    /// [`IdentError::BadStart`] for numbers of another recursion, and for numbers that were changed or cut.
+    pub fn restore(&mut self, orders: Option<Orders>, numbers: &[f64]) -> Result<(), IdentError> {
+        let mut of_stage = numbers;
+        if let Some(decimator) = &mut self.decimator {
+            let wrong = || IdentError::BadStart {
+                reason: "the saved tracker is of another rate, or was changed or cut since; save it again".to_owned(),
+            };
+            let (length, all) = opened(numbers).and_then(<[f64]>::split_last).ok_or_else(wrong)?;
+            let (stage, of_decimator) = all.split_at_checked(*length as usize).ok_or_else(wrong)?;
+            if !decimator.restore(of_decimator) {
+                return Err(wrong());
             }
+            of_stage = stage;
         }
+        self.stage = Stage::restored(&self.plan, orders, of_stage, self.plan.sample_time())?;
+        Ok(())
     }
 }
 
-/// The samples that are collected for the start fit.
-#[derive(Debug)]
-pub struct WarmUp {
-    length: usize,
-    sample_time: SampleTime,
-    samples: VecDeque<Sample>,
-    /// Number of samples since the collection started.
-    pub collected: usize,
-    /// Number of samples at which the fit is tried.
-    pub needed: usize,
-    /// Reason why the last start fit failed or the collection restarted.
-    pub trouble: Option<String>,
-    /// Number of faulty samples at the end.
-    faulty: usize,
-}
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_model::{
+        Channel,
+        scenario::{Condition, Scenario},
+    };
+    use hoid_sim::{RunSeed, Simulator};
 
-impl State for WarmUp {
-    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
-        visit_all(
-            &mut [
-                &mut self.length,
-                &mut self.collected,
-                &mut self.needed,
-                &mut self.faulty,
-            ],
-            each,
-        );
-        let mut kept = self.samples.len();
-        kept.visit(each);
-        let nothing = Sample {
-            e: 0.0,
-            u: 0.0,
+    use super::*;
+    use crate::Method;
+
+    /// The first seconds of a run of C1 at 1000 Hz, each sample of the run held.
+    fn fast(length_s: f64) -> Record {
+        let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+        let record = simulator.run(RunSeed::default(), false).unwrap();
+        let record = record.span(0.0, length_s).unwrap();
+        let held = |name: &str, values: &[f64]| {
+            let values = values.iter().flat_map(|v| [*v; 10]).collect();
+            Channel::new(name, "", values)
+        };
+        let (e, u) = (held("e", record.input()), held("u", record.output()));
+        Record::new(SampleTime::new(0.001).unwrap(), e, u).unwrap()
+    }
+
+    fn samples(record: &Record) -> impl Iterator<Item = Sample> {
+        let pairs = record.input().iter().zip(record.output());
+        pairs.map(|(e, u)| Sample {
+            e: *e,
+            u: *u,
             reference: None,
-        };
-        self.samples.resize(kept.min(KEPT.saturating_mul(self.length)), nothing);
-        for sample in &mut self.samples {
-            let mut known = sample.reference.is_some();
-            let mut reference = sample.reference.unwrap_or(f64::NAN);
-            visit_all(&mut [&mut sample.e, &mut sample.u, &mut known, &mut reference], each);
-            sample.reference = known.then_some(reference);
-        }
-    }
-}
-
-impl WarmUp {
-    /// Returns the warm-up as numbers, for [`WarmUp::restored`]; the reason of the last failure is not among them.
-    pub fn saved(&mut self) -> Vec<f64> {
-        let mut numbers = Vec::new();
-        self.visit(&mut |number| numbers.push(*number));
-        sealed(numbers)
+        })
     }
 
-    /// Restores the warm-up that [`WarmUp::saved`] returned. `None` for numbers of something else, and for numbers
-    /// that were changed or cut.
-    pub fn restored(sample_time: SampleTime, numbers: &[f64]) -> Option<Self> {
-        let mut warm_up = Self::new(0, sample_time);
-        let mut left = opened(numbers)?.iter();
-        let mut lacking = false;
-        warm_up.visit(&mut |number| match left.next() {
-            Some(saved) => *number = *saved,
-            None => lacking = true,
-        });
-        (!lacking && left.next().is_none()).then_some(warm_up)
+    fn live(asked: &TrackRequest) -> Live {
+        let ts = SampleTime::new(0.001).unwrap();
+        Live::new(asked, ts, Decimation::Auto, DEFAULT_WARM_UP_S).unwrap()
     }
 
-    fn new(length: usize, sample_time: SampleTime) -> Self {
-        Self {
-            length,
-            sample_time,
-            samples: VecDeque::new(),
-            collected: 0,
-            needed: length,
-            trouble: None,
-            faulty: 0,
+    fn choose(plan: &TrackPlan, record: &Record) -> Result<(TrackOptions, Option<Choice>), IdentError> {
+        plan.choose(record, &|| {})
+    }
+
+    #[test]
+    fn a_fast_stream_is_tracked_as_its_decimated_recording() {
+        let record = fast(12.0);
+        let mut live = live(&TrackRequest::default());
+        let advanced = (samples(&record))
+            .filter(|sample| !live.update(*sample, true, &choose).between)
+            .count();
+        assert!((live.behind_s() - 0.15).abs() < 0.02, "{}", live.behind_s());
+        assert_eq!(live.decimated().map(|done| done.factor), Some(10));
+
+        let (lower, _) = record.decimated(10).unwrap();
+        let mut tracker = Tracker::new(live.plan().options(), None, lower.sample_time()).unwrap();
+        for sample in samples(&lower).take(advanced) {
+            tracker.update(sample, true);
+        }
+        assert!(advanced > 1100, "{advanced}");
+        assert_eq!(live.tracker().unwrap().theta(), tracker.theta());
+        assert_eq!(live.counts(), tracker.counts());
+    }
+
+    #[test]
+    fn a_rate_is_kept_where_samples_are_counted() {
+        assert!(live(&TrackRequest::of(Method::rpem())).decimated().is_none());
+    }
+
+    #[test]
+    fn a_restored_stream_continues_between_two_samples_of_the_lower_rate() {
+        let record = fast(6.0);
+        let all: Vec<Sample> = samples(&record).collect();
+        let (before, after) = all.split_at(3005);
+        let mut first = live(&TrackRequest::default());
+        for sample in before {
+            first.update(*sample, true, &choose);
+        }
+        let (orders, numbers) = first.saved();
+        let mut second = live(&TrackRequest::default());
+        second.restore(orders, &numbers).unwrap();
+        for sample in after {
+            let pair = [&mut first, &mut second].map(|live| live.update(*sample, true, &choose));
+            assert_eq!(pair[0].between, pair[1].between);
+            assert_eq!(pair[0].outcome, pair[1].outcome);
+        }
+        assert_eq!(first.tracker().unwrap().theta(), second.tracker().unwrap().theta());
+        for wrong in [&numbers[1..], &numbers[..numbers.len() - 1], &[]] {
+            assert!(second.restore(orders, wrong).is_err());
         }
     }
 
-    /// Takes a sample. The collection starts with a sound sample, and restarts after a long fault.
-    fn collect(&mut self, sample: Sample) {
-        let sound = sample.e.is_finite() && sample.u.is_finite();
-        self.faulty = if sound { 0 } else { self.faulty + 1 };
-        if self.samples.is_empty() && !sound {
-            return;
+    #[test]
+    fn requests_that_cannot_be_live_are_refused() {
+        let ts = SampleTime::new(0.01).unwrap();
+        let asked = TrackRequest::default();
+        for warm_up_s in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let error = Live::new(&asked, ts, Decimation::Off, warm_up_s).unwrap_err();
+            assert!(error.to_string().contains("warm_up"), "{error}");
         }
-        if self.faulty as f64 * self.sample_time.s() > LONGEST_FAULT_S {
-            *self = Self::new(self.length, self.sample_time);
-            self.trouble = Some(format!(
-                "more than {LONGEST_FAULT_S} s of faulty samples: the warm-up started again"
-            ));
-            return;
-        }
-        if self.samples.len() == KEPT * self.length {
-            self.samples.pop_front();
-        }
-        self.samples.push_back(sample);
-        self.collected += 1;
-    }
-
-    /// Leaves out the idle head, and collects as many samples in its place; false if there is none.
-    fn leave_out_idle(&mut self) -> bool {
-        let Ok(record) = self.record() else { return false };
-        let idle = idle_head(&record);
-        if idle == 0 {
-            return false;
-        }
-        self.samples.drain(..idle.min(self.samples.len()));
-        self.needed = self.collected + idle;
-        self.trouble = Some(format!(
-            "neither e nor u moved for {:.1} s: left out, the warm-up continues",
-            idle as f64 * self.sample_time.s()
-        ));
-        true
-    }
-
-    /// Builds the tracker with the batch fit of the collected samples and with settled filters.
-    fn start(&self, choose: Choose<'_>) -> Result<(Tracker, Option<Choice>), IdentError> {
-        let record = self.record()?;
-        let (options, choice) = choose(&record)?;
-        let mut tracker = Tracker::new(&options, Some(&record), self.sample_time)?;
-        for sample in &self.samples {
-            tracker.update(*sample, false);
-        }
-        Ok((tracker, choice))
-    }
-
-    /// Returns the collected samples as a record; a faulty value is replaced by the last good one.
-    fn record(&self) -> Result<Record, IdentError> {
-        let channel = |name: &str, of: fn(&Sample) -> f64| {
-            let mut last = self.samples.iter().map(of).find(|v| v.is_finite()).unwrap_or(0.0);
-            let values = self.samples.iter().map(|s| {
-                let v = of(s);
-                last = if v.is_finite() { v } else { last };
-                last
-            });
-            Channel::new(name, "", values.collect())
-        };
-        let (input, output) = (channel("e", |s| s.e), channel("u", |s| s.u));
-        let record = Record::new(self.sample_time, input, output)?.labelled("of the warm-up");
-        if self.samples.iter().any(|s| s.reference.is_none()) {
-            return Ok(record);
-        }
-        let reference = channel("f_t", |s| s.reference.unwrap_or(f64::NAN));
-        Ok(record.with_channel(reference)?)
+        let mut live = live(&asked);
+        let error = live.start_from(fast(2.0).decimated(10).unwrap().0).unwrap_err();
+        assert!(error.to_string().contains("0.001 s"), "{error}");
     }
 }

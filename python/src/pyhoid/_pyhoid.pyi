@@ -355,7 +355,7 @@ class Trace:
 class Tracker:
     # `pyhoid.Tracker` has the keywords that people write.
     def __new__(
-        cls, options: dict[str, Any], sample_time: float, warm_up: int, record: Record | None
+        cls, options: dict[str, Any], sample_time: float, warm_up: float, record: Record | None
     ) -> Any: ...
     def step(self, e: float, u: float, f_t: float | None = None, update: bool = True) -> float:
         """Take one sample. Returns the innovation: NaN at a fault and during the warm-up."""

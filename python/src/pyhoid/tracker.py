@@ -83,14 +83,13 @@ class Tracker(_pyhoid.Tracker):
         """See the class."""
         method = _recursion.name_of_now(method)
         options = _recursion.plain(locals(), settings) | {"decimate": str(decimate)}
-        samples = round(warm_up / sample_time) if sample_time > 0 else 0
-        return cls._made(options, float(sample_time), samples, record)
+        return cls._made(options, float(sample_time), float(warm_up), record)
 
     @classmethod
     def _made(
-        cls, options: dict[str, Any], sample_time: float, warm_up: int, record: Record | None
+        cls, options: dict[str, Any], sample_time: float, warm_up: float, record: Record | None
     ) -> Tracker:
-        tracker: Tracker = super().__new__(cls, options, sample_time, max(warm_up, 0), record)
+        tracker: Tracker = super().__new__(cls, options, sample_time, warm_up, record)
         tracker._options = options
         return tracker
 
@@ -206,6 +205,7 @@ def _restored(
     orders: dict[str, int] | None,
     numbers: FloatArray,
 ) -> Tracker:
-    tracker = kind._made(options, sample_time, 1, None)
+    # The length of the warm-up is in the numbers: any valid one serves here.
+    tracker = kind._made(options, sample_time, max(20.0, sample_time), None)
     tracker.restore(orders, numbers)
     return tracker

@@ -14,6 +14,6 @@ mod settings;
 mod tracked;
 
 pub use errors::relative_errors;
-pub use run::{Tracking, plan_of};
+pub use run::{Tracking, options_of_recursion};
 pub use settings::settings_of_recursion;
 pub use tracked::Tracked;

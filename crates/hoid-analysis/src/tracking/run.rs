@@ -202,14 +202,16 @@ impl Tracking {
 }
 
 /// Returns the plan of a recursion; its errors are reported as errors of its options.
-///
-/// # Errors
-/// [`AnalysisError::Options`].
-pub fn plan_of(asked: &TrackRequest, sample_time: SampleTime) -> Result<TrackPlan, AnalysisError> {
-    asked.plan(sample_time).map_err(|error| match error {
+fn plan_of(asked: &TrackRequest, sample_time: SampleTime) -> Result<TrackPlan, AnalysisError> {
+    asked.plan(sample_time).map_err(options_of_recursion)
+}
+
+/// Reports an error of a requested recursion as one of its options.
+pub fn options_of_recursion(error: IdentError) -> AnalysisError {
+    match error {
         IdentError::BadStart { reason } => options(format!("--start: {reason}")),
         other => options(other.to_string()),
-    })
+    }
 }
 
 fn options(reason: String) -> AnalysisError {

@@ -23,7 +23,7 @@ use hoid_model::{
     scenario::{Condition as OfText, Scenario},
 };
 use hoid_sim::{RunSeed, Simulator};
-use hoid_track::{Live, Method, Sample, TrackOptions, Tracker, WarmUp, sealed};
+use hoid_track::{Method, Sample, Stage, TrackOptions, Tracker, WarmUp, sealed};
 use serde_json::{Value, json};
 
 use crate::{
@@ -245,10 +245,10 @@ impl Hostile {
         };
         let Some((options, _)) = self.trackers.get(which) else {
             if let Some(warm_up) = WarmUp::restored(sample_time, &numbers) {
-                let mut live = Live::Collecting(warm_up);
+                let mut live = Stage::Collecting(warm_up);
                 let default = TrackOptions::default_for(Method::adaptive(), 29);
                 for k in from..from + SAMPLES {
-                    live.update(sample(k), &|_| Ok((default.clone(), None)));
+                    live.update(sample(k), true, &|_| Ok((default.clone(), None)));
                 }
                 live.saved();
             }
@@ -303,9 +303,9 @@ fn saved(record: &Record) -> (Vec<(TrackOptions, Vec<f64>)>, Vec<f64>) {
         (options, numbers)
     };
     let default = of(hoid_survey::physical());
-    let mut live = Live::new(&default, 2000, record.sample_time()).unwrap();
+    let mut live = Stage::new(&default, 2000, record.sample_time()).unwrap();
     for k in 0..100 {
-        live.update(sample(k), &|_| Ok((default.clone(), None)));
+        live.update(sample(k), true, &|_| Ok((default.clone(), None)));
     }
     (all.into_iter().map(run).collect(), live.saved().1)
 }

@@ -119,10 +119,7 @@ impl EstimateDatagram {
         innovation: Option<f64>,
         change: Option<&(Option<f64>, Change)>,
     ) -> Self {
-        let tracker = match live {
-            Live::Tracking(tracker) => Some(tracker),
-            Live::Collecting(_) => None,
-        };
+        let tracker = live.tracker();
         let operator = tracker.map(|tracker| tracker.operator());
         let level = tracker
             .zip(operator.as_ref())

@@ -1,7 +1,7 @@
 //! One line of the output.
 
 use hoid::model::{Decimated, Finding, VerdictLevel, uncertainty::Estimate};
-use hoid::track::{Change, Live, TrackFault, Tracker};
+use hoid::track::{Change, Live, Stage, TrackFault, Tracker};
 use serde::{Serialize, Serializer};
 use serde_json::Value;
 
@@ -134,8 +134,6 @@ pub struct StreamStatus<'a> {
     pub event: Option<TrackFault>,
     /// Faults since the last line.
     pub fault: Option<String>,
-    /// The decimation, if any.
-    pub decimated: Option<Decimated>,
     /// Findings that make the whole stream doubtful.
     pub finding: Option<&'a Finding>,
 }
@@ -146,10 +144,7 @@ impl StreamStatus<'_> {
     /// # Errors
     /// Errors of the serialiser, which do not occur for a buffer in memory.
     pub fn write(&self, buffer: &mut Vec<u8>) -> serde_json::Result<()> {
-        let tracker: Option<&Tracker> = match self.live {
-            Live::Tracking(tracker) => Some(tracker),
-            Live::Collecting(_) => None,
-        };
+        let tracker = self.live.tracker();
         let operator = tracker.map(Tracker::operator);
         let level = tracker.zip(operator.as_ref()).map(|(t, o)| t.level(o));
         let line = Line {
@@ -183,15 +178,15 @@ impl StreamStatus<'_> {
             counts: self.counts,
             event: self.event.as_ref().map(json::track_fault),
             fault: self.fault.as_deref(),
-            decimated: self.decimated.map(Rate::from),
+            decimated: self.live.decimated().map(Rate::from),
             findings: self.finding.map(json::finding).into_iter().collect(),
-            warm_up: match self.live {
-                Live::Collecting(warm_up) => Some(WarmUp {
+            warm_up: match self.live.stage() {
+                Stage::Collecting(warm_up) => Some(WarmUp {
                     collected: warm_up.collected,
                     needed: warm_up.needed,
                     reason: warm_up.trouble.as_deref(),
                 }),
-                Live::Tracking(_) => None,
+                Stage::Tracking(_) => None,
             },
         };
         buffer.clear();

@@ -24,8 +24,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-use hoid::analysis::plan_of;
-use hoid::model::{Decimator, SampleTime};
+use hoid::analysis::options_of_recursion;
+use hoid::model::SampleTime;
+use hoid::track::{DEFAULT_WARM_UP_S, Live};
 
 use crate::{args::StreamArgs, error::CliError, interrupt, output, recursion};
 use lines::Lines;
@@ -46,24 +47,20 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
     let sample_time = SampleTime::new(1.0 / args.fs)?;
     let asked = recursion::request(&args.recursion)?;
     let decimation = args.rate.of(asked.counts_samples());
-    let decimator = match decimation.factor(sample_time) {
-        1 => None,
-        // With an output only, no hold is assumed.
-        factor => Some(Decimator::new(factor, sample_time, [true, false, false])?),
-    };
-    let tracked = decimator.as_ref().map_or(sample_time, Decimator::sample_time);
-    let plan = plan_of(&asked, tracked)?;
-    if plan.options().method.smooths() {
+    if asked.method.smooths() {
         return Err(CliError::Usage(
             "--smooth belongs to hoid track: a stream has no future samples".to_owned(),
         ));
     }
-    if args.warm_up.is_some() && plan.options().method.starts_itself() {
+    if args.warm_up.is_some() && asked.method.starts_itself() {
         return Err(CliError::Usage(format!(
             "--warm-up is for a start fit, and {} has none: it speaks at once; drop it, or name --method physical",
-            plan.options().method
+            asked.method
         )));
     }
+    let warm_up_s = args.warm_up.unwrap_or(DEFAULT_WARM_UP_S);
+    let live = Live::new(&asked, sample_time, decimation, warm_up_s).map_err(options_of_recursion)?;
+    let plan = live.plan();
     if args.recursion.start.is_some() && !plan.is_settled() {
         return Err(CliError::Usage(
             "--start leaves no warm-up to search nk and orders on; give --nk and --orders as single numbers, as --nk 29 \
@@ -72,7 +69,7 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
         ));
     }
     let udp = args.udp.as_ref().map(Udp::bind).transpose()?;
-    let session = Arc::new(Mutex::new(Session::new(args, (asked, plan), sample_time, decimator)?));
+    let session = Arc::new(Mutex::new(Session::new(args, asked, live)?));
     end_on_interrupt(&session);
     match udp {
         Some(udp) => over_udp(&udp, &session),

@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use hoid::analysis::{Setting, settings_of_recursion};
 use hoid::ident::Choice;
-use hoid::model::{Decimator, Finding, SampleTime};
-use hoid::track::{Change, Live, LiveOutcome, Sample, TrackFault, TrackOptions, TrackPlan, TrackRequest};
+use hoid::model::{Finding, SampleTime};
+use hoid::track::{Change, Live, Sample, Stage, TrackFault, TrackOptions, TrackRequest};
 
 use super::{
     clock::{Arrival, Clock, LONGEST_GAP_S},
@@ -15,22 +15,17 @@ use super::{
 };
 use crate::{args::StreamArgs, commands::reading, error::CliError, output, recursion, text};
 
-/// Default length of the warm-up, s.
-const DEFAULT_WARM_UP_S: f64 = 20.0;
 /// Maximum number of faults kept for the next line.
 const FAULTS_TOLD: usize = 4;
 
 /// The state of the stream, changed by each line.
 pub struct Session {
     asked: TrackRequest,
-    plan: TrackPlan,
     columns: Columns,
     clock: Clock,
     live: Live,
     /// Time between two samples of the stream.
     sample_time: SampleTime,
-    /// Decimator of error, control and target.
-    decimator: Option<Decimator<3>>,
     /// Factors of e and u.
     scale: (f64, f64),
     every: u64,
@@ -55,30 +50,16 @@ pub struct Session {
 }
 
 impl Session {
-    pub fn new(
-        args: &StreamArgs,
-        (asked, plan): (TrackRequest, TrackPlan),
-        sample_time: SampleTime,
-        decimator: Option<Decimator<3>>,
-    ) -> Result<Self, CliError> {
-        let length_s = args.warm_up.unwrap_or(DEFAULT_WARM_UP_S);
-        let tracked = decimator.as_ref().map_or(sample_time, Decimator::sample_time);
-        let samples = (length_s / tracked.s()).round();
-        if !(1.0..=1e7).contains(&samples) {
-            return Err(CliError::Usage(format!(
-                "--warm-up {length_s}: expected a time in s of one sample to 10 million"
-            )));
-        }
+    pub fn new(args: &StreamArgs, asked: TrackRequest, live: Live) -> Result<Self, CliError> {
         let with_input = asked.structure().has_input();
-        let largest = plan.options().largest;
+        let sample_time = live.sample_time();
+        let largest = live.plan().options().largest;
         let mut session = Self {
-            live: Live::new(plan.options(), samples as usize, tracked)?,
+            live,
             asked,
-            plan,
             columns: Columns::new(&args.input, &args.output, with_input, largest),
             clock: Clock::new(sample_time.s()),
             sample_time,
-            decimator,
             scale: scale(args)?,
             every: args.every as u64,
             lines: 0,
@@ -93,8 +74,8 @@ impl Session {
             rate_told: false,
             rate: None,
         };
-        if matches!(session.live, Live::Tracking(_)) {
-            let options = session.plan.options().clone();
+        if session.live.tracker().is_some() {
+            let options = session.live.plan().options().clone();
             session.began("started at once", &options, None);
         }
         Ok(session)
@@ -102,12 +83,11 @@ impl Session {
 
     /// Reports the start of the tracker: its names, and all settings on standard error.
     fn began(&mut self, when: &str, options: &TrackOptions, choice: Option<&Choice>) {
-        if let Live::Tracking(tracker) = &self.live {
+        if let Some(tracker) = self.live.tracker() {
             self.names = tracker.parameter_names();
         }
-        let mut settings = settings_of_recursion(&self.asked, &self.plan, options, choice);
-        if let Some(decimator) = &self.decimator {
-            let done = decimator.done();
+        let mut settings = settings_of_recursion(&self.asked, self.live.plan(), options, choice);
+        if let Some(done) = self.live.decimated() {
             settings.push(Setting::new("rate", format!("{done}, {:.3} s behind", done.lag_s)));
         }
         if self.scale != (1.0, 1.0) {
@@ -162,7 +142,7 @@ impl Session {
         match Datagram::of(bytes) {
             Datagram::Sample(sample) => {
                 self.forget_innovation();
-                self.timed(sample.read(self.sample_time, self.plan.options().largest));
+                self.timed(sample.read(self.sample_time, self.live.plan().options().largest));
                 self.lines += 1;
                 if self.lines.is_multiple_of(self.every) {
                     answer(self, Some(sample.sequence))?;
@@ -259,7 +239,7 @@ impl Session {
     /// Discards the innovation, which belongs to one sample: in a decimated stream the last one remains for several
     /// lines.
     fn forget_innovation(&mut self) {
-        if self.decimator.is_none() {
+        if self.live.decimated().is_none() {
             self.innovation = None;
         }
     }
@@ -270,36 +250,24 @@ impl Session {
         if !self.has_time {
             self.t = Some((self.counts.samples - 1) as f64 * self.sample_time.s());
         }
-        let (mut sample, mut tracked, mut behind_s) = (Sample { e, u, reference }, self.sample_time, 0.0);
-        if let Some(decimator) = &mut self.decimator {
-            let Some([e, u, f_t]) = decimator.take([e, u, reference.unwrap_or(f64::NAN)]) else {
-                return;
-            };
-            let reference = Some(f_t).filter(|f| f.is_finite());
-            (sample, tracked) = (Sample { e, u, reference }, decimator.sample_time());
-            behind_s = decimator.lag_samples() as f64 * self.sample_time.s();
-            self.innovation = None;
+        let taken = self.live.update(Sample { e, u, reference }, true, &recursion::choose);
+        if taken.between {
+            return;
         }
-        // The time up to which the recursion has advanced.
-        let t = self.t.map(|t| t - behind_s);
-        let plan = &self.plan;
-        let LiveOutcome { outcome, started } = self.live.update(sample, &|record| recursion::choose(plan, record));
-        if let Some(outcome) = outcome {
-            self.innovation = outcome.innovation;
-            self.counts.shortened += u64::from(outcome.shortened);
-            if let Live::Tracking(tracker) = &self.live {
-                (self.counts.held, self.counts.restarts) = (tracker.counts().held, tracker.counts().restarts);
-                if let Some(event) = tracker.event() {
-                    self.event = Some(event.at(t.unwrap_or(f64::NAN), tracked));
-                }
+        self.innovation = taken.outcome.and_then(|outcome| outcome.innovation);
+        self.counts.shortened += u64::from(taken.outcome.is_some_and(|outcome| outcome.shortened));
+        if let Some(tracker) = self.live.tracker() {
+            // The time up to which the recursion has advanced.
+            let t = self.t.map(|t| t - self.live.behind_s());
+            (self.counts.held, self.counts.restarts) = (tracker.counts().held, tracker.counts().restarts);
+            if let Some(event) = tracker.event() {
+                self.event = Some(event.at(t.unwrap_or(f64::NAN), self.live.plan().sample_time()));
             }
-            if let Live::Tracking(tracker) = &self.live
-                && let Some(change) = tracker.change()
-            {
+            if let Some(change) = tracker.change() {
                 self.change = Some((t, change));
             }
         }
-        if let Some((options, choice)) = started {
+        if let Some((options, choice)) = taken.started {
             let when = format!("started after {} samples", self.counts.samples);
             self.began(&when, &options, choice.as_ref());
         }
@@ -330,7 +298,6 @@ impl Session {
             event: self.event.take(),
             counts: self.counts,
             fault,
-            decimated: self.decimator.as_ref().map(Decimator::done),
             finding: self.rate.as_ref(),
         };
         let unwritable = |e| CliError::Stream(format!("a line of the output cannot be made: {e}"));
@@ -347,9 +314,9 @@ impl Session {
                 text::counted(c.dropped, "line")
             )));
         }
-        match &self.live {
-            Live::Tracking(_) => Ok(()),
-            Live::Collecting(_) => Err(CliError::NotDetermined(
+        match self.live.stage() {
+            Stage::Tracking(_) => Ok(()),
+            Stage::Collecting(_) => Err(CliError::NotDetermined(
                 "the stream ended within the warm-up, without an estimate; give it more samples, or a shorter --warm-up".to_owned(),
             )),
         }
@@ -373,7 +340,7 @@ impl Session {
                 text::counted(c.restarts, "time")
             ));
         }
-        if let Live::Collecting(warm_up) = &self.live {
+        if let Stage::Collecting(warm_up) = self.live.stage() {
             text.push_str(&format!(
                 " The warm-up did not end: {} of {} samples{}.",
                 warm_up.collected,

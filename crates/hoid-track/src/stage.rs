@@ -1,0 +1,269 @@
+//! Stages of a live recursion: the warm-up for the start fit, then the tracker.
+
+use std::collections::VecDeque;
+
+use hoid_core::state::{State, visit_all};
+use hoid_model::{Channel, Orders, Record, SampleTime};
+
+use crate::{
+    Outcome, Sample, StartAt, TrackOptions, TrackPlan, Tracker,
+    idle::idle_head,
+    seal::{opened, sealed},
+};
+use hoid_ident::{Choice, IdentError};
+
+/// Computes the options from a record of the warm-up, with the searched values.
+pub type Choose<'a> = &'a dyn Fn(&Record) -> Result<(TrackOptions, Option<Choice>), IdentError>;
+
+/// Share of the warm-up that is collected in addition after a failed fit.
+const QUARTER: usize = 4;
+/// Length that is kept of a warm-up that continues, as a multiple of its length.
+const KEPT: usize = 2;
+/// Longest run of faulty samples within a warm-up, s; after a longer one the warm-up restarts.
+const LONGEST_FAULT_S: f64 = 1.0;
+
+/// Stage of a live recursion.
+#[derive(Debug)]
+pub enum Stage {
+    /// The samples of the start fit are being collected.
+    Collecting(WarmUp),
+    /// The tracker is running.
+    Tracking(Box<Tracker>),
+}
+
+/// Result of a sample.
+#[derive(Debug, Default)]
+pub struct LiveOutcome {
+    /// Outcome of the tracker, once there is one.
+    pub outcome: Option<Outcome>,
+    /// Options and search of a start fit that was made at this sample.
+    pub started: Option<(TrackOptions, Option<Choice>)>,
+    /// True if the sample completed none of the lower rate: the recursion did not advance.
+    pub between: bool,
+}
+
+impl Stage {
+    /// Builds a recursion that starts at once if its start is given, else after a warm-up of a given number of
+    /// samples.
+    ///
+    /// # Errors
+    /// [`IdentError`] for a start that cannot be used.
+    pub fn new(options: &TrackOptions, warm_up: usize, sample_time: SampleTime) -> Result<Self, IdentError> {
+        Ok(match options.start {
+            StartAt::Span(_) if !options.method.starts_itself() => Self::Collecting(WarmUp::new(warm_up, sample_time)),
+            _ => Self::Tracking(Box::new(Tracker::new(options, None, sample_time)?)),
+        })
+    }
+
+    /// Returns everything that changes as numbers, and the orders once there is a tracker, for [`Stage::restored`]. The
+    /// recursion does not change.
+    pub fn saved(&mut self) -> (Option<Orders>, Vec<f64>) {
+        match self {
+            Self::Tracking(tracker) => (Some(tracker.options().orders), tracker.saved()),
+            Self::Collecting(warm_up) => (None, warm_up.saved()),
+        }
+    }
+
+    /// Restores the recursion that [`Stage::saved`] returned, from its plan.
+    ///
+    /// # Errors
+    /// [`IdentError::BadStart`] for numbers of another recursion, and for numbers that were changed or cut; the errors
+    /// of [`Tracker::new`].
+    pub fn restored(
+        plan: &TrackPlan,
+        orders: Option<Orders>,
+        numbers: &[f64],
+        sample_time: SampleTime,
+    ) -> Result<Self, IdentError> {
+        let Some(orders) = orders else {
+            let warm_up = WarmUp::restored(sample_time, numbers).ok_or_else(|| IdentError::BadStart {
+                reason: "the numbers of the saved warm-up were changed or cut since; save it again".to_owned(),
+            })?;
+            return Ok(Self::Collecting(warm_up));
+        };
+        let tracker = Tracker::restored(&plan.with_orders(orders), sample_time, numbers)?;
+        Ok(Self::Tracking(Box::new(tracker)))
+    }
+
+    /// Takes a sample; NaN marks faulty or missing values. If `moves` is false a tracker only updates its filters. The
+    /// fit of the warm-up is made at its last sample, with the options that `choose` returns for it.
+    pub fn update(&mut self, sample: Sample, moves: bool, choose: Choose<'_>) -> LiveOutcome {
+        let warm_up = match self {
+            Self::Tracking(tracker) => {
+                return LiveOutcome {
+                    outcome: Some(tracker.update(sample, moves)),
+                    ..LiveOutcome::default()
+                };
+            }
+            Self::Collecting(warm_up) => warm_up,
+        };
+        warm_up.collect(sample);
+        if warm_up.collected < warm_up.needed {
+            return LiveOutcome::default();
+        }
+        if warm_up.leave_out_idle() {
+            return LiveOutcome::default();
+        }
+        match warm_up.start(choose) {
+            Ok((tracker, choice)) => {
+                let options = tracker.options().clone();
+                *self = Self::Tracking(Box::new(tracker));
+                LiveOutcome {
+                    started: Some((options, choice)),
+                    ..LiveOutcome::default()
+                }
+            }
+            Err(error) => {
+                warm_up.needed = warm_up.collected + (warm_up.length / QUARTER).max(1);
+                warm_up.trouble = Some(error.to_string());
+                LiveOutcome::default()
+            }
+        }
+    }
+}
+
+/// The samples that are collected for the start fit.
+#[derive(Debug)]
+pub struct WarmUp {
+    length: usize,
+    sample_time: SampleTime,
+    samples: VecDeque<Sample>,
+    /// Number of samples since the collection started.
+    pub collected: usize,
+    /// Number of samples at which the fit is tried.
+    pub needed: usize,
+    /// Reason why the last start fit failed or the collection restarted.
+    pub trouble: Option<String>,
+    /// Number of faulty samples at the end.
+    faulty: usize,
+}
+
+impl State for WarmUp {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        visit_all(
+            &mut [
+                &mut self.length,
+                &mut self.collected,
+                &mut self.needed,
+                &mut self.faulty,
+            ],
+            each,
+        );
+        let mut kept = self.samples.len();
+        kept.visit(each);
+        let nothing = Sample {
+            e: 0.0,
+            u: 0.0,
+            reference: None,
+        };
+        self.samples.resize(kept.min(KEPT.saturating_mul(self.length)), nothing);
+        for sample in &mut self.samples {
+            let mut known = sample.reference.is_some();
+            let mut reference = sample.reference.unwrap_or(f64::NAN);
+            visit_all(&mut [&mut sample.e, &mut sample.u, &mut known, &mut reference], each);
+            sample.reference = known.then_some(reference);
+        }
+    }
+}
+
+impl WarmUp {
+    /// Returns the warm-up as numbers, for [`WarmUp::restored`]; the reason of the last failure is not among them.
+    pub fn saved(&mut self) -> Vec<f64> {
+        let mut numbers = Vec::new();
+        self.visit(&mut |number| numbers.push(*number));
+        sealed(numbers)
+    }
+
+    /// Restores the warm-up that [`WarmUp::saved`] returned. `None` for numbers of something else, and for numbers
+    /// that were changed or cut.
+    pub fn restored(sample_time: SampleTime, numbers: &[f64]) -> Option<Self> {
+        let mut warm_up = Self::new(0, sample_time);
+        let mut left = opened(numbers)?.iter();
+        let mut lacking = false;
+        warm_up.visit(&mut |number| match left.next() {
+            Some(saved) => *number = *saved,
+            None => lacking = true,
+        });
+        (!lacking && left.next().is_none()).then_some(warm_up)
+    }
+
+    fn new(length: usize, sample_time: SampleTime) -> Self {
+        Self {
+            length,
+            sample_time,
+            samples: VecDeque::new(),
+            collected: 0,
+            needed: length,
+            trouble: None,
+            faulty: 0,
+        }
+    }
+
+    /// Takes a sample. The collection starts with a sound sample, and restarts after a long fault.
+    fn collect(&mut self, sample: Sample) {
+        let sound = sample.e.is_finite() && sample.u.is_finite();
+        self.faulty = if sound { 0 } else { self.faulty + 1 };
+        if self.samples.is_empty() && !sound {
+            return;
+        }
+        if self.faulty as f64 * self.sample_time.s() > LONGEST_FAULT_S {
+            *self = Self::new(self.length, self.sample_time);
+            self.trouble = Some(format!(
+                "more than {LONGEST_FAULT_S} s of faulty samples: the warm-up started again"
+            ));
+            return;
+        }
+        if self.samples.len() == KEPT * self.length {
+            self.samples.pop_front();
+        }
+        self.samples.push_back(sample);
+        self.collected += 1;
+    }
+
+    /// Leaves out the idle head, and collects as many samples in its place; false if there is none.
+    fn leave_out_idle(&mut self) -> bool {
+        let Ok(record) = self.record() else { return false };
+        let idle = idle_head(&record);
+        if idle == 0 {
+            return false;
+        }
+        self.samples.drain(..idle.min(self.samples.len()));
+        self.needed = self.collected + idle;
+        self.trouble = Some(format!(
+            "neither e nor u moved for {:.1} s: left out, the warm-up continues",
+            idle as f64 * self.sample_time.s()
+        ));
+        true
+    }
+
+    /// Builds the tracker with the batch fit of the collected samples and with settled filters.
+    fn start(&self, choose: Choose<'_>) -> Result<(Tracker, Option<Choice>), IdentError> {
+        let record = self.record()?;
+        let (options, choice) = choose(&record)?;
+        let mut tracker = Tracker::new(&options, Some(&record), self.sample_time)?;
+        for sample in &self.samples {
+            tracker.update(*sample, false);
+        }
+        Ok((tracker, choice))
+    }
+
+    /// Returns the collected samples as a record; a faulty value is replaced by the last good one.
+    fn record(&self) -> Result<Record, IdentError> {
+        let channel = |name: &str, of: fn(&Sample) -> f64| {
+            let mut last = self.samples.iter().map(of).find(|v| v.is_finite()).unwrap_or(0.0);
+            let values = self.samples.iter().map(|s| {
+                let v = of(s);
+                last = if v.is_finite() { v } else { last };
+                last
+            });
+            Channel::new(name, "", values.collect())
+        };
+        let (input, output) = (channel("e", |s| s.e), channel("u", |s| s.u));
+        let record = Record::new(self.sample_time, input, output)?.labelled("of the warm-up");
+        if self.samples.iter().any(|s| s.reference.is_none()) {
+            return Ok(record);
+        }
+        let reference = channel("f_t", |s| s.reference.unwrap_or(f64::NAN));
+        Ok(record.with_channel(reference)?)
+    }
+}
