@@ -176,6 +176,15 @@ pub fn instability(fit: &Fit) -> &'static str {
     }
 }
 
+/// A p value to two digits, as a relation: a rounded 0 or 1 would be no probability of a test.
+pub fn p_value(p: f64) -> String {
+    match p {
+        p if p > 0.99 => "p > 0.99".to_owned(),
+        p if p < 0.01 => format!("p = {p:.0e}"),
+        p => format!("p = {p:.2}"),
+    }
+}
+
 /// A count as text: "1 step", "2 steps".
 pub fn counted(n: u64, what: &str) -> String {
     match n {

@@ -1,4 +1,4 @@
-//! Random operators of all forms, simulated with little noise or none: identification of form, parameters and
+//! Random operators of all default forms, simulated with little noise or none: identification of form, parameters and
 //! intersample behaviour of the error.
 //!
 //! ```sh
@@ -109,14 +109,15 @@ fn record(model: &HeldFamily, ts: SampleTime, share: f64, random: &mut Uniform) 
 
 fn main() -> Result<(), Box<dyn Error>> {
     let number = |i: usize, otherwise: u64| env::args().nth(i).map_or(Ok(otherwise), |text| text.parse());
+    let forms_of_default = FamilyEstimator::default().forms;
     let (people, seed) = (number(1, 1000)?, number(2, 1)?);
     for share in SHARES {
         let mut random = Uniform(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15));
         let (mut forms, mut courses, mut wrong, mut failed, mut outside) = (0, 0, 0, 0, 0);
         let each = (people / SHARES.len() as u64).max(1);
         for k in 0..each {
-            let form = Form::ALL[k as usize % Form::ALL.len()];
-            let course = if (k / 8) % 2 == 0 {
+            let form = forms_of_default[k as usize % forms_of_default.len()];
+            let course = if (k / forms_of_default.len() as u64).is_multiple_of(2) {
                 Intersample::Zoh
             } else {
                 Intersample::Foh

@@ -5,7 +5,7 @@
 //! linear regression, and its response replaces the describing function if no periodic excitation was recorded: for the
 //! starts of all forms.
 
-use hoid_model::{Complex64, Record, SampleTime, Structure};
+use hoid_model::{Complex64, Orders, Record, SampleTime, Structure};
 
 use super::{prediction::NONE, response_fit::MeasuredResponse};
 use crate::{Estimator, Fit, IdentError, ResponsePoint};
@@ -16,10 +16,13 @@ const POLES: usize = 16;
 const FEWEST: usize = 4;
 /// Most coefficients of B.
 pub(super) const MOST_GAINS: usize = 60;
-/// Largest number of coefficients of B if u is predicted so well that there may be no noise, and the threshold for
-/// this: at high rates a long delay takes more samples than the default number.
-const MOST_WITHOUT_NOISE: usize = 200;
+/// Share of the innovations in the power of u below which there may be no noise.
 const PROMISING: f64 = 1e-3;
+/// Orders of A of an operator: the neuromuscular system, and up to two lags.
+const OWN_ORDERS: (usize, usize) = (2, 4);
+/// Number of coefficients of B beyond the order of A: as many as that, one for a part of a sample of the delay, one for
+/// linear interpolation.
+const FURTHER_GAINS: usize = 2;
 /// Frequencies of the response, rad/s, evenly over their logarithm.
 const BAND_RAD_S: (f64, f64) = (0.5, 20.0);
 const POINTS: usize = 24;
@@ -44,18 +47,28 @@ impl ArxResponse {
         regressed(records, false, MOST_GAINS)
     }
 
-    /// The same for almost no noise, with the largest possible number of coefficients of B: a u without noise does not
-    /// determine those of A, and B has to cover the delay. `None` if there is more noise.
-    pub fn without_noise(records: &[Record]) -> Option<Self> {
-        let found = regressed(records, true, MOST_GAINS).ok()?;
-        if found.innovations < NONE {
-            return Some(found);
-        }
-        if gains(records) <= MOST_GAINS || found.innovations > PROMISING {
+    /// The same for almost no noise; `None` if there is more. A u without noise does not determine the coefficients of A
+    /// in a model of high order, and B has to cover the delay, which takes many samples at high rates. But an operator
+    /// without noise is a model of its own order, exactly, at the whole part of its own delay: of both kinds, the model
+    /// with the smallest innovations.
+    pub fn without_noise(records: &[Record], longest_delay_s: f64) -> Option<Self> {
+        let high = regressed(records, true, MOST_GAINS).ok()?;
+        if high.innovations > PROMISING {
             return None;
         }
-        let found = regressed(records, true, MOST_WITHOUT_NOISE).ok()?;
-        (found.innovations < NONE).then_some(found)
+        let longest = (longest_delay_s / records[0].sample_time().s()).ceil() as usize;
+        let own = (OWN_ORDERS.0..=OWN_ORDERS.1)
+            .flat_map(|na| (0..=longest).map(move |nk| (na, nk)))
+            .filter_map(|(na, nk)| {
+                let mut orders = Structure::Arx.operator_orders(nk);
+                (orders.na, orders.nb) = (na, na + FURTHER_GAINS);
+                with_level(orders).fit(records).ok()
+            })
+            .map(|fit| Self::of_fit(records, &fit));
+        let least = own.fold(high, |least, own| {
+            if own.innovations < least.innovations { own } else { least }
+        });
+        (least.innovations < NONE).then_some(least)
     }
 
     fn of_fit(records: &[Record], fit: &Fit) -> Self {
@@ -89,6 +102,14 @@ pub(super) fn halved((na, nb): (usize, usize)) -> Option<(usize, usize)> {
     (na.max(nb) > FEWEST).then(|| (na.div_ceil(2).max(2), nb.div_ceil(2).max(2)))
 }
 
+/// An ARX model with a level: without noise, the removed means have a visible effect.
+fn with_level(orders: Orders) -> Estimator {
+    Estimator {
+        level: true,
+        ..Estimator::new(Structure::Arx, orders)
+    }
+}
+
 /// Number of coefficients of B that cover a response.
 fn gains(records: &[Record]) -> usize {
     (RESPONSE_S / records[0].sample_time().s()).ceil() as usize
@@ -99,10 +120,10 @@ fn regressed(records: &[Record], of_a_alone: bool, most_gains: usize) -> Result<
     let mut orders = Structure::Arx.operator_orders(1);
     (orders.na, orders.nb) = first_orders(records, 1, most_gains);
     loop {
-        // Without noise, the removed means have a visible effect.
-        let estimator = Estimator {
-            level: of_a_alone,
-            ..Estimator::new(Structure::Arx, orders)
+        let estimator = if of_a_alone {
+            with_level(orders)
+        } else {
+            Estimator::new(Structure::Arx, orders)
         };
         let found = estimator.fit(records);
         let fewer = if of_a_alone {

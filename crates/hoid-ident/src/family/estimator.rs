@@ -360,7 +360,7 @@ impl FamilyEstimator {
             Ok::<_, IdentError>(found)
         };
         let mut from: Vec<Starts> = starts.iter().map(|s| (s.form, s.coordinates.clone())).collect();
-        let clean = ArxResponse::without_noise(records);
+        let clean = ArxResponse::without_noise(records, self.delay_range_s.1);
         if let Some(clean) = &clean {
             for (form, coordinates) in &mut from {
                 coordinates.extend(

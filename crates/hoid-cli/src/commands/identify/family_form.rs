@@ -105,8 +105,8 @@ impl FamilyReport<'_> {
             let (name, role) = (&channel.name, channel.role);
             match &channel.response {
                 None => page.push_str(&format!(
-                    "No response to {name} ({role}) was found (p = {:.2} for the best of {} forms).\n",
-                    channel.p_value,
+                    "No response to {name} ({role}) was found ({} for the best of {} forms).\n",
+                    text::p_value(channel.p_value),
                     channel.forms.len() - 1
                 )),
                 Some(of) => {
@@ -276,17 +276,17 @@ impl FamilyReport<'_> {
         if let Some(agreement) = &fit.agreement {
             let pairs = agreement.pairs.iter().map(|pair| {
                 format!(
-                    "{} and {} p = {:.2}",
+                    "{} and {} {}",
                     pair.methods.0.words(),
                     pair.methods.1.words(),
-                    pair.p_value
+                    text::p_value(pair.p_value)
                 )
             });
             page.push_str(&format!(
-                "Agreement over {} coordinates that the data determine: {}; together p = {:.2}.\n",
+                "Agreement over {} coordinates that the data determine: {}; together {}.\n",
                 agreement.rows.len(),
                 pairs.collect::<Vec<_>>().join(", "),
-                agreement.p_value
+                text::p_value(agreement.p_value)
             ));
         }
         page
@@ -297,12 +297,12 @@ impl FamilyReport<'_> {
         let mut page = String::from("\n");
         if let Some(free) = &fit.free_model {
             page.push_str(&format!(
-                "Box-Jenkins of the same orders: loss {} against {}, likelihood ratio {:.1} with {} degrees of freedom (p = {:.2}).\n",
+                "Box-Jenkins of the same orders: loss {} against {}, likelihood ratio {:.1} with {} degrees of freedom ({}).\n",
                 numbers::plain(free.loss),
                 numbers::plain(fit.loss),
                 free.likelihood_ratio,
                 free.degrees_of_freedom,
-                free.p_value
+                text::p_value(free.p_value)
             ));
         }
         let clusters = match fit.cluster_kind {
