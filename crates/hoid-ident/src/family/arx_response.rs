@@ -66,7 +66,11 @@ impl ArxResponse {
             })
             .map(|fit| Self::of_fit(records, &fit));
         let least = own.fold(high, |least, own| {
-            if own.innovations < least.innovations { own } else { least }
+            if own.innovations < least.innovations {
+                own
+            } else {
+                least
+            }
         });
         (least.innovations < NONE).then_some(least)
     }

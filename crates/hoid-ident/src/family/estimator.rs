@@ -17,7 +17,7 @@ use super::{
     line_fit::{LineFit, by_simplicity, line_fit},
     lines::LineData,
     low_noise::{LittleNoise, Starts},
-    noise::{Autoregression, NoiseProducts},
+    noise::{Autoregression, NoiseProducts, Penalty},
     options::{FamilyEstimator, HIGHEST_NOISE_ORDER},
     prediction::{NoiseOrders, Prediction},
     prediction_fit::PredictionFit,
@@ -292,6 +292,25 @@ impl FamilyEstimator {
         })
     }
 
+    /// Returns an operator of the first form from the response of an ARX model of high order, and the autoregression of
+    /// the rest of u, of the best order up to `highest`: a start for other estimators of this form. `None` if the
+    /// records do not give one.
+    pub(crate) fn first_guess(&self, records: &[Record], highest: usize) -> Option<(Vec<f64>, Autoregression)> {
+        let form = *self.forms.first()?;
+        let prediction = self.prediction(self.intersample, records, &[form]).ok()?;
+        self.check(records, prediction.first).ok()?;
+        let response = ArxResponse::of(records).ok()?.points;
+        let start = self.start(form, None, (&response, Grid::Default), &prediction).ok()?;
+        let coordinates = start.coordinates.into_iter().next()?;
+        let operator = (form, self.neuromuscular);
+        let series = prediction
+            .unexplained(operator, &coordinates, &mut Workspace::of_thread())
+            .ok()?;
+        let products = NoiseProducts::new(&series, highest);
+        let order = products.best_order(1..=highest, Penalty::Schwarz)?;
+        Some((coordinates, products.fit(order)?))
+    }
+
     fn sorted_forms(&self) -> Result<Vec<Form>, IdentError> {
         let mut forms: Vec<Form> = (self.forms.iter().copied())
             .filter(|form| form.is_proper(self.neuromuscular))
@@ -551,7 +570,9 @@ impl FamilyEstimator {
             .or_else(|| losses(NoiseProducts::fit_up_to))
             .ok_or(IdentError::NoFiniteLoss)?;
         let (form, start, products) = left.swap_remove(least);
-        let autoregression = products.best_order(self.nd.clone()).ok_or(IdentError::NoFiniteLoss)?;
+        let autoregression = products
+            .best_order(self.nd.clone(), Penalty::Akaike)
+            .ok_or(IdentError::NoFiniteLoss)?;
         if *self.nc.end() == 0 {
             return Ok((0, autoregression));
         }

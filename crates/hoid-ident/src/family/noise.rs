@@ -21,6 +21,13 @@ pub(crate) struct Autoregression {
     pub loss: f64,
 }
 
+/// What a coefficient has to gain in `n ln V`: 2 (Akaike), `ln n` (Schwarz).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Penalty {
+    Akaike,
+    Schwarz,
+}
+
 /// Products of v and its past, `sum v(t-i) v(t-j)` for i, j from 0 to the highest order.
 pub(crate) struct NoiseProducts {
     highest: usize,
@@ -72,10 +79,14 @@ impl NoiseProducts {
         Some(found)
     }
 
-    /// Returns the best of these orders by Akaike's criterion.
-    pub fn best_order(&self, orders: impl Iterator<Item = usize>) -> Option<usize> {
+    /// Returns the best of these orders by a criterion.
+    pub fn best_order(&self, orders: impl Iterator<Item = usize>, penalty: Penalty) -> Option<usize> {
         let n = self.count as f64;
-        let value = |order: usize| Some((n * self.fit(order)?.loss.ln() + 2.0 * order as f64, order));
+        let of_one = match penalty {
+            Penalty::Akaike => 2.0,
+            Penalty::Schwarz => n.ln(),
+        };
+        let value = |order: usize| Some((n * self.fit(order)?.loss.ln() + of_one * order as f64, order));
         let best = orders
             .filter(|o| *o <= self.highest)
             .filter_map(value)
@@ -152,7 +163,7 @@ mod tests {
         );
         assert!((fit.loss - 1.0 / 12.0).abs() < 0.01);
         // Akaike's criterion never takes too few, and what it takes too many of gains little.
-        let order = products.best_order(0..=8).unwrap();
+        let order = products.best_order(0..=8, Penalty::Akaike).unwrap();
         let gained = 1.0 - products.fit(order).unwrap().loss / fit.loss;
         assert!(order >= 2 && gained < 0.003, "{order} {gained}");
     }
@@ -185,7 +196,10 @@ mod tests {
     #[test]
     fn nothing_to_model_is_no_model() {
         let none = NoiseProducts::new(&[vec![0.0; 50]], 4);
-        assert_eq!((none.best_order(0..=4), none.fit_up_to(4)), (None, None));
+        assert_eq!(
+            (none.best_order(0..=4, Penalty::Akaike), none.fit_up_to(4)),
+            (None, None)
+        );
         assert_eq!(NoiseProducts::new(&[vec![1.0; 3]], 4).fit(1), None);
     }
 }

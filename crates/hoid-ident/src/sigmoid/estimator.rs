@@ -14,10 +14,13 @@ use super::{
 };
 use crate::{
     IdentError,
+    family::{FamilyEstimator, Intersample},
     informative_data::{check_record, common_sample_time},
     level::without_level,
 };
 
+/// Highest order of the noise model that is chosen.
+const MOST_NOISE: usize = 12;
 /// Number of lower minima that the walks along t_M and G may find before the fit is stopped at the last one.
 const MOST_LOWER: usize = 10;
 
@@ -29,6 +32,55 @@ impl SigmoidChange {
     /// [`IdentError`]; how the search ended, and which parameters the data do not determine, is part of the fit.
     pub fn fit(&self, records: &[Record]) -> Result<SigmoidFit, IdentError> {
         let sample_time = common_sample_time(records)?;
+        // The regressions that make and rank the starts have no level.
+        let off_level = self.level.then(|| without_level(records));
+        let off_level = off_level.as_deref().unwrap_or(records);
+        let guess = match self.start {
+            Some(_) => None,
+            None => self.of_one_operator().first_guess(off_level, MOST_NOISE),
+        };
+        let order = guess.as_ref().map(|(_, noise)| noise.d.len());
+        let guess = guess.map(|(coordinates, _)| coordinates);
+        let with_noise = |nd| {
+            let ordered = Self {
+                nd: Some(nd),
+                ..self.clone()
+            };
+            ordered.fit_from(records, (sample_time, off_level), guess.as_deref())
+        };
+        match self.nd.or(order) {
+            None => with_noise(self.nd_of_start()),
+            // Exact data determine no noise model; that of first order has a start of its own.
+            Some(nd) if self.nd.is_none() && nd > 1 => with_noise(nd).or_else(|_| with_noise(1)),
+            Some(nd) => with_noise(nd),
+        }
+    }
+
+    /// The operator without a change, of which starts are made.
+    fn of_one_operator(&self) -> FamilyEstimator {
+        FamilyEstimator {
+            forms: vec![self.form],
+            neuromuscular: self.neuromuscular,
+            delay_range_s: self.delay_range_s,
+            prior: self.prior.clone(),
+            intersample: Intersample::Zoh,
+            ..FamilyEstimator::default()
+        }
+    }
+
+    /// Order of the noise that a given start has; 1 without one.
+    fn nd_of_start(&self) -> usize {
+        let others = Layout::new(self.form, self.neuromuscular, 0).len();
+        let of_start = self.start.as_ref().map(|start| start.len().saturating_sub(others));
+        of_start.unwrap_or(1)
+    }
+
+    fn fit_from(
+        &self,
+        records: &[Record],
+        (sample_time, off_level): (SampleTime, &[Record]),
+        guess: Option<&[f64]>,
+    ) -> Result<SigmoidFit, IdentError> {
         let mut criterion = self.criterion(records, sample_time)?;
         let unit = prior::penalties(&criterion.layout, &self.prior);
         for penalty in &unit {
@@ -36,7 +88,7 @@ impl SigmoidChange {
             let (low, high) = criterion.limits[penalty.place];
             criterion.limits[penalty.place] = (low.max(0.0), high);
         }
-        let starts = self.starts(&criterion, records)?;
+        let starts = self.starts(&criterion, off_level, guess)?;
         if let Some((_, theta)) = starts.first() {
             criterion.penalty = prior::begun(&criterion, &unit, theta);
         }
@@ -75,41 +127,36 @@ impl SigmoidChange {
         }
     }
 
-    /// Returns the names of the parameters of this form and noise model: `K_e1`, `K_e2`, `T_L1`, `T_L2`, `t_M`, `G`,
+    /// Returns the names of the parameters of this form and noise model (of first order if its order is chosen): `K_e1`, `K_e2`, `T_L1`, `T_L2`, `t_M`, `G`,
     /// `omega_nm`, `zeta_nm`, `tau_e`, `d1` ... for a gain and a lead.
     pub fn names(&self) -> Vec<String> {
         self.layout().names()
     }
 
     fn layout(&self) -> Layout {
-        Layout::new(self.form, self.neuromuscular, self.nd)
+        Layout::new(
+            self.form,
+            self.neuromuscular,
+            self.nd.unwrap_or_else(|| self.nd_of_start()),
+        )
     }
 
     /// Returns name and theta of each start.
     fn starts(
         &self,
         criterion: &ChangeCriterion<'_>,
-        records: &[Record],
+        off_level: &[Record],
+        guess: Option<&[f64]>,
     ) -> Result<Vec<(String, Vec<f64>)>, IdentError> {
-        Ok(match &self.start {
-            Some(start) => vec![("given".to_owned(), self.given_start(criterion, start)?)],
-            None => {
-                // The regressions that rank the starts have no level.
-                let off_level = if self.level {
-                    without_level(records)
-                } else {
-                    records.to_vec()
-                };
-                let of_starts = ChangeCriterion {
-                    limits: criterion.limits.clone(),
-                    ..self.criterion(&off_level, criterion.sample_time)?
-                };
-                starts::initial_guesses(&of_starts, &off_level)
-                    .into_iter()
-                    .map(|s| (s.label, s.theta))
-                    .collect()
-            }
-        })
+        if let Some(start) = &self.start {
+            return Ok(vec![("given".to_owned(), self.given_start(criterion, start)?)]);
+        }
+        let of_starts = ChangeCriterion {
+            limits: criterion.limits.clone(),
+            ..self.criterion(off_level, criterion.sample_time)?
+        };
+        let starts = starts::initial_guesses(&of_starts, off_level, guess);
+        Ok(starts.into_iter().map(|s| (s.label, s.theta)).collect())
     }
 
     fn criterion<'a>(&self, records: &'a [Record], sample_time: SampleTime) -> Result<ChangeCriterion<'a>, IdentError> {
@@ -150,6 +197,7 @@ impl SigmoidChange {
         let longest = whole_samples(limits[layout.delay].1, sample_time)? + layout.reach().max(1);
         let orders = layout.orders(longest);
         let criterion = ChangeCriterion {
+            first: longest + layout.nd,
             layout,
             data: records
                 .iter()
@@ -160,7 +208,6 @@ impl SigmoidChange {
                 })
                 .collect(),
             sample_time,
-            first: longest + self.nd,
             limits,
             piece: None,
             changes: true,

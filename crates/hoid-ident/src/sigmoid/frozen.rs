@@ -1,9 +1,10 @@
 //! Poles, delay and noise model from which searches start.
 //!
-//! For an operator of a gain and a lead they come from Box-Jenkins fits to the first and the last third of the records
-//! or, if those give no operator, from a small grid of poles. A form of the family always uses a grid.
+//! All forms have those of one operator at the response of an ARX model of high order for all records. For a gain and a
+//! lead others come from Box-Jenkins fits to the first and the last third of the records; if there are none, from a
+//! small grid of poles. Another form always uses a grid too.
 
-use hoid_model::{OperatorParameters, Orders, Record, Structure};
+use hoid_model::{OperatorParameters, Orders, Record, Structure, operator_family::Coordinate};
 
 use super::{layout::Layout, objective::ChangeCriterion};
 use crate::{Estimator, Fit, SearchMethod, SearchOptions};
@@ -60,6 +61,36 @@ pub(super) fn of_family(criterion: &ChangeCriterion<'_>) -> Vec<Frozen> {
         }
     }
     all
+}
+
+/// Returns the poles and the delay of one operator for all records.
+pub(super) fn of_guess(criterion: &ChangeCriterion<'_>, coordinates: &[f64]) -> Frozen {
+    let layout = &criterion.layout;
+    let mut theta = vec![0.0; layout.len()];
+    let of_form = layout.form.coordinates(layout.neuromuscular);
+    for (coordinate, value) in of_form.iter().zip(coordinates) {
+        match coordinate {
+            Coordinate::LagRate => layout.lag.into_iter().for_each(|place| theta[place] = *value),
+            Coordinate::LogOmega => layout
+                .muscles
+                .into_iter()
+                .for_each(|[omega, _]| theta[omega] = value.exp()),
+            Coordinate::LogZeta => layout
+                .muscles
+                .into_iter()
+                .for_each(|[_, zeta]| theta[zeta] = value.exp()),
+            Coordinate::Delay => theta[layout.delay] = *value,
+            _ => {}
+        }
+    }
+    if layout.nd > 0 {
+        theta[layout.noise] = GRID_D1;
+    }
+    within_limits(criterion, &mut theta);
+    Frozen {
+        label: format!("one operator, tau_e = {:.3} s", theta[layout.delay]),
+        theta,
+    }
 }
 
 /// Returns the poles of the windows.

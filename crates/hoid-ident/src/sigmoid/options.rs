@@ -27,8 +27,9 @@ pub struct SigmoidChange {
     pub level: bool,
     /// Prior knowledge of the person; that of T_L is used before and after the change. Default: none.
     pub prior: OperatorPrior,
-    /// Order nd of D.
-    pub nd: usize,
+    /// Order nd of D; `None` for the best by Schwarz's criterion, from 1 to 12, for the part of u that one operator
+    /// leaves. Default `None`.
+    pub nd: Option<usize>,
     /// Shortest and longest delay tau_e, s; any fraction of a sample. Equal ends fix it.
     pub delay_range_s: (f64, f64),
     /// Fixed and bounded parameters by name ([`SigmoidChange::names`]). By default t_M is within the middle nine tenths
@@ -46,7 +47,7 @@ pub struct SigmoidChange {
 }
 
 impl Default for SigmoidChange {
-    /// First-order noise, delay between 0.05 and 0.6 s, a noise level that changes, own starts; searches of up to 200
+    /// Noise of the order that the records show, delay between 0.05 and 0.6 s, a noise level that changes, own starts; searches of up to 200
     /// steps to a relative decrease of 1e-10 (a thousandth of a standard error): with a small change the loss has many
     /// ripples in t_M.
     fn default() -> Self {
@@ -55,7 +56,7 @@ impl Default for SigmoidChange {
             neuromuscular: true,
             level: false,
             prior: OperatorPrior::none(),
-            nd: 1,
+            nd: None,
             delay_range_s: (0.05, 0.6),
             constraints: BTreeMap::new(),
             noise_level: NoiseLevel::default(),
@@ -85,8 +86,11 @@ impl SigmoidChange {
                 });
             }
         }
-        let nd = named.get("nd").map_or(self.nd, |nd| *nd.start());
-        Ok(Self { nd, ..self })
+        let nd = named.get("nd").map(|nd| *nd.start());
+        Ok(Self {
+            nd: nd.or(self.nd),
+            ..self
+        })
     }
 }
 
@@ -102,11 +106,14 @@ impl BatchOptions for SigmoidChange {
                 .printed("neuromuscular", |how, _| Some(shared::yes_words(how.neuromuscular))),
             shared::prior("none", |how: &mut Self| &mut how.prior)
                 .printed("prior", |how, _| Some(how.prior.to_string())),
-            BatchOption::new(shared::orders("nd=1 of its noise"), |how: &mut Self, option, text| {
-                *how = how.clone().with_noise_orders(&option.read(text)?)?;
-                Ok(())
-            })
-            .printed("orders", |how, _| Some(format!("nd={}", how.nd))),
+            BatchOption::new(
+                shared::orders("nd of its noise by BIC, up to 12"),
+                |how: &mut Self, option, text| {
+                    *how = how.clone().with_noise_orders(&option.read(text)?)?;
+                    Ok(())
+                },
+            )
+            .printed("orders", |how, _| how.nd.map(|nd| format!("nd={nd}"))),
             shared::delay_range(
                 default.delay_range_s,
                 |how: &mut Self| &mut how.delay_range_s,

@@ -9,7 +9,7 @@
 use hoid_model::{Form, Record};
 
 use super::{
-    frozen::{Frozen, of_family, of_grid, of_windows},
+    frozen::{Frozen, of_family, of_grid, of_guess, of_windows},
     objective::ChangeCriterion,
     ranking::Ranking,
 };
@@ -32,15 +32,22 @@ pub(crate) struct Start {
 }
 
 /// Returns the starts, the best first: one for each rate, and for a form of the family one for each of the best delays.
-pub(crate) fn initial_guesses(criterion: &ChangeCriterion<'_>, records: &[Record]) -> Vec<Start> {
+/// `guess` has the coordinates of one operator for all records.
+pub(crate) fn initial_guesses(
+    criterion: &ChangeCriterion<'_>,
+    records: &[Record],
+    guess: Option<&[f64]>,
+) -> Vec<Start> {
     let (low, high) = criterion.limits[criterion.layout.log_rate];
     let mut rates: Vec<f64> = RATES.iter().map(|g| g.ln().clamp(low, high)).collect();
     rates.dedup();
     // The best poles for the medium rate are used for all.
     let middling = rates[rates.len() / 2];
+    let guessed = guess.map(|guess| of_guess(criterion, guess));
     let frozen = match criterion.layout.form {
         Form::Lead => {
             let mut frozen = of_windows(criterion, records);
+            frozen.extend(guessed.and_then(|guess| with_noise(criterion, guess, middling)));
             if frozen.is_empty() {
                 frozen = of_grid(criterion);
             }
@@ -49,7 +56,7 @@ pub(crate) fn initial_guesses(criterion: &ChangeCriterion<'_>, records: &[Record
                 .filter_map(|f| Some((on_grid(criterion, &f, middling)?.0, f)));
             ranked.min_by(|a, b| a.0.total_cmp(&b.0)).into_iter().collect()
         }
-        _ => best_of_family(criterion, middling),
+        _ => best_of_family(criterion, guessed, middling),
     };
     let mut starts: Vec<Start> = frozen
         .iter()
@@ -62,10 +69,11 @@ pub(crate) fn initial_guesses(criterion: &ChangeCriterion<'_>, records: &[Record
     starts
 }
 
-/// Returns the best poles of a grid, each with the noise model of its residuals.
-fn best_of_family(criterion: &ChangeCriterion<'_>, log_rate: f64) -> Vec<(f64, Frozen)> {
+/// Returns the best poles of a grid and of a guess, each with the noise model of its residuals.
+fn best_of_family(criterion: &ChangeCriterion<'_>, guessed: Option<Frozen>, log_rate: f64) -> Vec<(f64, Frozen)> {
     let ranked = |frozen: Frozen| Some((on_grid(criterion, &frozen, log_rate)?.0, frozen));
-    let mut all: Vec<(f64, Frozen)> = of_family(criterion).into_iter().filter_map(ranked).collect();
+    let grid = of_family(criterion).into_iter().chain(guessed);
+    let mut all: Vec<(f64, Frozen)> = grid.filter_map(ranked).collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     let delay = |frozen: &Frozen| frozen.theta[criterion.layout.delay];
     let mut tried: Vec<f64> = Vec::new();
@@ -75,14 +83,19 @@ fn best_of_family(criterion: &ChangeCriterion<'_>, log_rate: f64) -> Vec<(f64, F
         is_new
     });
     all.truncate(BEST_DELAYS);
+    let noise = |(rank, frozen): (f64, Frozen)| Some((rank, with_noise(criterion, frozen, log_rate)?));
+    all.into_iter().filter_map(noise).collect()
+}
+
+/// Gives poles the noise model of what they leave of u; `None` if they have no numerator.
+fn with_noise(criterion: &ChangeCriterion<'_>, mut frozen: Frozen, log_rate: f64) -> Option<Frozen> {
     let (nd, noise) = (criterion.layout.nd, criterion.layout.noise);
-    for (_, frozen) in &mut all {
-        let left = on_grid(criterion, frozen, log_rate).and_then(|(_, theta, ranking)| ranking.unexplained(&theta));
-        if let Some(found) = left.and_then(|series| NoiseProducts::new(&series, nd).fit(nd)) {
-            frozen.theta[noise..].copy_from_slice(&found.d);
-        }
+    let (_, theta, ranking) = on_grid(criterion, &frozen, log_rate)?;
+    let series = ranking.unexplained(&theta)?;
+    if let Some(found) = NoiseProducts::new(&series, nd).fit(nd) {
+        frozen.theta[noise..].copy_from_slice(&found.d);
     }
-    all
+    Some(frozen)
 }
 
 /// Returns the start of the model without a change, from the poles, the delay and the noise model of the other.

@@ -183,6 +183,7 @@ impl GeneticSigmoid {
     fn fit(&self, task: &Task<'_>) -> Result<SigmoidFit, ThesisError> {
         let (e, u) = task.signals(NAME, 1000)?;
         let estimator = SigmoidChange {
+            nd: Some(1),
             start: Some(self.start(task, e, u)),
             likelihood_intervals: false,
             ..SigmoidChange::default()
@@ -278,6 +279,7 @@ mod tests {
         let run = Run::of(Condition::C4, 1, 0.1);
         let genetic = GeneticSigmoid::default().fit(&run.task()).unwrap();
         let own = SigmoidChange {
+            nd: Some(1),
             likelihood_intervals: false,
             ..SigmoidChange::default()
         };
