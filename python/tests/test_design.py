@@ -68,13 +68,22 @@ def test_a_group_is_designed_for(group_results: Path) -> None:
         pyhoid.design(group_results, controlled_element="1/s")
 
 
+def test_both_responses_to_a_target_that_is_seen() -> None:
+    designed = pyhoid.design(controlled_element="4/s", display="pursuit", difference="tau_f=0.05")
+    assert designed.errors["K_f"] > 0 and designed.errors["tau_f"] > 0
+    assert set(designed.to_dataframe("lines")["enters"]) == {"target", "disturbance"}
+    assert len(designed.to_dataframe("response_to_target")) == len(designed.response)
+
+
 def test_mistakes_are_told(tmp_path: Path) -> None:
     with pytest.raises(pyhoid.OptionError, match=r"controlled_element"):
         pyhoid.design()
     with pytest.raises(pyhoid.OptionError, match="expected one of crossover"):
         pyhoid.design(controlled_element="4/s", wanted={"T_I": 0.1})
     with pytest.raises(pyhoid.OptionError, match="disturbance"):
-        pyhoid.design(controlled_element="4/s", display="pursuit")
+        pyhoid.design(controlled_element="4/s", display="pursuit", against="reference")
+    with pytest.raises(pyhoid.OptionError, match="spacing"):
+        pyhoid.design(controlled_element="4/s", lines=60, spacing=9)
     with pytest.raises(pyhoid.FileMissingError):
         pyhoid.design(tmp_path / "nothing.toml")
     with pytest.raises(pyhoid.FormatError, match="no people"):

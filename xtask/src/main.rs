@@ -15,7 +15,7 @@
 //! | `cargo xtask miri [ARGUMENT...]` | the boundary to C under Miri, arguments for its tests (module `miri`) |
 //! | `cargo xtask places [--dry or --dev]` | one run through every place in which hoid runs, as the table of the page "In your simulator" (module `places`) |
 //! | `cargo xtask bench [OPTION...]` | the tasks of `research/notes/speed-peers.md` next to the peers that are installed, or how cost grows (module `bench`) |
-//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults`, `faults-clean`, `tracker-faults`, `mutations`, `bombs`, `hostile`, `kills`, `full-disks`, `latency`, `lab`, `lab-hour`, `lab-real`, `challenge`, `challenge-people` |
+//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `design-errors`, `faults`, `faults-clean`, `tracker-faults`, `mutations`, `bombs`, `hostile`, `kills`, `full-disks`, `latency`, `lab`, `lab-hour`, `lab-real`, `challenge`, `challenge-people` |
 //!
 //! Almost only the standard library is used: a task must start at once on a new machine.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
@@ -133,7 +133,7 @@ const fn slow_of(name: &'static str, package: &'static str, example: &'static st
     }
 }
 
-const SLOW: [Slow; 18] = [
+const SLOW: [Slow; 19] = [
     slow_of("people-coverage", "hoid", "people_coverage"),
     Slow {
         program: Some("hoid-cli"),
@@ -143,6 +143,7 @@ const SLOW: [Slow; 18] = [
     slow_of("little-noise", "hoid-evidence", "little_noise"),
     slow_of("intersample-coverage", "hoid-evidence", "intersample_coverage"),
     slow_of("inputs-coverage", "hoid-evidence", "inputs_coverage"),
+    slow_of("design-errors", "hoid-design", "design_errors"),
     slow_of("tracker-faults", "hoid", "tracker_faults"),
     Slow {
         profile: "dev",

@@ -192,6 +192,147 @@ fn people_of_a_group_have_a_typical_and_a_worst_one() {
     assert!(found["worst"]["name"].is_string());
 }
 
+/// A target that is seen: both responses have errors, and the experiment runs and is identified.
+#[test]
+fn both_responses_to_a_target_that_is_seen_are_designed() {
+    let directory = TempDir::new().unwrap();
+    let at = directory.path();
+    let arguments = ["design", "--controlled-element", "4/s", "--display", "pursuit"];
+    let all = [&arguments[..], &["--remnant-share", ".1", "--out", "design"]].concat();
+    let page = good(at, &all);
+    for words in [
+        "K_f (s)",
+        "tau_f (s)",
+        "response to the target (derivative",
+        "disturbance",
+    ] {
+        assert!(page.contains(words), "{words}: {page}");
+    }
+    let object = json(at, &[&all[..], &["--json"]].concat());
+    assert_eq!(object["feedforward"]["form"], "derivative");
+    let lab = fs::read_to_string(at.join("design/lab.toml")).unwrap();
+    assert!(lab.contains("display = \"pursuit\""), "{lab}");
+    assert!(
+        fs::read_to_string(at.join("design/design.svg"))
+            .unwrap()
+            .contains("gain of F")
+    );
+    good(
+        at,
+        &["simulate", "--scenario", "design/scenario.toml", "--out", "run.csv"],
+    );
+    let fit = json(
+        at,
+        &[
+            "identify",
+            "run.csv",
+            "--role",
+            "f_t=feedforward/derivative",
+            "--form",
+            "gain",
+            "--intersample",
+            "zoh",
+            "--json",
+        ],
+    );
+    // The gain of the response to the target, within four of the errors that were designed.
+    let named = |all: &serde_json::Value, name: &str| {
+        let found = all.as_array().unwrap().iter().find(|p| p["name"] == name);
+        found.unwrap().clone()
+    };
+    let designed = named(&object["parameters"], "K_f");
+    let found = named(&fit["channels"][1]["parameters"], "K_d");
+    let off = (found["value"].as_f64().unwrap() - designed["value"].as_f64().unwrap()).abs();
+    assert!(
+        off < 4.0 * designed["standard_error"].as_f64().unwrap(),
+        "{found} {designed}"
+    );
+    // A pair of forcing functions is judged from a scenario, not from a table of one.
+    let again = json(
+        at,
+        &[&arguments[..], &["--against", "design/scenario.toml", "--json"]].concat(),
+    );
+    assert!((again["against"]["rms_e"].as_f64().unwrap() / again["rms_e"].as_f64().unwrap() - 1.0).abs() < 1e-6);
+}
+
+/// The spread of a difference between people from a comparison, a group, and a population.
+#[test]
+fn the_spread_of_a_difference_is_that_of_the_people() {
+    let directory = TempDir::new().unwrap();
+    let at = directory.path();
+    let person = |subject: &str, condition: &str, tau: f64| {
+        serde_json::json!({
+            "subject": subject, "condition": condition, "run": "all", "runs": 4, "form": "gain",
+            "parameters": {
+                "K": {"value": 0.6, "standard_error": 0.01}, "omega_nm": {"value": 10.0, "standard_error": 0.1},
+                "zeta_nm": {"value": 0.3, "standard_error": 0.01}, "tau_e": {"value": tau, "standard_error": 0.002},
+            },
+            "verdict": {"level": "trustworthy", "reasons": []},
+        })
+    };
+    let group = serde_json::json!({"hoid": "0", "group": "g", "people": [
+        person("A", "rate", 0.2), person("B", "rate", 0.22), person("C", "rate", 0.18), person("D", "rate", 0.2),
+        person("A", "slow", 0.24), person("B", "slow", 0.31), person("C", "slow", 0.26), person("D", "slow", 0.22),
+    ]});
+    fs::write(at.join("group.json"), group.to_string()).unwrap();
+    let compared = good(at, &["compare", "group.json", "--of", "tau_e", "--json"]);
+    fs::write(at.join("comparison.json"), &compared).unwrap();
+    let compared: serde_json::Value = serde_json::from_str(&compared).unwrap();
+    let tau = compared["differences"][0]["tau"].as_f64().unwrap();
+    assert!(tau > 0.02, "{tau}");
+    let design = [
+        "design",
+        "--controlled-element",
+        "4/s",
+        "--difference",
+        "tau_e=10%",
+        "--json",
+    ];
+    let plan = |more: &[&str]| json(at, &[&design[..], more].concat())["difference"].clone();
+    let spread = |plan: &serde_json::Value| plan["between_people"].as_f64().unwrap();
+    let of = |plan: &serde_json::Value| plan["between_source"].as_str().unwrap().to_owned();
+    let given = plan(&["--between-people", "comparison.json"]);
+    assert!((spread(&given) / tau - 1.0).abs() < 1e-12 && of(&given).contains("4 people in comparison.json"));
+    let of_people = plan(&["--people", "group.json", "--condition", "rate"]);
+    assert!(
+        (spread(&of_people) / tau - 1.0).abs() < 1e-12 && of(&of_people).contains("group.json"),
+        "{of_people}"
+    );
+    let default = plan(&[]);
+    assert!(
+        of(&default) == "a default" && (spread(&default) - 0.02).abs() < 1e-12,
+        "{default}"
+    );
+    let part = plan(&[
+        "--people",
+        "group.json",
+        "--condition",
+        "rate",
+        "--between-people",
+        ".3",
+    ]);
+    assert!(
+        (spread(&part) - 0.06).abs() < 1e-12 && of(&part) == "as given",
+        "{part}"
+    );
+    let population = serde_json::json!({"kind": "population", "condition": "rate", "form": "gain", "parameters": [
+        {"name": "tau_e", "value": 0.2, "spread": 0.25, "people": []},
+    ]});
+    fs::write(at.join("population.json"), population.to_string()).unwrap();
+    let bound = plan(&["--between-people", "population.json"]);
+    assert!(
+        (spread(&bound) - 0.05).abs() < 1e-12 && of(&bound).starts_with("at most"),
+        "{bound}"
+    );
+    // The crossover is no parameter of a population.
+    let all = ["design", "--controlled-element", "4/s", "--difference", "crossover=10%"];
+    let (code, said) = bad(at, &[&all[..], &["--between-people", "population.json"]].concat());
+    assert!(
+        code == 2 && said.contains("no spread between people of crossover"),
+        "{code} {said}"
+    );
+}
+
 #[test]
 fn mistakes_have_remedies() {
     let directory = TempDir::new().unwrap();
@@ -205,7 +346,17 @@ fn mistakes_have_remedies() {
         (&["--controlled-element", "900/(s(s+1))"], 1, "roots"),
         (&["--against", "nowhere.toml"], 1, "nowhere.toml"),
         (&["--form", "gain"], 2, "has its own"),
-        (&["--display", "pursuit"], 2, "--disturbance"),
+        (
+            &["--display", "pursuit", "--against", "reference"],
+            2,
+            "no lines of a disturbance",
+        ),
+        (&["--lines", "60", "--spacing", "9"], 2, "--spacing"),
+        (
+            &["--difference", "crossover=.5", "--between-people", "person.toml"],
+            2,
+            "hoid compare --of crossover",
+        ),
         (&["--difference", "crossover=0"], 2, "other than zero"),
         (&["--difference", "speed=1"], 2, "expected one of"),
         (&["--power", ".9"], 2, "--difference"),

@@ -12,11 +12,15 @@ use tempfile::TempDir;
 fn a_designed_experiment_is_read() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
-    for display in Display::CHOICES {
+    let points = [Enters::Disturbance, Enters::Target];
+    let all = points
+        .iter()
+        .flat_map(|enters| Display::CHOICES.iter().map(move |display| (*enters, *display)));
+    for (enters, display) in all {
         let request = DesignRequest {
             controlled_element: Some("90/(s(s+6))".parse().unwrap()),
-            enters: Enters::Disturbance,
-            display: *display,
+            enters,
+            display,
             runs: Some(3),
             ..DesignRequest::default()
         };
@@ -25,11 +29,15 @@ fn a_designed_experiment_is_read() {
         fs::write(at.join("lab.toml"), design.lab("scenario.toml").unwrap()).unwrap();
         let config = Config::read(&at.join("lab.toml")).unwrap();
         let condition = &config.condition[0];
-        assert_eq!((condition.runs, condition.display), (3, *display));
+        assert_eq!((condition.runs, condition.display), (3, display));
         let course = condition.course().unwrap();
         let [target, disturbance] = course.excitations();
-        assert!(target.function.sinusoids().is_empty());
-        assert_eq!(disturbance.function.sinusoids().len(), design.lines.len());
+        let lines = |of| design.lines.iter().filter(|line| line.enters == of).count();
+        assert_eq!(target.function.sinusoids().len(), lines(Enters::Target));
+        assert_eq!(disturbance.function.sinusoids().len(), lines(Enters::Disturbance));
+        let (seen, of_error) = (enters == Enters::Target, display == Display::Compensatory);
+        assert_eq!(lines(Enters::Target) > 0, seen);
+        assert_eq!(lines(Enters::Disturbance) > 0, !seen || !of_error);
         assert_eq!(
             course.element_at(0.0).unwrap().to_string(),
             design.task.state.controlled_element.to_string()

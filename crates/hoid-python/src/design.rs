@@ -1,7 +1,7 @@
 //! `pyhoid.design`: a forcing function and the errors to be expected; the package reads the JSON of the result.
 
 use hoid_design::experiment::{
-    Against, DesignRequest, Designing, DifferenceRequest, Enters, ExperimentDesign, People, Remnant,
+    Against, Between, DesignRequest, Designing, DifferenceRequest, Enters, ExperimentDesign, People, Remnant,
 };
 use hoid_model::{Form, family_scenario::Display};
 use hoid_report::{design_figure, runs_figure};
@@ -11,7 +11,7 @@ use crate::{controlled_element::ControlledElement, errors::Outcome, names};
 
 /// Designs, and returns the result as JSON.
 #[pyfunction]
-#[pyo3(signature = (people, *, condition, controlled_element, form, wanted, disturbance, remnant, length, runs, lines, band, shelf, limits, against, difference, statistics, display, seed))]
+#[pyo3(signature = (people, *, condition, controlled_element, form, wanted, disturbance, remnant, length, runs, lines, spacing, band, shelf, limits, against, difference, statistics, display, seed))]
 #[allow(clippy::too_many_arguments)]
 pub fn design(
     py: Python<'_>,
@@ -25,12 +25,13 @@ pub fn design(
     length: f64,
     runs: Option<usize>,
     lines: usize,
+    spacing: u32,
     band: (f64, f64),
     shelf: f64,
     limits: (Option<f64>, Option<f64>),
     against: Option<&str>,
     difference: Option<&str>,
-    statistics: (f64, f64, f64, f64),
+    statistics: (f64, f64, Option<String>, f64),
     display: &str,
     seed: u64,
 ) -> Outcome<String> {
@@ -40,7 +41,7 @@ pub fn design(
             sought: text.parse()?,
             power,
             alpha,
-            between_people,
+            between_people: between_people.as_deref().map(Between::of_text),
             run_to_run,
         })
     };
@@ -65,6 +66,7 @@ pub fn design(
             wanted: wanted.iter().map(|text| text.parse()).collect::<Result<_, _>>()?,
             period_s: length,
             lines,
+            spacing,
             band_rad_s: band,
             shelf,
             most_rms: [limits.0, limits.1],

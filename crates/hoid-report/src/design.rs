@@ -1,6 +1,6 @@
 //! A designed experiment as figures: the forcing function with the response of the person, and errors over runs.
 
-use hoid_design::experiment::{DesignedLine, Expected, ExpectedResponse, ExperimentDesign};
+use hoid_design::experiment::{DesignedLine, Enters, Expected, ExpectedResponse, ExperimentDesign};
 use hoid_model::uncertainty::Estimate;
 
 use crate::{
@@ -9,41 +9,38 @@ use crate::{
 };
 
 /// Amplitudes of the lines, and gain and phase of the person: the operator with its band, and the lines with their bars,
-/// each of 95 % over all runs.
+/// each of 95 % over all runs; likewise the response to a target that is shown, at the lines of the target.
 pub fn design_figure(design: &ExperimentDesign) -> String {
-    let lines = &design.lines;
-    let of_lines = |of: &dyn Fn(&DesignedLine) -> f64| lines.iter().map(of).collect::<Vec<f64>>();
-    let omega = of_lines(&|l| l.line.omega_rad_s);
-    let amplitudes = Curve {
-        kind: LineKind::Stems,
-        ..curve("", 0, omega.clone(), of_lines(&|l| l.line.amplitude_deg))
-    };
-    let response = |name: &str, unit: &str, of: fn(&ExpectedResponse) -> Estimate| {
-        let band: Vec<Estimate> = design.response.iter().map(of).collect();
-        let points: Vec<Estimate> = lines.iter().map(|l| of(&l.response)).collect();
-        let values = |all: &[Estimate]| all.iter().map(|e| e.value).collect::<Vec<f64>>();
-        let operator = Curve {
-            band: band.iter().map(ends).collect(),
+    let is_seen = design.task.feedforward.is_some();
+    let amplitude = |(shade, enters): (usize, Enters)| {
+        let own: Vec<&DesignedLine> = design.lines.iter().filter(|l| l.enters == enters).collect();
+        let name = if is_seen { enters.name() } else { "" };
+        Curve {
+            kind: LineKind::Stems,
             ..curve(
-                "operator, band 95 %",
-                1,
-                design.response.iter().map(|r| r.omega_rad_s).collect(),
-                values(&band),
+                name,
+                shade,
+                own.iter().map(|l| l.line.omega_rad_s).collect(),
+                own.iter().map(|l| l.line.amplitude_deg).collect(),
             )
-        };
-        let at_lines = Curve {
-            kind: LineKind::Points,
-            bars: points.iter().map(ends).collect(),
-            ..curve("one line alone, bars 95 %", 0, omega.clone(), values(&points))
-        };
-        panel(name, unit, vec![operator, at_lines])
+        }
     };
+    let points = [(0, Enters::Target), (1, Enters::Disturbance)].into_iter();
+    let there = points.filter(|(_, enters)| design.lines.iter().any(|l| l.enters == *enters));
+    let amplitudes = match is_seen {
+        true => there.map(amplitude).collect(),
+        false => there.map(|(_, enters)| amplitude((0, enters))).collect(),
+    };
+    let of_target = |l: &&DesignedLine| is_seen && l.enters == Enters::Target;
+    let (target, error): (Vec<&DesignedLine>, Vec<&DesignedLine>) = design.lines.iter().partition(of_target);
+    let of_error = if is_seen { "of B " } else { "" };
+    let mut panels = vec![panel("amplitude", "", amplitudes)];
+    panels.extend(responses(of_error, &design.response, &error));
+    if is_seen {
+        panels.extend(responses("of F ", &design.response_to_target, &target));
+    }
     let grid = CurveGrid {
-        panels: vec![
-            panel("amplitude", "", vec![amplitudes]),
-            response("gain", "dB", |r| r.gain_db),
-            response("phase", "deg", |r| r.phase_deg),
-        ],
+        panels,
         columns: 1,
         abscissa: "frequency \u{3c9} (rad/s)".to_owned(),
         logarithmic_abscissa: true,
@@ -56,6 +53,36 @@ pub fn design_figure(design: &ExperimentDesign) -> String {
         design.length_s
     );
     curves("design", &title, &grid)
+}
+
+/// Gain and phase of a response: between the lines, and at them.
+fn responses(of: &str, between: &[ExpectedResponse], at: &[&DesignedLine]) -> [CurvePanel; 2] {
+    let one = |name: &str, unit: &str, part: fn(&ExpectedResponse) -> Estimate| {
+        let band: Vec<Estimate> = between.iter().map(part).collect();
+        let points: Vec<Estimate> = at.iter().map(|l| part(&l.response)).collect();
+        let values = |all: &[Estimate]| all.iter().map(|e| e.value).collect::<Vec<f64>>();
+        let operator = Curve {
+            band: band.iter().map(ends).collect(),
+            ..curve(
+                "operator, band 95 %",
+                1,
+                between.iter().map(|r| r.omega_rad_s).collect(),
+                values(&band),
+            )
+        };
+        let at_lines = Curve {
+            kind: LineKind::Points,
+            bars: points.iter().map(ends).collect(),
+            ..curve(
+                "one line alone, bars 95 %",
+                0,
+                at.iter().map(|l| l.line.omega_rad_s).collect(),
+                values(&points),
+            )
+        };
+        panel(format!("{name} {of}").trim_end(), unit, vec![operator, at_lines])
+    };
+    [one("gain", "dB", |r| r.gain_db), one("phase", "deg", |r| r.phase_deg)]
 }
 
 /// Fewest runs of the abscissa.
@@ -182,6 +209,7 @@ fn panel(name: &str, unit: &str, curves: Vec<Curve>) -> CurvePanel {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use hoid_design::experiment::{DesignRequest, DifferenceRequest};
+    use hoid_model::family_scenario::Display;
 
     use super::*;
 
@@ -198,6 +226,15 @@ mod tests {
         assert!(figure.matches("<circle").count() >= 3 * design.lines.len() && !figure.contains("NaN"));
         let runs = runs_figure(&design);
         assert!(runs.contains("tau") && runs.contains("relative error") && !runs.contains("NaN"));
+        assert!(!figure.contains("gain of F"));
+        let pursuit = DesignRequest {
+            display: Display::Pursuit,
+            ..request.clone()
+        };
+        let both = design_figure(&pursuit.run().unwrap());
+        for name in ["gain of B", "phase of F", "target", "disturbance"] {
+            assert!(both.contains(name) && !both.contains("NaN"), "{name}");
+        }
         design.wanted = vec!["crossover=3%".parse().unwrap()];
         assert!(runs_figure(&design).contains("accepted"));
     }

@@ -7,8 +7,8 @@ use std::f64::consts::TAU;
 use hoid_model::{
     Complex64, ContinuousTransferFunction, FamilyOperator, FamilyScenario, FamilyState, Form, SampleTime,
     family_scenario::{
-        Excitation, Feedforward, Followed, Intermittence, MultiSine, PartStrength, Pulses, RemnantPart, RemnantShape,
-        SignalDependence, Stick,
+        Excitation, Feedforward, Followed, Interleaved, Intermittence, MultiSine, PartStrength, Pulses, RemnantPart,
+        RemnantShape, SignalDependence, Stick,
     },
     operator_family::Coordinate,
     polynomial,
@@ -378,8 +378,23 @@ fn parts() -> Vec<Vec<RemnantPart>> {
 
 #[test]
 fn each_remnant_has_its_share_of_the_variance() {
-    for (kind, remnant) in parts().into_iter().enumerate() {
-        let mut scenario = typical();
+    // The last one is that of a person who answers a target, with most of u from it.
+    let mut seen = typical();
+    let sum = |rms, interleaved| MultiSine {
+        rms,
+        interleaved,
+        ..MultiSine::default()
+    };
+    seen.target = sum(1.0, Interleaved::Even).excitation().unwrap();
+    seen.disturbance = sum(0.2, Interleaved::Odd).excitation().unwrap();
+    let x = [0.7, 11.0_f64.ln(), 0.3_f64.ln(), 0.2];
+    seen.feedforward = Some(Feedforward {
+        operator: FamilyOperator::new(Form::Derivative, true, &x).unwrap(),
+        preview_s: 0.25,
+    });
+    let all = parts().into_iter().map(|remnant| (typical(), remnant));
+    let all = all.chain([(seen, parts().swap_remove(0))]);
+    for (kind, (mut scenario, remnant)) in all.enumerate() {
         scenario.run_in_s = 20.0;
         let silent = FamilySimulator::new(&scenario).unwrap();
         scenario.remnant = remnant;

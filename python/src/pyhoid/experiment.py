@@ -42,6 +42,8 @@ class ExperimentDesign(Written):
         self.lines: list[dict[str, Any]] = found["lines"]
         #: The operator between the lines, with its errors.
         self.response: list[dict[str, Any]] = found["response"]
+        #: The response to a target that is shown, likewise; empty without it.
+        self.response_to_target: list[dict[str, Any]] = found["response_to_target"]
         #: The person with the greatest errors, if there are several people.
         self.worst: dict[str, Any] | None = found["worst"]
         #: The other people.
@@ -61,10 +63,13 @@ class ExperimentDesign(Written):
         return {row["quantity"]: row["standard_error"] for row in self._parameters}
 
     def to_dataframe(
-        self, table: Literal["errors", "lines", "response", "people", "power"] = "errors"
+        self,
+        table: Literal[
+            "errors", "lines", "response", "response_to_target", "people", "power"
+        ] = "errors",
     ) -> pd.DataFrame:
-        """A table of the result: errors of the typical person, lines, response, errors of each of
-        several people, or the power over runs and people.
+        """A table of the result: errors of the typical person, lines, response to the error and to a
+        target that is shown, errors of each of several people, or the power over runs and people.
 
         >>> designed.to_dataframe("lines")
         """
@@ -176,7 +181,7 @@ def design(
     difference: Mapping[str, float] | str | None = None,
     power: float = 0.8,
     alpha: float = 0.05,
-    between_people: float = 0.1,
+    between_people: float | str | PathLike[str] | None = None,
     run_to_run: float = 0.06,
     condition: str | None = None,
     form: str | None = None,
@@ -185,6 +190,7 @@ def design(
     length: float = 81.92,
     runs: int | None = None,
     lines: int = 10,
+    spacing: int = 3,
     band: tuple[float, float] = (0.2, 18.0),
     shelf: float = 0.2,
     max_rms_e: float | None = None,
@@ -213,6 +219,8 @@ def design(
         Probability to find it, and level of the test.
     between_people, run_to_run : float
         Standard deviation of the difference between people, and of a person from run to run, relative.
+        The first may be a file that has it: a comparison as JSON, the result of a group with several
+        conditions, a ``population.json``. Without it that of ``people`` if they have one, else 0.1.
     condition : str
         The condition of a group that has several.
     form : str
@@ -220,14 +228,15 @@ def design(
     disturbance : bool
         The forcing function enters at the input of the controlled element; else it is the target.
     display : {"compensatory", "pursuit", "preview"}
-        Display of the task, for the lab.
+        Display of the task. On the last two a target and a disturbance are designed, on lines of their
+        own, and the errors of the response to the target (``K_f``, ``tau_f``) are predicted too.
     length : float
         Length of a run in s, the period of the forcing function.
     runs : int
         Number of runs; by default that which the wanted errors take.
-    lines, band, shelf
-        Number of lines, their lowest and highest frequency in rad/s, and the largest amplitude beyond
-        the crossover as a part of the mean below.
+    lines, spacing, band, shelf
+        Number of lines, their least distance in multiples of 1/length, their lowest and highest
+        frequency in rad/s, and the largest amplitude beyond the crossover as a part of the mean below.
     max_rms_e, max_u : float
         Largest rms of error and control.
     remnant_share, remnant_time_constant : float
@@ -264,12 +273,13 @@ def design(
         length=length,
         runs=runs,
         lines=lines,
+        spacing=spacing,
         band=band,
         shelf=shelf,
         limits=(max_rms_e, max_u),
         against=None if against is None else fspath(against),
         difference=None if difference is None else ",".join(_assignments(difference)),
-        statistics=(power, alpha, between_people, run_to_run),
+        statistics=(power, alpha, None if between_people is None else str(between_people), run_to_run),
         display=display,
         seed=seed,
     )

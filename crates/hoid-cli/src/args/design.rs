@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use hoid::design::experiment::{ALPHA, Against, BETWEEN_PEOPLE, POWER, People, RUN_TO_RUN, Remnant, Sought, Wanted};
+use hoid::design::experiment::{ALPHA, Against, Between, POWER, People, RUN_TO_RUN, Remnant, Sought, Wanted};
 use hoid::model::{ContinuousTransferFunction, Form, family_scenario::Display};
 
 use super::{choices::choice_of, figure::FigureArgs, parse::parse_span, show::ShowArgs};
@@ -24,7 +24,7 @@ pub struct DesignArgs {
     /// The controlled element, as 90/(s(s+6)) or 90/1,6,0 [default: that of the scenario or group]
     #[arg(long, value_name = "TF")]
     pub controlled_element: Option<ContinuousTransferFunction>,
-    /// The quantities requested, with the standard error that is accepted: crossover=3%,tau_e=5%,phase_margin=2 (deg)
+    /// The quantities requested, with the standard error that is accepted: crossover=3%,tau_e=5%,phase_margin=2 (deg), tau_f=0.02 (s)
     /// [default: all parameters alike]
     #[arg(long = "for", value_name = "LIST", value_delimiter = ',')]
     pub wanted: Vec<Wanted>,
@@ -43,9 +43,12 @@ pub struct DesignArgs {
     /// Number of runs [default: the number for the target, else 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub runs: Option<u32>,
-    /// Lines of the forcing function
+    /// Lines of the forcing function, of each of two
     #[arg(long, value_name = "N", default_value_t = 10)]
     pub lines: usize,
+    /// Least distance of two lines, in multiples of the fundamental 1/length
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
+    pub spacing: u32,
     /// Lowest and highest frequency of the lines, rad/s
     #[arg(long, value_name = "LO..HI", default_value = "0.2..18", value_parser = parse_span)]
     pub band: (f64, f64),
@@ -59,7 +62,7 @@ pub struct DesignArgs {
     /// Greatest rms of the control
     #[arg(long, value_name = "RMS")]
     pub max_u: Option<f64>,
-    /// A forcing function to be judged next to it: a scenario with a target or disturbance, a table of lines (columns
+    /// A forcing function to be judged next to it: a scenario with a target or disturbance (or both), a table of lines (columns
     /// omega_rad_s, amplitude, phase_rad), or reference (the ten sines of the text)
     #[arg(long, value_name = "FORCING.toml|.csv|reference")]
     pub against: Option<Against>,
@@ -74,14 +77,15 @@ pub struct DesignArgs {
     #[arg(long, value_name = "P", default_value_t = ALPHA, requires = "difference")]
     pub alpha: f64,
     /// Standard deviation of the difference between people, as a part of the quantity (of the phase margin: as by a gain
-    /// of this spread)
-    #[arg(long, value_name = "PART", default_value_t = BETWEEN_PEOPLE, requires = "difference")]
-    pub between_people: f64,
+    /// of this spread), or a file that has it: what `hoid compare --json` printed, the result of a group with several
+    /// conditions, a population.json [default: that of --people if it has one, else .1]
+    #[arg(long, value_name = "PART|FILE", requires = "difference")]
+    pub between_people: Option<Between>,
     /// Standard deviation of a person from run to run, likewise
     #[arg(long, value_name = "PART", default_value_t = RUN_TO_RUN, requires = "difference")]
     pub run_to_run: f64,
-    /// Display of the task, written for the lab: compensatory (error only), pursuit (target and output), preview. On the
-    /// last two the design is that of the disturbance
+    /// Display of the task: compensatory (error only), pursuit (target and output), preview (and its future). On the last
+    /// two a target and a disturbance are designed, on lines of their own, which separate the responses to error and target
     #[arg(long, value_name = "NAME", default_value = "compensatory", value_parser = choice_of(&Display::ALL))]
     pub display: Display,
     /// Start of the search for phases: each gives other phases of the same lines; the same seed gives the same design

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use hoid::design::experiment::{
-    DesignRequest, Designing, DifferencePlan, DifferenceRequest, Enters, Expected, ExperimentDesign, Remnant,
+    Between, DesignRequest, Designing, DifferencePlan, DifferenceRequest, Enters, Expected, ExperimentDesign, Remnant,
 };
 use hoid::model::{numbers::DASH, uncertainty::Estimate};
 use hoid::report::{PaperTable, design_figure, runs_figure};
@@ -21,7 +21,11 @@ pub fn run(args: &DesignArgs) -> Result<(), CliError> {
         figure::check(figure)?;
     }
     paper_table::check(&args.show)?;
-    let inputs: Vec<&Path> = args.people.path().into_iter().collect();
+    let spread = args.between_people.as_ref().and_then(|between| match between {
+        Between::File(path) => Some(path.as_path()),
+        Between::Part(_) => None,
+    });
+    let inputs: Vec<&Path> = args.people.path().into_iter().chain(spread).collect();
     let files = [args.picture.figure.as_deref(), args.show.table.as_deref()];
     output_paths::check(&inputs, &files, &[])?;
     if let Some(out) = &args.out {
@@ -62,6 +66,7 @@ fn request(args: &DesignArgs) -> DesignRequest {
             wanted: args.wanted.clone(),
             period_s: args.length,
             lines: args.lines,
+            spacing: args.spacing,
             band_rad_s: args.band,
             shelf: args.shelf,
             most_rms: [args.max_rms_e, args.max_u],
@@ -74,7 +79,7 @@ fn request(args: &DesignArgs) -> DesignRequest {
             sought,
             power: args.power,
             alpha: args.alpha,
-            between_people: args.between_people,
+            between_people: args.between_people.clone(),
             run_to_run: args.run_to_run,
         }),
     }
@@ -122,6 +127,13 @@ fn page(found: &ExperimentDesign, verbose: bool) -> String {
     page.push_str(&needed(found));
     if let Some(plan) = &found.difference {
         page.push_str(&difference(plan));
+    }
+    if let Some(seen) = &found.task.feedforward {
+        page.push_str(&format!(
+            "The response to the target ({}, preview {} s) has the parameters ..._f; target and disturbance have lines of their own.\n",
+            seen.operator.form(),
+            seen.preview_s
+        ));
     }
     page.push_str(&format!(
         "\nThe forcing function, crest factor {:.2}\n{}\n\
@@ -247,17 +259,18 @@ fn difference(plan: &DifferencePlan) -> String {
     }
     format!(
         "\nA difference in {size} between two conditions takes {answer} (power {}, alpha {}).\n{rows}\n\
-         Power of the paired t test of n people. A person's difference: {} between people, {} from run to run, {} expected error of a run.\n",
+         Power of the paired t test of n people. A person's difference: {} between people ({}), {} from run to run, {} expected error of a run.\n",
         plan.request.power,
         plan.request.alpha,
         text::significant(plan.between_people),
+        plan.between_source,
         text::significant(plan.run_to_run),
         text::significant(plan.error_of_run),
     )
 }
 
 fn lines(found: &ExperimentDesign) -> Rows {
-    let mut lines = text::table(&["line (rad/s)", "periods a run", "amplitude", "phase (rad)"]);
+    let mut lines = text::table(&["line (rad/s)", "periods a run", "amplitude", "phase (rad)", "enters"]);
     for designed in &found.lines {
         let line = designed.line;
         lines.add_row([
@@ -265,6 +278,7 @@ fn lines(found: &ExperimentDesign) -> Rows {
             format!("{:.0}", line.omega_rad_s * found.length_s / std::f64::consts::TAU),
             text::significant(line.amplitude_deg),
             format!("{:.3}", line.phase_rad),
+            designed.enters.name().to_owned(),
         ]);
     }
     lines

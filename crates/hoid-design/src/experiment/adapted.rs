@@ -20,12 +20,12 @@ use hoid_model::{
 use super::{DesignError, chosen::NamedState};
 
 /// Frequency at which slopes are compared, rad/s.
-const NEAR_CROSSOVER_RAD_S: f64 = 3.0;
+pub(super) const NEAR_CROSSOVER_RAD_S: f64 = 3.0;
 /// Slope that a form without lead and lag may lack.
 const SMALL_SLOPE: f64 = 0.3;
 /// Shortest time constant, longest lead and longest lag, s.
 const SHORTEST_S: f64 = 0.1;
-const LONGEST_LEAD_S: f64 = 2.0;
+pub(super) const LONGEST_LEAD_S: f64 = 2.0;
 const LONGEST_LAG_S: f64 = 3.0;
 /// The phase margin, and the least one, deg.
 const MARGIN_DEG: f64 = 40.0;
@@ -82,7 +82,8 @@ pub(super) fn population(
     Ok((typical, others))
 }
 
-fn slope(element: &ContinuousTransferFunction) -> f64 {
+/// Slope of `ln|P|` over `ln omega` near the crossover.
+pub(super) fn slope(element: &ContinuousTransferFunction) -> f64 {
     let gain = |omega: f64| element.response(omega).norm().ln();
     let step = 0.01_f64;
     let (up, down) = (NEAR_CROSSOVER_RAD_S * step.exp(), NEAR_CROSSOVER_RAD_S * (-step).exp());
@@ -99,7 +100,7 @@ fn form_of(element: &ContinuousTransferFunction) -> Form {
 }
 
 /// The time constant whose lead adds this slope at 3 rad/s, up to a longest one.
-fn time_constant(slope: f64, longest_s: f64) -> f64 {
+pub(super) fn time_constant(slope: f64, longest_s: f64) -> f64 {
     let x = (slope.max(0.0) / (1.0 - slope).max(1e-9)).sqrt();
     (x / NEAR_CROSSOVER_RAD_S).clamp(SHORTEST_S, longest_s)
 }

@@ -12,7 +12,7 @@ use hoid_model::{
     forcing::{ForcingFunction, Sinusoid},
 };
 
-use super::{DesignError, Enters};
+use super::{DesignError, Enters, Forcing};
 
 /// Another forcing function: the ten sines of the text by the name `reference`, those of a scenario, or the lines in a
 /// table with the columns omega_rad_s, amplitude and, if there is one, phase_rad.
@@ -53,17 +53,33 @@ impl Against {
         }
     }
 
-    pub(super) fn forcing(&self, enters: Enters) -> Result<ForcingFunction, DesignError> {
+    /// The lines that enter at these points.
+    pub(super) fn forcing(&self, points: &[Enters]) -> Result<Forcing, DesignError> {
+        let one = |function: &ForcingFunction| match points {
+            [enters] => Ok(Forcing::of(*enters, function)),
+            _ => Err(DesignError::OneForcing {
+                name: self.name(),
+                missing: Enters::Disturbance,
+            }),
+        };
         match self {
-            Self::Reference => Ok(ForcingFunction::reference()),
+            Self::Reference => one(&ForcingFunction::reference()),
             Self::File(path) if is_scenario(path) => {
                 let scenario = family(path)?;
-                Ok(match enters {
-                    Enters::Target => scenario.target.function,
-                    Enters::Disturbance => scenario.disturbance.function,
-                })
+                let of = |enters: &Enters| match enters {
+                    Enters::Target => &scenario.target.function,
+                    Enters::Disturbance => &scenario.disturbance.function,
+                };
+                if let Some(missing) = points.iter().find(|p| of(p).sinusoids().is_empty()) {
+                    return Err(DesignError::OneForcing {
+                        name: self.name(),
+                        missing: *missing,
+                    });
+                }
+                let all = points.iter().flat_map(|p| Forcing::of(*p, of(p)).lines().to_vec());
+                Ok(Forcing::new(all.collect())?)
             }
-            Self::File(path) => lines(&read_table(path)?, path),
+            Self::File(path) => one(&lines(&read_table(path)?, path)?),
         }
     }
 }

@@ -1,11 +1,14 @@
 //! The designed experiment: forcing function, expected errors of the typical person and of the others, and its JSON.
 
 use hoid_analysis::{AnalysisError, Setting, json};
-use hoid_model::{Verdict, family_scenario::Display};
+use hoid_model::{
+    Verdict,
+    family_scenario::{Display, Feedforward},
+};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
-use super::{DesignedLine, DifferencePlan, Expected, ExpectedResponse, Task, Wanted};
+use super::{DesignedLine, DifferencePlan, Enters, Expected, ExpectedResponse, Task, Wanted};
 
 /// Expected errors with a name: of another person, or with another forcing function over the same time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -21,8 +24,10 @@ pub struct NamedExpected {
 /// A designed experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ExperimentDesign {
-    /// The typical person, with element, point of entry and remnant.
+    /// The typical person, with element and remnant.
     pub task: Task,
+    /// Point of entry of the forcing function; a target on a display that shows it comes with a disturbance.
+    pub enters: Enters,
     /// Name of the typical person.
     pub person: String,
     /// Length of a run in s, the period of the forcing function.
@@ -39,7 +44,9 @@ pub struct ExperimentDesign {
     pub lines: Vec<DesignedLine>,
     /// The operator between the lines, with the errors of all runs.
     pub response: Vec<ExpectedResponse>,
-    /// Its peak divided by its rms.
+    /// The response to a target that is seen, likewise; empty without it.
+    pub response_to_target: Vec<ExpectedResponse>,
+    /// Peak of the forcing function divided by its rms, the larger one of two.
     pub crest_factor: f64,
     /// Errors of all runs of the typical person.
     pub expected: Expected,
@@ -72,6 +79,11 @@ impl ExperimentDesign {
             json!(self.task.state.controlled_element.to_string()),
         );
         set("display", json!(self.display.name()));
+        set("enters", json!(self.enters.name()));
+        set(
+            "feedforward",
+            self.task.feedforward.as_ref().map_or(Value::Null, of_seen),
+        );
         set("runs", json!(self.runs));
         set("length_s", json::number(self.length_s));
         set("runs_needed", json!(self.runs_needed));
@@ -81,6 +93,10 @@ impl ExperimentDesign {
         }
         set("lines", self.lines.iter().map(of_line).collect());
         set("response", self.response.iter().map(of_response).collect());
+        set(
+            "response_to_target",
+            self.response_to_target.iter().map(of_response).collect(),
+        );
         set("people", self.people.iter().map(of_named).collect());
         set("worst", self.worst.as_ref().map_or(Value::Null, of_named));
         set("against", self.against.as_ref().map_or(Value::Null, of_named));
@@ -109,10 +125,18 @@ impl ExperimentDesign {
 
 fn of_line(designed: &DesignedLine) -> Value {
     let mut one = of_response(&designed.response);
+    one["enters"] = json!(designed.enters.name());
     one["amplitude"] = json::number(designed.line.amplitude_deg);
     one["phase_rad"] = json::number(designed.line.phase_rad);
     one["to_remnant"] = json::number(designed.to_remnant);
     one
+}
+
+fn of_seen(seen: &Feedforward) -> Value {
+    json!({
+        "form": seen.operator.form().name(),
+        "preview_s": json::number(seen.preview_s),
+    })
 }
 
 fn of_response(r: &ExpectedResponse) -> Value {

@@ -1,6 +1,6 @@
 //! The people of a design: the typical one, for whom the forcing function is, and the others.
 
-use hoid_model::{ContinuousTransferFunction, FamilyState, Finding, Form};
+use hoid_model::{ContinuousTransferFunction, FamilyState, Finding, Form, family_scenario::Feedforward};
 
 use super::DesignError;
 
@@ -16,6 +16,8 @@ pub(super) struct NamedState {
 pub(super) struct Chosen {
     pub typical: NamedState,
     pub others: Vec<NamedState>,
+    /// The response to a target that is seen, where the people state it.
+    pub feedforward: Option<Feedforward>,
     pub findings: Vec<Finding>,
 }
 

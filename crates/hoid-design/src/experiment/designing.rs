@@ -6,28 +6,19 @@
 //! gradients g and accepted errors s; the design minimises `J = sum over wanted g' I^-1 g/s^2`, the sum of the squared
 //! ratios of errors to accepted errors.
 //!
-//! - **Amplitudes.** J is convex in q. From equal shares, `q_k <- q_k sqrt(d_k/sum q d)`,
-//!   `d_k = sum g' I^-1 M_k I^-1 g/s^2`, decreases J in every step (D. M. Titterington, *Applied Statistics* 27 (1978)
-//!   227-234; Y. Yu, *Ann. Stat.* 38 (2010) 1593-1606). Each line keeps at least a part of an equal share, for people
-//!   who differ from the assumed operator.
-//! - **Frequencies.** Each line in turn is moved to multiples near it and keeps the one with the smallest J (V. V.
-//!   Fedorov, *Theory of Optimal Experiments*, 1972), on condition that no line is a harmonic of another.
-//! - **Limits.** If a target has much power above the crossover frequency, people lower their crossover frequency (D.
-//!   T. McRuer and H. R. Jex, *IEEE Trans. Human Factors in Electronics* 8 (1967) 231-249): lines there form a shelf,
-//!   with amplitudes up to a given part of the geometric mean of those below. Lines below are between half and twice
-//!   that mean. The size is then the largest that satisfies the limits of the rms of e and u.
+//! Amplitudes, places and limits are those of the module `search`.
 
 use std::f64::consts::TAU;
 
-use hoid_model::forcing::{ForcingFunction, Sinusoid};
-use hoid_numerics::statistics::mean;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 use super::{
-    DesignError, Expected, Task, Wanted,
-    information::{Loop, inverse},
-    lines::{crest_factor, multiples, set_phases},
+    DesignError, Enters, Expected, Forcing, Task, Wanted,
+    information::Loop,
+    joint::Quantity,
+    lines::{crest_factor, far_enough, multiples, set_phases},
     periods,
+    search::Search,
 };
 
 /// Options of the design of a forcing function.
@@ -37,8 +28,10 @@ pub struct Designing {
     pub wanted: Vec<Wanted>,
     /// Period in s: the duration of a run, or an integer fraction of it.
     pub period_s: f64,
-    /// Number of lines.
+    /// Number of lines of each forcing function.
     pub lines: usize,
+    /// Least distance of two lines in multiples of the fundamental.
+    pub spacing: u32,
     /// The lowest and the highest frequency, rad/s.
     pub band_rad_s: (f64, f64),
     /// Largest amplitude of a line above the crossover, relative to the geometric mean of those below.
@@ -55,6 +48,7 @@ impl Default for Designing {
             wanted: Vec::new(),
             period_s: 81.92,
             lines: 10,
+            spacing: 3,
             band_rad_s: (0.2, 18.0),
             shelf: 0.2,
             most_rms: [None; 2],
@@ -66,9 +60,9 @@ impl Default for Designing {
 /// A forcing function with its expected errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Designed {
-    /// The forcing function.
-    pub forcing: ForcingFunction,
-    /// Peak divided by rms.
+    /// The forcing functions.
+    pub forcing: Forcing,
+    /// Peak divided by rms; the larger one of two.
     pub crest_factor: f64,
     /// Expected errors for one period.
     pub expected: Expected,
@@ -76,25 +70,13 @@ pub struct Designed {
     pub periods: usize,
 }
 
-/// Largest ratio of the amplitude of a line below the crossover to their geometric mean; its inverse is the smallest.
-const WITHIN: f64 = 2.0;
-/// Part of an equal share that each line keeps at least.
-const LEAST_SHARE: f64 = 0.1;
-/// Steps of the iteration of the shares, and steps if a line is moved for a trial.
-const STEPS: usize = 400;
-const STEPS_OF_TRIAL: usize = 60;
-/// Multiples by which a line is moved, and number of rounds.
-const MOVES: [i64; 6] = [-4, -2, -1, 1, 2, 4];
-const ROUNDS: usize = 3;
-/// Least relative improvement for which a line is moved.
-const WORTH: f64 = 1e-3;
-
 impl Designing {
-    /// Designs the forcing function.
+    /// Designs a forcing function for each point of entry.
     ///
     /// # Errors
-    /// [`DesignError`] as for [`super::expected`], and if a requested quantity does not exist.
-    pub fn run(&self, task: &Task) -> Result<Designed, DesignError> {
+    /// [`DesignError`] as for [`super::expected`], if a requested quantity does not exist, and if the band has no room for
+    /// the lines.
+    pub fn run(&self, task: &Task, points: &[Enters]) -> Result<Designed, DesignError> {
         let least = (self.band_rad_s.0 * self.period_s / TAU).ceil();
         let largest = (self.band_rad_s.1 * self.period_s / TAU).floor();
         if !(least >= 1.0 && largest > least && largest < 1e5) {
@@ -104,6 +86,7 @@ impl Designing {
                 expected: "above the lowest, which is one or more, and below 100000",
             });
         }
+        let (least, largest) = (least as u32, largest as u32);
         let all = Loop::of(task)?;
         let search = Search {
             all: &all,
@@ -111,53 +94,44 @@ impl Designing {
             period_s: self.period_s,
             shelf: self.shelf,
         };
-        let mut places = multiples(least as u32, largest as u32, self.lines);
-        let (mut shares, mut best) = search.shares(&places, STEPS)?;
-        for _ in 0..ROUNDS {
-            let before = best;
-            for k in 0..places.len() {
-                for by in MOVES {
-                    let moved = i64::from(places[k]) + by;
-                    let others = || {
-                        places
-                            .iter()
-                            .enumerate()
-                            .filter(|(j, _)| *j != k)
-                            .map(|(_, m)| i64::from(*m))
-                    };
-                    let inside = moved >= least as i64 && moved <= largest as i64;
-                    if !inside || others().any(|m| moved % m == 0 || m % moved == 0) {
-                        continue;
-                    }
-                    let mut trial = places.clone();
-                    trial[k] = moved as u32;
-                    if let Ok((found, criterion)) = search.shares(&trial, STEPS_OF_TRIAL)
-                        && criterion < best * (1.0 - WORTH)
-                    {
-                        (places, shares, best) = (trial, found, criterion);
-                    }
-                }
-            }
-            if best >= before {
-                break;
-            }
+        let asked = self.lines * points.len();
+        let found = multiples((least, largest), asked, self.spacing);
+        if found.len() < asked {
+            return Err(DesignError::NoRoom {
+                asked,
+                found: found.len(),
+                spacing: self.spacing,
+            });
         }
-        let (found, _) = search.shares(&places, STEPS).unwrap_or((shares, best));
-        let mut lines = search.lines(&places, &found);
-        lines.sort_by(|a, b| a.omega_rad_s.total_cmp(&b.omega_rad_s));
-        let of_one = all.expected(&ForcingFunction::new(lines.clone())?, self.period_s)?;
+        let places = found.into_iter().zip(points.iter().cycle().copied()).collect();
+        let (places, shares) = search.places(places, |all, k, moved| {
+            let others = all.iter().enumerate().filter(|(j, _)| *j != k);
+            let mut others = others.map(|(_, (m, _))| *m);
+            (least..=largest).contains(&moved) && others.all(|m| far_enough(m, moved, self.spacing))
+        })?;
+        let mut lines = search.lines(&places, &shares);
+        lines.sort_by(|(_, a), (_, b)| a.omega_rad_s.total_cmp(&b.omega_rad_s));
+        let of_one = all.expected(&Forcing::new(lines.clone())?, self.period_s)?;
         let limits = [of_one.rms_e, of_one.rms_u].into_iter().zip(self.most_rms);
         let scale = limits
             .filter_map(|(rms, most)| Some(most? / rms))
             .fold(f64::INFINITY, f64::min);
         if scale.is_finite() {
-            lines.iter_mut().for_each(|line| line.amplitude_deg *= scale);
+            lines.iter_mut().for_each(|(_, line)| line.amplitude_deg *= scale);
         }
-        set_phases(&mut lines, self.period_s, self.seed);
-        let forcing = ForcingFunction::new(lines)?;
+        let mut crest = 0.0_f64;
+        let forcing = Forcing::new(lines)?;
+        let mut flat = Vec::new();
+        for &enters in points {
+            let mut own = forcing.sinusoids(enters);
+            set_phases(&mut own, self.period_s, self.seed);
+            crest = crest.max(crest_factor(&own, self.period_s));
+            flat.extend(own.into_iter().map(|line| (enters, line)));
+        }
+        let forcing = Forcing::new(flat)?;
         let expected = all.expected(&forcing, self.period_s)?;
         Ok(Designed {
-            crest_factor: crest_factor(forcing.sinusoids(), self.period_s),
+            crest_factor: crest,
             periods: periods(&expected, &self.wanted),
             expected,
             forcing,
@@ -166,10 +140,10 @@ impl Designing {
 
     /// Gradients of the requested quantities, each divided by the accepted error.
     fn gradients(&self, all: &Loop<'_>) -> Result<Vec<DVector<f64>>, DesignError> {
-        let known = all.gradients();
+        let known = all.quantities();
         let of = |wanted: &Wanted| {
-            let (_, gradient, scale) = known.iter().find(|(name, _, _)| *name == wanted.name).ok_or_else(|| {
-                let names: Vec<&str> = known.iter().map(|(name, _, _)| *name).collect();
+            let found = known.iter().find(|q| q.name == wanted.name).ok_or_else(|| {
+                let names: Vec<&str> = known.iter().map(|q| q.name).collect();
                 DesignError::NotThere {
                     name: wanted.name.clone(),
                     expected: names.join(", "),
@@ -182,116 +156,32 @@ impl Designing {
                     expected: "a positive number",
                 });
             }
-            Ok(gradient / (scale * wanted.error))
+            Ok(&found.gradient / (found.scale * wanted.error))
         };
         if self.wanted.is_empty() {
-            let parameters = known
-                .iter()
-                .filter(|(name, _, _)| !matches!(*name, "crossover" | "phase_margin"));
-            return Ok(parameters.map(|(_, gradient, scale)| gradient / *scale).collect());
+            let is_parameter = |q: &&Quantity| !matches!(q.name, "crossover" | "phase_margin");
+            let parameters = known.iter().filter(is_parameter);
+            return Ok(parameters.map(|q| &q.gradient / q.size).collect());
         }
         self.wanted.iter().map(of).collect()
-    }
-}
-
-struct Search<'a> {
-    all: &'a Loop<'a>,
-    gradients: Vec<DVector<f64>>,
-    period_s: f64,
-    shelf: f64,
-}
-
-impl Search<'_> {
-    fn omega(&self, multiple: u32) -> f64 {
-        f64::from(multiple) * TAU / self.period_s
-    }
-
-    /// Returns the best shares of lines at these frequencies, and J.
-    fn shares(&self, places: &[u32], steps: usize) -> Result<(Vec<f64>, f64), DesignError> {
-        let by_share: Vec<DMatrix<f64>> = places
-            .iter()
-            .map(|m| self.all.information_by_share(self.omega(*m)))
-            .collect();
-        let n = places.len();
-        let mut shares = vec![1.0 / n as f64; n];
-        let mut last = f64::INFINITY;
-        for step in 0..steps {
-            let information = by_share.iter().zip(&shares).fold(
-                DMatrix::zeros(by_share[0].nrows(), by_share[0].ncols()),
-                |sum, (m, q)| sum + m * *q,
-            );
-            let covariance = inverse(&information).ok_or(DesignError::NotIdentifiable {
-                lines: n,
-                coordinates: information.nrows(),
-            })?;
-            let directions: Vec<DVector<f64>> = self.gradients.iter().map(|g| &covariance * g).collect();
-            let criterion: f64 = directions.iter().zip(&self.gradients).map(|(c, g)| c.dot(g)).sum();
-            last = criterion;
-            if step + 1 == steps {
-                break;
-            }
-            let slope = |m: &DMatrix<f64>| -> f64 { directions.iter().map(|c| (m * c).dot(c)).sum() };
-            let moved: Vec<f64> = by_share
-                .iter()
-                .zip(&shares)
-                .map(|(m, q)| q * (slope(m) / criterion).sqrt())
-                .collect();
-            let whole: f64 = moved.iter().sum();
-            let least = LEAST_SHARE / n as f64;
-            shares = moved.iter().map(|q| (q / whole).max(least)).collect();
-            self.limit(places, &mut shares);
-        }
-        Ok((shares, last))
-    }
-
-    /// Limits the amplitudes of the lines, redistributes the rest, and normalises the sum to one.
-    fn limit(&self, places: &[u32], shares: &mut [f64]) {
-        let lines: Vec<(f64, bool)> = places
-            .iter()
-            .map(|m| (self.omega(*m), self.omega(*m) > self.all.crossover_rad_s))
-            .map(|(omega, beyond)| (self.all.control_by_power(omega), beyond))
-            .collect();
-        let below = lines.iter().zip(shares.iter()).filter(|((_, beyond), _)| !beyond);
-        let logarithms: Vec<f64> = below.map(|((control, _), q)| (q / control).ln()).collect();
-        if !logarithms.is_empty() {
-            let level = mean(&logarithms).exp();
-            for ((control, beyond), q) in lines.iter().zip(shares.iter_mut()) {
-                let power = *q / control;
-                *q = control
-                    * match beyond {
-                        true => power.min(self.shelf * self.shelf * level),
-                        false => power.clamp(level / (WITHIN * WITHIN), level * WITHIN * WITHIN),
-                    };
-            }
-        }
-        let whole: f64 = shares.iter().sum();
-        shares.iter_mut().for_each(|q| *q /= whole);
-    }
-
-    /// Returns lines with these shares and a total rms of one.
-    fn lines(&self, places: &[u32], shares: &[f64]) -> Vec<Sinusoid> {
-        let power = |(m, q): (&u32, &f64)| q / self.all.control_by_power(self.omega(*m));
-        let powers: Vec<f64> = places.iter().zip(shares).map(power).collect();
-        let whole: f64 = powers.iter().sum();
-        let line = |(m, p): (&u32, &f64)| Sinusoid {
-            amplitude_deg: (2.0 * p / whole).sqrt(),
-            omega_rad_s: self.omega(*m),
-            phase_rad: 0.0,
-        };
-        places.iter().zip(&powers).map(line).collect()
     }
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use super::{super::information::tests::task, *};
+    use hoid_numerics::statistics::mean;
+
+    use super::{
+        super::information::tests::{reference, task},
+        *,
+    };
 
     #[test]
     fn a_design_tells_more_than_the_lines_of_the_text() {
         let task = task(0.2);
-        let designed = Designing::default().run(&task).unwrap();
-        let text = super::super::expected(&task, &ForcingFunction::reference(), 81.92).unwrap();
+        let designed = Designing::default().run(&task, &[Enters::Target]).unwrap();
+        let text = super::super::expected(&task, &reference(), 81.92).unwrap();
         let sum = |of: &Expected| -> f64 {
             of.parameters
                 .iter()
@@ -306,16 +196,13 @@ mod tests {
         );
         assert!(sum(&designed.expected) < 0.7 * sum(&text));
         assert!(designed.crest_factor < 2.5 && designed.periods == 1);
-        assert!((designed.forcing.rms_deg() - 1.0).abs() < 1e-9);
-        assert_eq!(designed, Designing::default().run(&task).unwrap());
+        assert!((designed.forcing.function(Enters::Target).unwrap().rms_deg() - 1.0).abs() < 1e-9);
+        assert_eq!(designed, Designing::default().run(&task, &[Enters::Target]).unwrap());
         // The shelf above the crossover, and no dominant line.
         let crossover = designed.expected.crossover_rad_s.value;
         let amplitudes = |beyond: bool| -> Vec<f64> {
-            let of = designed
-                .forcing
-                .sinusoids()
-                .iter()
-                .filter(|l| (l.omega_rad_s > crossover) == beyond);
+            let all = designed.forcing.sinusoids(Enters::Target).into_iter();
+            let of = all.filter(|l| (l.omega_rad_s > crossover) == beyond);
             of.map(|l| l.amplitude_deg).collect()
         };
         let below = amplitudes(false);
@@ -344,7 +231,7 @@ mod tests {
                 wanted,
                 ..Designing::default()
             }
-            .run(&task)
+            .run(&task, &[Enters::Target])
             .unwrap();
             let error = |name: &str| designed.expected.relative_error(name).unwrap();
             assert_eq!(designed.periods, (error(name) / 0.02).powi(2).ceil().max(1.0) as usize);
@@ -363,7 +250,7 @@ mod tests {
             wanted,
             ..Designing::default()
         }
-        .run(&task)
+        .run(&task, &[Enters::Target])
         .unwrap_err();
         assert!(error.to_string().contains("crossover, phase_margin"), "{error}");
     }
@@ -376,7 +263,7 @@ mod tests {
                 most_rms,
                 ..Designing::default()
             }
-            .run(&task)
+            .run(&task, &[Enters::Target])
             .unwrap()
             .expected
         };
@@ -388,7 +275,7 @@ mod tests {
             band_rad_s: (3.0, 2.0),
             ..Designing::default()
         }
-        .run(&task)
+        .run(&task, &[Enters::Target])
         .unwrap_err();
         assert!(matches!(error, DesignError::OutOfRange { .. }));
         assert!(matches!(
@@ -396,7 +283,7 @@ mod tests {
                 lines: 1,
                 ..Designing::default()
             }
-            .run(&task),
+            .run(&task, &[Enters::Target]),
             Err(DesignError::NotIdentifiable { .. })
         ));
     }

@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use super::{
-    DesignError, Expected, Task,
+    Between, DesignError, Expected, People, Task,
     information::Loop,
     power::{MOST_PEOPLE, people_needed, power},
     wanted::named_number,
@@ -62,8 +62,9 @@ pub struct DifferenceRequest {
     pub power: f64,
     /// The level of the test.
     pub alpha: f64,
-    /// Standard deviation of the difference between people, relative.
-    pub between_people: f64,
+    /// Standard deviation of the difference between people; if `None` that of the people of the design where they have
+    /// one, else [`BETWEEN_PEOPLE`].
+    pub between_people: Option<Between>,
     /// Standard deviation of a person from run to run, relative.
     pub run_to_run: f64,
 }
@@ -84,7 +85,7 @@ impl DifferenceRequest {
             sought,
             power: POWER,
             alpha: ALPHA,
-            between_people: BETWEEN_PEOPLE,
+            between_people: None,
             run_to_run: RUN_TO_RUN,
         }
     }
@@ -116,6 +117,8 @@ pub struct DifferencePlan {
     pub run_to_run: f64,
     /// Standard deviation of the difference between people.
     pub between_people: f64,
+    /// Source of the latter.
+    pub between_source: String,
     /// Numbers of people in the table.
     pub people: Vec<usize>,
     /// Numbers of runs with their power.
@@ -138,7 +141,7 @@ impl DifferenceRequest {
     /// [`DesignError::OutOfRange`], [`DesignError::NotThere`].
     pub(super) fn plan(
         &self,
-        task: &Task,
+        (task, people): (&Task, &People),
         of_run: &Expected,
         runs: Option<usize>,
     ) -> Result<DifferencePlan, DesignError> {
@@ -159,12 +162,15 @@ impl DifferenceRequest {
         } else {
             self.sought.size
         };
+        let name = self.sought.name.as_str();
+        let between = Between::spread(self.between_people.as_ref(), people, (name, unit), BETWEEN_PEOPLE)?;
         let mut plan = DifferencePlan {
             request: self.clone(),
             size,
             error_of_run: found.standard_error.unwrap_or(f64::NAN),
             run_to_run: self.run_to_run * unit,
-            between_people: self.between_people * unit,
+            between_people: between.value,
+            between_source: between.source,
             people: PEOPLE.to_vec(),
             rows: Vec::new(),
             answer: 0,
@@ -209,7 +215,9 @@ impl DifferenceRequest {
                 expected: "0 to 10, relative to the quantity, as 0.1",
             }),
         };
-        spread("spread of the difference between people", self.between_people)?;
+        if let Some(Between::Part(part)) = self.between_people {
+            spread("spread of the difference between people", part)?;
+        }
         spread("spread from run to run", self.run_to_run)?;
         if !(self.sought.size.is_finite() && self.sought.size != 0.0) {
             return Err(DesignError::OutOfRange {
@@ -258,6 +266,7 @@ impl DifferencePlan {
             "error_of_run": json::number(self.error_of_run),
             "run_to_run": json::number(self.run_to_run),
             "between_people": json::number(self.between_people),
+            "between_source": self.between_source,
             "table": self.rows.iter().map(row).collect::<Vec<_>>(),
         })
     }
@@ -286,8 +295,10 @@ mod tests {
 
     fn plan(text: &str, runs: Option<usize>) -> Result<DifferencePlan, DesignError> {
         let task = task(0.2);
-        let designed = Designing::default().run(&task).unwrap();
-        DifferenceRequest::new(text.parse()?).plan(&task, &designed.expected, runs)
+        let designed = Designing::default()
+            .run(&task, &[crate::experiment::Enters::Target])
+            .unwrap();
+        DifferenceRequest::new(text.parse()?).plan((&task, &People::Population), &designed.expected, runs)
     }
 
     #[test]
@@ -314,6 +325,7 @@ mod tests {
         // Of the margin a gain of 6 %: some degrees.
         let margin = plan("margin=5", None).unwrap();
         assert!((0.3..6.0).contains(&margin.run_to_run), "{}", margin.run_to_run);
+        assert_eq!(margin.between_source, "a default");
         for bad in ["crossover=0", "T_I=1", "crossover", "crossover=x"] {
             assert!(plan(bad, None).is_err(), "{bad}");
         }

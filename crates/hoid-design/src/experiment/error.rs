@@ -1,9 +1,12 @@
 //! Errors of the design of an experiment.
 
 use hoid_io::{IoError, ScenarioFileError};
-use hoid_model::{Form, ModelError, family_scenario::Display};
+use hoid_model::{Form, ModelError};
+
 use hoid_study::StudyError;
 use thiserror::Error;
+
+use super::Enters;
 
 /// Errors of the design of an experiment.
 #[derive(Debug, Error)]
@@ -34,6 +37,18 @@ pub enum DesignError {
         /// Number of parameters of the person.
         coordinates: usize,
     },
+    /// A band without room for the lines.
+    #[error(
+        "the band has room for {found} lines of {asked} that are {spacing} multiples of the fundamental apart and no harmonics of each other: give fewer lines (--lines), a wider band (--band), a longer run (--length), or less distance (--spacing)"
+    )]
+    NoRoom {
+        /// Number of lines that were asked for.
+        asked: usize,
+        /// Number of lines that were found.
+        found: usize,
+        /// The distance.
+        spacing: u32,
+    },
     /// A requested quantity that is not a parameter of the person.
     #[error("{name} is nothing that this person has; expected one of {expected}")]
     NotThere {
@@ -56,13 +71,23 @@ pub enum DesignError {
         /// Source of the people.
         people: String,
     },
-    /// A target that is seen, as the only forcing function.
+    /// A form of the response to the target that no typical person has.
     #[error(
-        "on a {display} display the person sees the target and answers it directly; by one forcing function that and the response to the error are not told apart, and errors of the feedforward are not predicted: design the disturbance (--disturbance), or for a compensatory display"
+        "with {element} people have no typical response to a target that they see: give a person with [feedforward] (--people scenario.toml), design the disturbance alone (--disturbance), or for a compensatory display"
     )]
-    SeenTarget {
-        /// The display.
-        display: Display,
+    NoFeedforward {
+        /// The controlled element.
+        element: String,
+    },
+    /// A forcing function without lines that the design has.
+    #[error(
+        "{name} has no lines of a {missing}; expected a scenario with those of each forcing function of the design: [target], [disturbance], or both for a display that shows the target"
+    )]
+    OneForcing {
+        /// The forcing function.
+        name: String,
+        /// What it lacks.
+        missing: Enters,
     },
     /// A form that is given next to people who have their own.
     #[error("the form {form} was given, but {people} has its own; leave the form out, or design for the population")]
@@ -107,6 +132,18 @@ pub enum DesignError {
         found: String,
         /// The conditions of the group.
         expected: String,
+    },
+    /// A file without the spread of a difference between people.
+    #[error(
+        "{path} has no spread between people of {name} ({reason}); expected a comparison with it (`hoid compare --of {name} --json`), the result of a group with several conditions, a population.json, or a number, as 0.1"
+    )]
+    NoSpread {
+        /// The file.
+        path: String,
+        /// The quantity.
+        name: String,
+        /// The problem.
+        reason: String,
     },
     /// A scenario of the thesis, which has no operator of the family.
     #[error("{path} is a scenario of the thesis; write one with the key form, as form = \"lead\"")]

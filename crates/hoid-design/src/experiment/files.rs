@@ -1,11 +1,14 @@
 //! The files of a designed experiment: a scenario that simulates it, the lines as a table, and an experiment for `hoid lab`.
 
-use hoid_model::{FamilyOperator, operator_family::NamedParameter};
+use hoid_model::{
+    FamilyOperator,
+    family_scenario::{Display, Feedforward},
+    forcing::Sinusoid,
+    operator_family::{Coordinate, NamedParameter},
+};
 
-use super::{DesignedLine, Enters, ExperimentDesign};
+use super::{DesignedLine, Enters, ExperimentDesign, task::SAMPLE_S};
 
-/// Time between samples of the simulation, s, if the length is a whole number of them.
-const SAMPLE_S: f64 = 0.01;
 /// Time before the measurement, s.
 const RUN_IN_S: f64 = 10.0;
 
@@ -13,13 +16,14 @@ impl ExperimentDesign {
     /// Returns a scenario with the designed forcing function: the text of its file.
     pub fn scenario(&self) -> String {
         let operator = &self.task.state.operator;
-        let line = |DesignedLine { line: l, .. }: &DesignedLine| {
-            format!(
-                "  {{ amplitude = {}, omega_rad_s = {}, phase_rad = {} }}",
-                l.amplitude_deg, l.omega_rad_s, l.phase_rad
-            )
+        let forcing = |enters: Enters| {
+            let own = self.lines.iter().filter(|l| l.enters == enters);
+            let lines: Vec<String> = own.map(|l| of_line(&l.line)).collect();
+            match lines.as_slice() {
+                [] => String::new(),
+                lines => format!("[{}]\nlines = [\n{},\n]\n\n", enters.name(), lines.join(",\n")),
+            }
         };
-        let lines: Vec<String> = self.lines.iter().map(line).collect();
         let shape = match self.task.remnant.time_constant_s {
             0.0 => "shape = \"white\"\n".to_owned(),
             t => format!("shape = \"lag\"\nT_n_s = {t}\n"),
@@ -27,7 +31,7 @@ impl ExperimentDesign {
         let sample_s = self.sample_s();
         format!(
             "# Made by `hoid design`.\nname = \"design\"\nform = \"{}\"\nneuromuscular = {}\nsample_time_s = {}\nmeasurement_s = {}\nrun_in_s = {}\n\n\
-             [initial]\n{}controlled_element = \"{}\"\n\n[{}]\nlines = [\n{},\n]\n\n[[remnant]]\n{shape}share = {}\n",
+             [initial]\n{}controlled_element = \"{}\"\n\n{}{}{}[[remnant]]\n{shape}share = {}\n",
             operator.form().name(),
             operator.has_neuromuscular(),
             sample_s,
@@ -35,11 +39,12 @@ impl ExperimentDesign {
             sample_s * (RUN_IN_S / sample_s).round(),
             operator_keys(operator),
             self.task.state.controlled_element,
-            match self.task.enters {
-                Enters::Target => "target",
-                Enters::Disturbance => "disturbance",
-            },
-            lines.join(",\n"),
+            forcing(Enters::Target),
+            self.task
+                .feedforward
+                .as_ref()
+                .map_or_else(String::new, |seen| of_seen(seen, sample_s)),
+            forcing(Enters::Disturbance),
             self.task.remnant.share,
         )
     }
@@ -55,11 +60,12 @@ impl ExperimentDesign {
 
     /// Returns the lines as a table in CSV, which [`super::Against`] reads.
     pub fn forcing_csv(&self) -> String {
-        let line = |DesignedLine { line: l, .. }: &DesignedLine| {
-            format!("{},{},{}\n", l.omega_rad_s, l.amplitude_deg, l.phase_rad)
+        let line = |DesignedLine { enters, line: l, .. }: &DesignedLine| {
+            let enters = enters.name();
+            format!("{},{},{},{enters}\n", l.omega_rad_s, l.amplitude_deg, l.phase_rad)
         };
         let lines: String = self.lines.iter().map(line).collect();
-        format!("omega_rad_s,amplitude,phase_rad\n{lines}")
+        format!("omega_rad_s,amplitude,phase_rad,enters\n{lines}")
     }
 }
 
@@ -78,10 +84,11 @@ impl ExperimentDesign {
         let room = |rms: f64| ROOM * if rms > 0.0 { rms } else { 1.0 };
         Some(format!(
             "# Made by `hoid design`; show it with `hoid lab --config`.\nname = \"design\"\n\n[[condition]]\nname = \"design\"\n\
-             text = \"Keep the error small.\"\nscenario = \"{scenario}\"\ndisplay = \"{}\"\n\
+             text = \"Keep the error small.\"\nscenario = \"{scenario}\"\ndisplay = \"{}\"\n{}\
              # {ROOM} rms of the error and of the control that are to be expected.\nhalf_width = {:.4}\nfull_deflection = {:.4}\n\
              training = 1\nruns = {}\n",
             self.display.name(),
+            self.preview(),
             room(self.expected.rms_e),
             room(self.expected.rms_u),
             self.runs.clamp(1, MOST_RUNS),
@@ -89,26 +96,66 @@ impl ExperimentDesign {
     }
 }
 
-fn operator_keys(operator: &FamilyOperator) -> String {
-    let key = |p: &NamedParameter| {
-        let name = match p.name {
-            "K_e" => "K",
-            "T_L" => "T_L_s",
-            "T_I" => "T_I_s",
-            "c_1" => "c_1_s",
-            "c_2" => "c_2_s2",
-            "alpha" => "alpha_rad_s",
-            "omega_nm" => "omega_nm_rad_s",
-            "tau_e" => "tau_e_s",
-            other => other,
-        };
-        let value = if p.value.is_finite() {
-            p.value.to_string()
-        } else {
-            "inf".to_owned()
-        };
-        format!("{name} = {value}\n")
+fn of_line(line: &Sinusoid) -> String {
+    format!(
+        "  {{ amplitude = {}, omega_rad_s = {}, phase_rad = {} }}",
+        line.amplitude_deg, line.omega_rad_s, line.phase_rad
+    )
+}
+
+/// The response to a target that is seen; its neuromuscular system is that of the response to the error.
+fn of_seen(seen: &Feedforward, sample_s: f64) -> String {
+    let named = seen.operator.named();
+    let own = |p: &&NamedParameter| {
+        let common = matches!(p.coordinate, Some(Coordinate::LogOmega | Coordinate::LogZeta));
+        p.coordinate.is_some() && !common
     };
+    let key = |p: &NamedParameter| match p.coordinate {
+        Some(Coordinate::Delay) => format!("tau_f_s = {}\n", p.value - seen.preview_s),
+        _ => key_of(p),
+    };
+    let keys: String = named.iter().filter(own).map(key).collect();
+    let form = seen.operator.form().name();
+    // Of whole samples.
+    let preview_s = sample_s * (seen.preview_s / sample_s).round();
+    format!("[feedforward]\nform = \"{form}\"\n{keys}preview_s = {preview_s}\n\n")
+}
+
+fn operator_keys(operator: &FamilyOperator) -> String {
     let named = operator.named();
-    named.iter().filter(|p| p.coordinate.is_some()).map(key).collect()
+    named.iter().filter(|p| p.coordinate.is_some()).map(key_of).collect()
+}
+
+impl ExperimentDesign {
+    /// The preview, as a key of the lab.
+    fn preview(&self) -> String {
+        let seen = self
+            .task
+            .feedforward
+            .as_ref()
+            .filter(|_| self.display == Display::Preview);
+        seen.map_or_else(String::new, |seen| format!("preview_s = {}\n", seen.preview_s))
+    }
+}
+
+/// A parameter as a key of a scenario.
+fn key_of(p: &NamedParameter) -> String {
+    let name = match p.name {
+        "K_e" => "K",
+        "K_d" => "K_d_s",
+        "T_L" => "T_L_s",
+        "T_I" => "T_I_s",
+        "c_1" => "c_1_s",
+        "c_2" => "c_2_s2",
+        "alpha" => "alpha_rad_s",
+        "omega_nm" => "omega_nm_rad_s",
+        "tau_e" => "tau_e_s",
+        other => other,
+    };
+    let value = if p.value.is_finite() {
+        p.value.to_string()
+    } else {
+        "inf".to_owned()
+    };
+    format!("{name} = {value}\n")
 }

@@ -268,6 +268,7 @@ fn with_others(typical: NamedState, rows: &[Row], element: &ContinuousTransferFu
     Chosen {
         typical,
         others,
+        feedforward: None,
         findings,
     }
 }

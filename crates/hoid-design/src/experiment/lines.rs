@@ -14,10 +14,15 @@ use std::f64::consts::TAU;
 
 use hoid_model::forcing::Sinusoid;
 
-/// Multiples within these bounds without an integer ratio, about evenly spread over the logarithm.
-pub(super) fn multiples(least: u32, largest: u32, count: usize) -> Vec<u32> {
+/// True if two multiples are at least so far apart, and none is a harmonic of the other.
+pub(super) fn far_enough(a: u32, b: u32, spacing: u32) -> bool {
+    a.abs_diff(b) >= spacing.max(1) && !a.is_multiple_of(b) && !b.is_multiple_of(a)
+}
+
+/// Multiples within these bounds that are [`far_enough`] from each other, about evenly spread over the logarithm; fewer than asked for
+/// if there is no room.
+pub(super) fn multiples((least, largest): (u32, u32), count: usize, spacing: u32) -> Vec<u32> {
     let mut taken: Vec<u32> = Vec::new();
-    let fits = |taken: &[u32], m: u32| taken.iter().all(|t| !m.is_multiple_of(*t) && !t.is_multiple_of(m));
     let (low, high) = (f64::from(least).ln(), f64::from(largest).ln());
     for k in 0..count {
         let part = if count > 1 { k as f64 / (count - 1) as f64 } else { 0.0 };
@@ -26,8 +31,8 @@ pub(super) fn multiples(least: u32, largest: u32, count: usize) -> Vec<u32> {
         let near = (0..=largest)
             .flat_map(|d| [wanted.checked_add(d), wanted.checked_sub(d)])
             .flatten();
-        let near = near.filter(|m| (least..=largest).contains(m) && !taken.contains(m));
-        if let Some(m) = near.into_iter().find(|m| fits(&taken, *m)) {
+        let mut near = near.filter(|m| (least..=largest).contains(m));
+        if let Some(m) = near.find(|m| taken.iter().all(|t| far_enough(*t, *m, spacing))) {
             taken.push(m);
         }
     }
@@ -151,19 +156,23 @@ mod tests {
     #[test]
     fn no_line_is_a_harmonic_of_another() {
         for (least, largest, count) in [(2, 200, 10), (3, 40, 12), (1, 30, 5), (2, 500, 60)] {
-            let all = multiples(least, largest, count);
-            assert!(all.len() >= count.min(8).min(all.len()) && !all.is_empty());
-            for (i, a) in all.iter().enumerate() {
-                assert!((least..=largest).contains(a));
-                assert!(all[i + 1..].iter().all(|b| !b.is_multiple_of(*a)), "{all:?}");
+            for spacing in [1, 2, 4] {
+                let all = multiples((least, largest), count, spacing);
+                assert!(!all.is_empty() && all.len() <= count);
+                for (i, a) in all.iter().enumerate() {
+                    assert!((least..=largest).contains(a));
+                    let apart = |b: &u32| !b.is_multiple_of(*a) && b - a >= spacing;
+                    assert!(all[i + 1..].iter().all(apart), "{all:?}");
+                }
             }
         }
-        assert_eq!(multiples(2, 200, 10).len(), 10);
+        assert_eq!(multiples((2, 200), 10, 2).len(), 10);
+        assert_eq!(multiples((3, 234), 20, 3).len(), 20);
     }
 
     #[test]
     fn phases_make_the_signal_flat() {
-        let all = multiples(2, 200, 10);
+        let all = multiples((2, 200), 10, 1);
         let mut lines = equal(&all, 80.0);
         let before = crest_factor(&lines, 80.0);
         set_phases(&mut lines, 80.0, 0);

@@ -12,7 +12,7 @@ use std::{
     str::FromStr,
 };
 
-use hoid_model::FamilyState;
+use hoid_model::{FamilyState, family_scenario::Feedforward};
 use serde_json::Value;
 
 use super::{
@@ -77,6 +77,7 @@ impl People {
             return Ok(Chosen {
                 typical,
                 others,
+                feedforward: None,
                 findings: Vec::new(),
             });
         };
@@ -90,7 +91,11 @@ impl People {
             return group_people::of_directory(path, given);
         }
         if !hoid_io::is_fit_file(&path.to_string_lossy()) {
-            return Ok(one(path, of_scenario(path, given)?));
+            let (state, feedforward) = of_scenario(path, given)?;
+            return Ok(Chosen {
+                feedforward,
+                ..one(path, state)
+            });
         }
         let text = hoid_io::read_settings(path)?;
         let object: Value = serde_json::from_str(&text).unwrap_or_default();
@@ -110,12 +115,13 @@ impl People {
     }
 }
 
-fn of_scenario(path: &Path, given: &Given<'_>) -> Result<FamilyState, DesignError> {
-    let mut state = family(path)?.initial;
+fn of_scenario(path: &Path, given: &Given<'_>) -> Result<(FamilyState, Option<Feedforward>), DesignError> {
+    let scenario = family(path)?;
+    let mut state = scenario.initial;
     if let Some(element) = given.controlled_element {
         state.controlled_element = element.clone();
     }
-    Ok(state)
+    Ok((state, scenario.feedforward))
 }
 
 fn one(path: &Path, state: FamilyState) -> Chosen {
@@ -123,6 +129,7 @@ fn one(path: &Path, state: FamilyState) -> Chosen {
     Chosen {
         typical: NamedState { name, state },
         others: Vec::new(),
+        feedforward: None,
         findings: Vec::new(),
     }
 }

@@ -2,16 +2,17 @@
 
 use hoid_analysis::Setting;
 use hoid_model::{
-    ContinuousTransferFunction, Finding, Form, Verdict, family_scenario::Display, forcing::ForcingFunction,
+    ContinuousTransferFunction, Finding, Form, Verdict,
+    family_scenario::{Display, Feedforward},
 };
 
 use super::{
-    Against, DesignError, DesignedLine, Designing, DifferenceRequest, Enters, Expected, ExperimentDesign,
-    NamedExpected, People, Remnant, Task, Wanted,
+    Against, BETWEEN_PEOPLE, Between, DesignError, DesignedLine, Designing, DifferenceRequest, Enters, Expected,
+    ExperimentDesign, Forcing, NamedExpected, People, Remnant, Task, Wanted,
     chosen::{Chosen, Given, NamedState, left_out},
     expected,
     information::Loop,
-    periods,
+    periods, seen,
 };
 
 /// A question about an experiment.
@@ -25,9 +26,9 @@ pub struct DesignRequest {
     pub controlled_element: Option<ContinuousTransferFunction>,
     /// Form of the population; the one that people use with the element if `None`.
     pub form: Option<Form>,
-    /// Point at which the forcing function enters.
+    /// Point at which the forcing function enters; a target on a display that shows it comes with a disturbance.
     pub enters: Enters,
-    /// Display of the task; of one that shows the target only the response to the error is designed for.
+    /// Display of the task.
     pub display: Display,
     /// The remnant.
     pub remnant: Remnant,
@@ -47,9 +48,6 @@ impl DesignRequest {
     /// # Errors
     /// [`DesignError`] for people who cannot be read, an unknown element, and as [`Designing::run`].
     pub fn run(&self) -> Result<ExperimentDesign, DesignError> {
-        if self.display != Display::Compensatory && self.enters == Enters::Target {
-            return Err(DesignError::SeenTarget { display: self.display });
-        }
         let given = Given {
             controlled_element: self.controlled_element.as_ref(),
             form: self.form,
@@ -58,10 +56,12 @@ impl DesignRequest {
         let Chosen {
             typical,
             others,
+            feedforward,
             mut findings,
         } = self.people.chosen(&given)?;
-        let task = self.task(&typical);
-        let designed = self.designing.run(&task)?;
+        let feedforward = feedforward.as_ref();
+        let task = self.task(&typical, feedforward)?;
+        let designed = self.designing.run(&task, self.points())?;
         let runs = self.runs.unwrap_or(designed.periods);
         if runs == 0 {
             return Err(DesignError::OutOfRange {
@@ -73,20 +73,21 @@ impl DesignRequest {
         let length_s = self.designing.period_s * runs as f64;
         let all_runs = expected(&task, &designed.forcing, length_s)?;
         let all = Loop::of(&task)?;
-        let lines = all.designed_lines(designed.forcing.sinusoids(), self.designing.period_s, runs);
-        let response = all.response(designed.forcing.sinusoids(), length_s)?;
-        findings.extend(drowned(&lines));
-        let people = self.people(&others, &designed.forcing, runs, &mut findings);
+        let lines = all.designed_lines(&designed.forcing, self.designing.period_s, runs)?;
+        let [response, response_to_target] = all.responses(&designed.forcing, length_s)?;
+        findings.extend(drowned(&lines, task.feedforward.is_some()));
+        let people = self.people((&others, feedforward), &designed.forcing, runs, &mut findings);
         let against = self.against.as_ref();
         let against = against.map(|other| self.compared(other, &task, runs)).transpose()?;
         let difference = self.difference.as_ref();
         let difference = difference
-            .map(|sought| sought.plan(&task, &designed.expected, self.runs))
+            .map(|sought| sought.plan((&task, &self.people), &designed.expected, self.runs))
             .transpose()?;
         Ok(ExperimentDesign {
             worst: worst(&people, &self.designing.wanted).cloned(),
             settings: self.settings(&task),
             person: typical.name,
+            enters: self.enters,
             task,
             length_s: self.designing.period_s,
             runs,
@@ -95,6 +96,7 @@ impl DesignRequest {
             display: self.display,
             lines,
             response,
+            response_to_target,
             crest_factor: designed.crest_factor,
             expected: all_runs,
             people,
@@ -104,25 +106,42 @@ impl DesignRequest {
         })
     }
 
-    fn task(&self, person: &NamedState) -> Task {
-        Task {
-            state: person.state.clone(),
-            enters: self.enters,
-            remnant: self.remnant,
+    /// Where the forcing functions enter.
+    fn points(&self) -> &'static [Enters] {
+        match (self.enters, self.display) {
+            (Enters::Target, Display::Compensatory) => &[Enters::Target],
+            (Enters::Target, _) => &[Enters::Target, Enters::Disturbance],
+            (Enters::Disturbance, _) => &[Enters::Disturbance],
         }
+    }
+
+    /// The task of a person, with their response to a target that is seen: the given one, or the typical one.
+    fn task(&self, person: &NamedState, given: Option<&Feedforward>) -> Result<Task, DesignError> {
+        let feedforward = match (self.points().len(), given) {
+            (1, _) => None,
+            (_, Some(given)) => Some(given.clone()),
+            (_, None) => Some(seen::typical(&person.state, self.display)?),
+        };
+        Ok(Task {
+            state: person.state.clone(),
+            feedforward,
+            remnant: self.remnant,
+        })
     }
 
     /// The errors of the other people; those without a loop are reported.
     fn people(
         &self,
-        others: &[NamedState],
-        forcing: &ForcingFunction,
+        (others, feedforward): (&[NamedState], Option<&Feedforward>),
+        forcing: &Forcing,
         runs: usize,
         findings: &mut Vec<Finding>,
     ) -> Vec<NamedExpected> {
         let mut all = Vec::new();
         for person in others {
-            match expected(&self.task(person), forcing, self.designing.period_s * runs as f64) {
+            let length_s = self.designing.period_s * runs as f64;
+            let found = self.task(person, feedforward);
+            match found.and_then(|task| expected(&task, forcing, length_s)) {
                 Ok(found) => all.push(NamedExpected {
                     name: person.name.clone(),
                     runs_needed: self.runs_needed(&found, runs),
@@ -135,7 +154,7 @@ impl DesignRequest {
     }
 
     fn compared(&self, other: &Against, task: &Task, runs: usize) -> Result<NamedExpected, DesignError> {
-        let forcing = other.forcing(self.enters)?;
+        let forcing = other.forcing(self.points())?;
         let found = expected(task, &forcing, self.designing.period_s * runs as f64)?;
         Ok(NamedExpected {
             name: other.name(),
@@ -184,6 +203,7 @@ impl DesignRequest {
             ),
             number("length", d.period_s, of.period_s),
             Setting::new("lines", d.lines.to_string()).given(d.lines != of.lines),
+            Setting::new("spacing", d.spacing.to_string()).given(d.spacing != of.spacing),
             Setting::new("band", format!("{}..{}", d.band_rad_s.0, d.band_rad_s.1))
                 .given(d.band_rad_s != of.band_rad_s),
             number("shelf", d.shelf, of.shelf),
@@ -193,6 +213,7 @@ impl DesignRequest {
         ];
         if let Some(of) = &self.difference {
             let default = DifferenceRequest::new(of.sought.clone());
+            let between = of.between_people.clone().unwrap_or(Between::Part(BETWEEN_PEOPLE));
             let size = format!(
                 "{}={}{}",
                 of.sought.name,
@@ -203,7 +224,7 @@ impl DesignRequest {
                 Setting::new("difference", size).given(true),
                 number("power", of.power, default.power),
                 number("alpha", of.alpha, default.alpha),
-                number("between_people", of.between_people, default.between_people),
+                Setting::new("between_people", between.to_string()).given(of.between_people.is_some()),
                 number("run_to_run", of.run_to_run, default.run_to_run),
             ]);
         }
@@ -211,9 +232,10 @@ impl DesignRequest {
     }
 }
 
-/// The finding of lines at which the remnant in e is not small.
-fn drowned(lines: &[DesignedLine]) -> Option<Finding> {
-    let weak = lines.iter().filter(|l| l.to_remnant < LEAST_TO_REMNANT);
+/// The finding of lines at which the remnant in e is not small; the target itself has no remnant.
+fn drowned(lines: &[DesignedLine], is_seen: bool) -> Option<Finding> {
+    let of_error = lines.iter().filter(|l| !(is_seen && l.enters == Enters::Target));
+    let weak = of_error.filter(|l| l.to_remnant < LEAST_TO_REMNANT);
     let weak: Vec<String> = weak.map(|l| format!("{:.2}", l.line.omega_rad_s)).collect();
     let message = format!(
         "in one run the lines at {} rad/s are less than {LEAST_TO_REMNANT} times the remnant in e: what is predicted there is too small; fewer lines or longer runs help",
@@ -282,18 +304,49 @@ mod tests {
     }
 
     #[test]
-    fn a_seen_target_is_refused_and_a_disturbance_is_not() {
+    fn a_seen_target_comes_with_a_disturbance() {
         let pursuit = DesignRequest {
             display: Display::Pursuit,
             ..request()
         };
-        assert!(matches!(pursuit.run(), Err(DesignError::SeenTarget { .. })));
+        let both = pursuit.run().unwrap();
+        let of = |enters: Enters| both.lines.iter().filter(move |l| l.enters == enters).count();
+        assert_eq!((of(Enters::Target), of(Enters::Disturbance)), (10, 10));
+        let multiple = |l: &DesignedLine| (l.line.omega_rad_s * both.length_s / std::f64::consts::TAU).round() as u32;
+        let multiples: Vec<u32> = both.lines.iter().map(multiple).collect();
+        for (k, m) in multiples.iter().enumerate() {
+            let others = &multiples[k + 1..];
+            assert!(others.iter().all(|n| n - m >= 3 && n % m != 0), "{multiples:?}");
+        }
+        for name in ["K_f", "tau_f", "tau_e"] {
+            assert!(both.expected.estimate(name).unwrap().standard_error.unwrap() > 0.0);
+        }
+        assert_eq!(ExperimentDesign::from_json(&both.to_json()).unwrap(), both);
+        // The scenario that is written has the same person.
+        let name = "scenario.toml";
+        let hoid_io::AnyScenario::Family(read) = hoid_io::parse_any_scenario(&both.scenario(), name, name).unwrap()
+        else {
+            panic!("no scenario of the family");
+        };
+        let (found, seen) = (read.feedforward.unwrap(), both.task.feedforward.as_ref().unwrap());
+        assert_eq!(found.operator.form(), seen.operator.form());
+        for (a, b) in found.operator.coordinates().iter().zip(seen.operator.coordinates()) {
+            assert!((a - b).abs() < 1e-12, "{found:?}");
+        }
+        assert_eq!(
+            (
+                read.target.function.sinusoids().len(),
+                read.disturbance.function.sinusoids().len()
+            ),
+            (10, 10)
+        );
         let design = DesignRequest {
             enters: Enters::Disturbance,
             ..pursuit
         };
-        let lab = design.run().unwrap().lab("scenario.toml").unwrap();
-        assert!(lab.contains("display = \"pursuit\""));
+        let alone = design.run().unwrap();
+        assert!(alone.lines.iter().all(|l| l.enters == Enters::Disturbance) && alone.response_to_target.is_empty());
+        assert!(alone.lab("scenario.toml").unwrap().contains("display = \"pursuit\""));
         let odd = Designing {
             period_s: 80.123,
             ..Designing::default()

@@ -1,17 +1,23 @@
 //! Expected errors of the response of the person: at the lines, and of the operator between them.
 //!
-//! At a line the response is the ratio of the Fourier coefficients of u and e, `var H^ = 4 S_n/(T a^2)` (`information`),
+//! At a line the response is the ratio of the Fourier coefficients of u and e, `var H^ = 4 S_n/(T a^2)`, a the amplitude of e (`information`),
 //! half of it along the response and half across: gain and phase have the relative error
 //! `sqrt(2 S_n/(T a^2))/|H|` each, times 8.7 dB and 57 deg. The operator has
 //! fewer parameters than lines have numbers: its error, `dH/H = sum dH/dtheta_k dtheta_k/H` with the inverse of the
 //! information, is smaller.
 //!
 //! In e the line exceeds the part of the remnant by `T a^2/(4 S_n |P S|^2)`.
+//!
+//! A line of a target X that is seen determines the response F to it by `F = (U - B E)/X`, with B from all lines:
+//! `dF/F = N/(F X) - (E B)/(X F) dB/B`, two independent parts, as the remnant at this line is not that at others.
 
-use hoid_model::{Complex64, forcing::Sinusoid, uncertainty::Estimate};
+use hoid_model::{Complex64, FamilyOperator, forcing::Sinusoid, uncertainty::Estimate};
 use serde::{Deserialize, Serialize};
 
-use super::{DesignError, information::Loop};
+use super::{
+    DesignError, Enters, Forcing,
+    information::{Loop, ahead},
+};
 
 /// Response of a person at a frequency with its expected errors.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -27,11 +33,15 @@ pub struct ExpectedResponse {
 /// A line of the designed forcing function.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DesignedLine {
+    /// Where it enters.
+    pub enters: Enters,
     /// Amplitude, frequency and phase.
     pub line: Sinusoid,
-    /// The response at it, with the errors of the line alone.
+    /// The response that it determines, with the errors of the line alone: to the error, or of a line of a target that is
+    /// seen the response to the target.
     pub response: ExpectedResponse,
-    /// Power in e divided by that of the remnant at this frequency, in one run.
+    /// Power divided by that of the remnant at this frequency, in one run: in e, or of a line of a target that is seen
+    /// that of the response to the target in u.
     pub to_remnant: f64,
 }
 
@@ -42,41 +52,97 @@ const DB: f64 = 20.0 / std::f64::consts::LN_10;
 
 impl Loop<'_> {
     /// The lines with the errors of `runs` runs of a length in s.
-    pub fn designed_lines(&self, lines: &[Sinusoid], period_s: f64, runs: usize) -> Vec<DesignedLine> {
-        let gain = self.remnant_gain(lines);
-        let line = |line: &Sinusoid| {
-            let response = self.task.state.operator.response(line.omega_rad_s);
-            let noise = gain * self.density(line.omega_rad_s);
-            let power = line.amplitude_deg.powi(2) * self.error_by_power(line.omega_rad_s);
-            let relative = (2.0 * noise / (period_s * runs as f64 * power)).sqrt() / response.norm();
-            let (s, p) = self.sensitivity(line.omega_rad_s);
-            DesignedLine {
-                line: *line,
-                response: expected(line.omega_rad_s, response, [relative; 2]),
-                to_remnant: period_s * power / (4.0 * noise * (p * s).norm_sqr()),
-            }
-        };
-        unwrapped(lines.iter().map(line).collect(), self.task.state.operator.tau_e_s())
-    }
-
-    /// The operator between the lines, with the errors of its parameters over `length_s`.
     ///
     /// # Errors
     /// [`DesignError::NotIdentifiable`].
-    pub fn response(&self, lines: &[Sinusoid], length_s: f64) -> Result<Vec<ExpectedResponse>, DesignError> {
-        let covariance: Vec<f64> = self.covariance(lines, length_s)?.iter().copied().collect();
-        let ends = lines.first().zip(lines.last());
-        let (low, high) = ends.map_or((0.1, 10.0), |(a, b)| (0.9 * a.omega_rad_s, 1.1 * b.omega_rad_s));
-        let step = (high / low).ln() / (POINTS - 1) as f64;
-        let at = |k: usize| {
-            let omega = low * (step * k as f64).exp();
-            let response = self.task.state.operator.response_and_gradient(omega);
-            let [[gain, _], [_, phase]] = response.relative_covariance(&covariance);
-            expected(omega, response.value, [gain.sqrt(), phase.sqrt()])
+    pub fn designed_lines(
+        &self,
+        forcing: &Forcing,
+        period_s: f64,
+        runs: usize,
+    ) -> Result<Vec<DesignedLine>, DesignError> {
+        let gain = self.remnant_gain(forcing);
+        let length_s = period_s * runs as f64;
+        let feedback = &self.task.state.operator;
+        let covariance = self.covariance(forcing, length_s)?;
+        let of_feedback = self.joint.of_feedback(&covariance, feedback);
+        let line = |(enters, line): &(Enters, Sinusoid)| {
+            let omega = line.omega_rad_s;
+            let noise = gain * self.density(omega);
+            let [error, target] = self.excited((*enters, omega)).map(|x| x * line.amplitude_deg);
+            let (response, [gain, phase], to_remnant) =
+                match self.task.feedforward.is_some() && *enters == Enters::Target {
+                    false => {
+                        let response = feedback.response(omega);
+                        let own = 2.0 * noise / (length_s * error.norm_sqr() * response.norm_sqr());
+                        let (s, p) = self.sensitivity(omega);
+                        let in_error = error.norm_sqr() / (p * s).norm_sqr();
+                        (response, [own; 2], in_error)
+                    }
+                    true => {
+                        let response = self.feedforward(omega);
+                        let own = 2.0 * noise / (length_s * target.norm_sqr() * response.norm_sqr());
+                        let known = feedback.response_and_gradient(omega);
+                        let by_feedback = error * known.value / (target * response);
+                        let of_known = turned(known.relative_covariance(&of_feedback), by_feedback);
+                        (response, of_known.map(|v| v + own), (target * response).norm_sqr())
+                    }
+                };
+            DesignedLine {
+                enters: *enters,
+                line: *line,
+                response: expected(omega, response, [gain.sqrt(), phase.sqrt()]),
+                to_remnant: period_s * to_remnant / (4.0 * noise),
+            }
         };
-        let delay = self.task.state.operator.tau_e_s();
-        Ok(unwrapped((0..POINTS).map(at).collect(), delay))
+        let (mut all, of_target): (Vec<_>, Vec<_>) = (forcing.lines().iter().map(line))
+            .partition(|l| l.enters == Enters::Disturbance || self.task.feedforward.is_none());
+        all = unwrapped(all, feedback.tau_e_s());
+        all.extend(unwrapped(of_target, self.delay_of_target_s()));
+        all.sort_by(|a, b| a.line.omega_rad_s.total_cmp(&b.line.omega_rad_s));
+        Ok(all)
     }
+
+    fn delay_of_target_s(&self) -> f64 {
+        let seen = self.task.feedforward.as_ref();
+        seen.map_or(0.0, |seen| seen.operator.tau_e_s() - seen.preview_s)
+    }
+
+    /// The responses to the error and to a target that is seen between the lines, with the errors of their parameters
+    /// over `length_s`.
+    ///
+    /// # Errors
+    /// [`DesignError::NotIdentifiable`].
+    pub fn responses(&self, forcing: &Forcing, length_s: f64) -> Result<[Vec<ExpectedResponse>; 2], DesignError> {
+        let covariance = self.covariance(forcing, length_s)?;
+        let of_line = |(_, line): &(Enters, Sinusoid)| line.omega_rad_s;
+        let all = forcing.lines().iter().map(of_line);
+        let (low, high) = all.fold((f64::INFINITY, 0.0_f64), |(a, b), w| (a.min(w), b.max(w)));
+        let curve = |operator: &FamilyOperator, preview_s: f64, covariance: &[f64]| {
+            let at = |k: usize| {
+                let omega = 0.9 * low * (1.1 / 0.9 * high / low).powf(k as f64 / (POINTS - 1) as f64);
+                let response = operator.response_and_gradient(omega);
+                let [[gain, _], [_, phase]] = response.relative_covariance(covariance);
+                let value = response.value * ahead(preview_s, omega);
+                expected(omega, value, [gain.sqrt(), phase.sqrt()])
+            };
+            unwrapped((0..POINTS).map(at).collect(), operator.tau_e_s() - preview_s)
+        };
+        let feedback = &self.task.state.operator;
+        let of_target = self.task.feedforward.as_ref().map(|seen| {
+            let covariance = self.joint.of_feedforward(&covariance);
+            curve(&seen.operator, seen.preview_s, &covariance)
+        });
+        let of_error = curve(feedback, 0.0, &self.joint.of_feedback(&covariance, feedback));
+        Ok([of_error, of_target.unwrap_or_default()])
+    }
+}
+
+/// Variances of the real and imaginary part of `c z`, from the covariance of those of z.
+fn turned(covariance: [[f64; 2]; 2], c: Complex64) -> [f64; 2] {
+    let [[aa, ab], [_, bb]] = covariance;
+    let along = |x: f64, y: f64| x * x * aa + 2.0 * x * y * ab + y * y * bb;
+    [along(c.re, -c.im), along(c.im, c.re)]
 }
 
 fn expected(omega_rad_s: f64, value: Complex64, [gain, phase]: [f64; 2]) -> ExpectedResponse {
@@ -131,12 +197,11 @@ mod tests {
         let task = task(0.2);
         let all = Loop::of(&task).unwrap();
         let designing = Designing::default();
-        let lines = designing.run(&task).unwrap().forcing.sinusoids().to_vec();
-        let (one, four) = (
-            all.designed_lines(&lines, designing.period_s, 1),
-            all.designed_lines(&lines, designing.period_s, 4),
-        );
-        let curve = all.response(&lines, designing.period_s).unwrap();
+        let lines = designing.run(&task, &[Enters::Target]).unwrap().forcing;
+        let of = |runs| all.designed_lines(&lines, designing.period_s, runs).unwrap();
+        let (one, four) = (of(1), of(4));
+        let [curve, none] = all.responses(&lines, designing.period_s).unwrap();
+        assert!(none.is_empty());
         for (one, four) in one.iter().zip(&four) {
             let error = |line: &DesignedLine| line.response.gain_db.standard_error.unwrap();
             assert!((error(one) / error(four) - 2.0).abs() < 1e-9 && one.to_remnant == four.to_remnant);

@@ -2,17 +2,18 @@
 //!
 //! Part i with gain 1 contributes `V_i = sum over k of h_i(k)^2` to the variance of u, with h_i the response of u,
 //! through the closed loop, to one unit of w at sample 0. The sinusoids of target and disturbance contribute
-//! `V_0 = sum of A^2/2 |u/f|^2` at their frequencies, with the responses of the sampled loop. All parts are
-//! independent, so that with shares p_i
+//! `V_0 = sum of A^2/2 |u/f|^2` at their frequencies, with the responses of the sampled loop: of a target that the person
+//! answers with F `e/f = (1 - P F)/(1 + B P)` and `u/f = (B + F)/(1 + B P)`. All parts are independent, so that with shares p_i
 //!
 //! `var u = (V_0 + sum of K_j^2 V_j of given gains) / (1 - sum of p_i)`, `K_i^2 = p_i var u / V_i`.
 //!
 //! The response also shows whether the loop is stable: it then decays to zero.
 
-use hoid_model::Complex64;
 use hoid_model::{
-    ModelError,
+    Complex64, ModelError,
     family_scenario::{FamilyScenario, PartStrength},
+    operator_family::HeldFamily,
+    polynomial,
 };
 
 use super::{
@@ -139,8 +140,16 @@ fn energy(held: &HeldLoop, shaping: &Shaping) -> Result<MeanSquares, ModelError>
     }
 }
 
+/// Response of a held operator, `backward` the delay of one sample.
+fn held_response(held: &HeldFamily, backward: Complex64) -> Complex64 {
+    let denominator = 1.0 + backward * polynomial::value(&held.f, backward);
+    polynomial::value(&held.b, backward) * backward.powu(held.nk as u32) / denominator
+}
+
 /// Mean squares due to target and disturbance.
 fn line_power(held: &HeldLoop, scenario: &FamilyScenario) -> Result<MeanSquares, ModelError> {
+    let seen = scenario.feedforward.as_ref();
+    let seen = seen.map(|seen| seen.operator.zoh(scenario.sample_time)).transpose()?;
     let mut sum = [0.0; 3];
     for (excitation, is_target) in [(&scenario.target, true), (&scenario.disturbance, false)] {
         for line in excitation.function.sinusoids() {
@@ -151,8 +160,17 @@ fn line_power(held: &HeldLoop, scenario: &FamilyScenario) -> Result<MeanSquares,
                 expected: "one that is not a pole of operator or controlled element",
             })?;
             let closed = 1.0 + y * p;
-            let of_e = if is_target { Complex64::from(1.0) } else { -p } / closed;
-            let of_u = y * of_e;
+            let backward = Complex64::from_polar(1.0, -omega * scenario.sample_time.s());
+            let (of_e, of_u) = match (is_target, &seen) {
+                (true, Some(seen)) => {
+                    // The preview only turns the phase of F relative to f: e depends on it.
+                    let shown_s = scenario.feedforward.as_ref().map_or(0.0, |seen| seen.preview_s);
+                    let f = held_response(seen, backward) * Complex64::from_polar(1.0, omega * shown_s);
+                    ((1.0 - p * f) / closed, (y + f) / closed)
+                }
+                (true, None) => (1.0 / closed, y / closed),
+                (false, _) => (-p / closed, -y * p / closed),
+            };
             let power = (line.amplitude_deg * of_u.norm()).powi(2) / 2.0;
             let step = (Complex64::from_polar(1.0, omega * scenario.sample_time.s()) - 1.0).norm_sqr();
             let of_error = (line.amplitude_deg * of_e.norm()).powi(2) / 2.0;

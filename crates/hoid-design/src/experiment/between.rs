@@ -1,0 +1,152 @@
+//! The standard deviation of a difference between people, for the number of people that find it.
+//!
+//! | source | the standard deviation b of the difference between two conditions |
+//! |---|---|
+//! | a number | that part of the quantity |
+//! | a comparison (`hoid compare --json`) | tau of its differences within people, without the errors of the estimates; of several their root mean square |
+//! | the result of a group with several conditions | the same of the comparison of its conditions |
+//! | the population of one condition (`hoid group --pool`) | sigma of its people, as a bound |
+//!
+//! In two conditions with the correlation rho of people b is `sigma sqrt(2 (1 - rho))`: no more than sigma, if rho is half or
+//! more. A population of one condition does not determine rho.
+
+use std::{
+    convert::Infallible,
+    fmt,
+    path::{Path, PathBuf},
+    str::FromStr,
+};
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::{DesignError, People};
+use crate::compare::{Comparing, Comparison, GroupEstimates, Quantity, Variation};
+
+/// Source of the spread of a difference between people.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Between {
+    /// A part of the quantity.
+    Part(f64),
+    /// A comparison, the result of a group, or a population.
+    File(PathBuf),
+}
+
+impl Between {
+    /// Returns what a text names.
+    pub fn of_text(text: &str) -> Self {
+        match text.parse() {
+            Ok(part) => Self::Part(part),
+            Err(_) => Self::File(text.into()),
+        }
+    }
+}
+
+impl FromStr for Between {
+    type Err = Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Infallible> {
+        Ok(Self::of_text(text))
+    }
+}
+
+impl fmt::Display for Between {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Part(part) => part.fmt(f),
+            Self::File(path) => path.display().fmt(f),
+        }
+    }
+}
+
+/// A spread in the unit of the quantity, with its source in words.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Spread {
+    pub value: f64,
+    pub source: String,
+}
+
+impl Between {
+    /// The spread of a quantity with this value. Without a source it is that of the people of the design if they have
+    /// one, else the default part.
+    ///
+    /// # Errors
+    /// [`DesignError::NoSpread`] for a file that has none.
+    pub(super) fn spread(
+        given: Option<&Self>,
+        people: &People,
+        (name, value): (&str, f64),
+        default: f64,
+    ) -> Result<Spread, DesignError> {
+        let path = match given {
+            Some(Self::Part(part)) => {
+                return Ok(Spread {
+                    value: part * value,
+                    source: "as given".to_owned(),
+                });
+            }
+            Some(Self::File(path)) => return of_file(path, (name, value)),
+            None => people.path(),
+        };
+        let known = path.and_then(|path| of_file(path, (name, value)).ok());
+        Ok(known.unwrap_or_else(|| Spread {
+            value: default * value,
+            source: "a default".to_owned(),
+        }))
+    }
+}
+
+fn of_file(path: &Path, (name, value): (&str, f64)) -> Result<Spread, DesignError> {
+    let none = |reason: String| DesignError::NoSpread {
+        path: path.display().to_string(),
+        name: name.to_owned(),
+        reason,
+    };
+    let quantity: Quantity = name
+        .parse()
+        .map_err(|error: crate::compare::CompareError| none(error.to_string()))?;
+    let shown = path.display();
+    if !path.is_dir() {
+        let text = hoid_io::read_settings(path)?;
+        let object: Value = serde_json::from_str(&text).map_err(|error| none(format!("it is not JSON: {error}")))?;
+        if object["kind"] == "population" {
+            let spread = in_population(&object, name).ok_or_else(|| none("its parameters are others".to_owned()))?;
+            return Ok(Spread {
+                value: spread * value,
+                source: format!("at most, the spread of the people of one condition in {shown}"),
+            });
+        }
+        if object["kind"] == "comparison" {
+            let found = Comparison::from_json(&text).map_err(|error| none(error.to_string()))?;
+            return of_comparison(&found, &quantity, &shown.to_string()).map_err(none);
+        }
+    }
+    let group = GroupEstimates::read(path).map_err(|error| none(error.to_string()))?;
+    let comparing = Comparing {
+        of: vec![quantity.clone()],
+        ..Comparing::default()
+    };
+    let found = comparing.run(&group).map_err(|error| none(error.to_string()))?;
+    of_comparison(&found, &quantity, &shown.to_string()).map_err(none)
+}
+
+/// Standard deviation of the logarithm between people.
+fn in_population(object: &Value, name: &str) -> Option<f64> {
+    let parameters = object["parameters"].as_array()?;
+    parameters.iter().find(|p| p["name"] == name)?["spread"].as_f64()
+}
+
+fn of_comparison(found: &Comparison, quantity: &Quantity, shown: &str) -> Result<Spread, String> {
+    let within = (found.differences.iter())
+        .filter(|d| d.quantity == *quantity && d.variation == Variation::Within && d.effect.is_none());
+    let all: Vec<(f64, usize)> = within.map(|d| (d.tau, d.people.len())).collect();
+    let Some(people) = all.iter().map(|(_, people)| *people).max() else {
+        let known: Vec<String> = found.quantities().iter().map(ToString::to_string).collect();
+        return Err(format!("it has differences within people of {}", known.join(", ")));
+    };
+    let square = all.iter().map(|(tau, _)| tau * tau).sum::<f64>() / all.len() as f64;
+    Ok(Spread {
+        value: square.sqrt(),
+        source: format!("of the differences of {people} people in {shown}"),
+    })
+}

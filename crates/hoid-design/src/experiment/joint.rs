@@ -1,0 +1,232 @@
+//! The coordinates of both responses of a person together: those of the response B to the error, then those of the
+//! response F to the target that it does not have in common with B, the neuromuscular system through which both move
+//! the hand.
+//!
+//! A line of the target with the amplitude X makes `E` of e, and `U = B E + F X + N`: its derivative with respect to a
+//! coordinate is `dB E + dF X`, in which F is zero at a line of the disturbance. What B alone leaves open at a line of
+//! the target, the lines of the disturbance determine (M. M. van Paassen and M. Mulder, *Identification of Human Operator
+//! Control Behaviour in Multiple-Loop Tracking Tasks*, IFAC 1998).
+
+use hoid_model::{
+    Complex64, FamilyOperator, interned::interned, operator_family::Coordinate, operator_family::NamedParameter,
+};
+use nalgebra::{DMatrix, DVector};
+
+use super::Task;
+
+/// The names of a parameter of F: those of its own, with `_f` at the end.
+fn name_of_target(parameter: &NamedParameter) -> &'static str {
+    let name = match parameter.name {
+        "K_d" | "K_e" => "K".to_owned(),
+        "tau_e" => "tau".to_owned(),
+        other => other.to_owned(),
+    };
+    interned(&format!("{name}_f")).unwrap_or(parameter.name)
+}
+
+/// A parameter, crossover or margin with its derivatives.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Quantity {
+    pub name: &'static str,
+    pub unit: &'static str,
+    pub value: f64,
+    /// With respect to the joint coordinates.
+    pub gradient: DVector<f64>,
+    /// The accepted error is relative to this: the value, or one unit.
+    pub scale: f64,
+    /// The size to which the error is relative where all parameters count alike.
+    pub size: f64,
+}
+
+impl Quantity {
+    /// A quantity whose errors are relative to its value.
+    fn relative(parameter: &NamedParameter, name: &'static str, gradient: DVector<f64>) -> Self {
+        let scale = parameter.value.abs();
+        Self {
+            name,
+            unit: parameter.unit,
+            value: parameter.value,
+            gradient,
+            scale,
+            size: scale,
+        }
+    }
+}
+
+/// Places of the coordinates.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Joint {
+    pub count: usize,
+    of_target: Vec<usize>,
+}
+
+impl Joint {
+    pub fn of(task: &Task) -> Self {
+        let feedback = &task.state.operator;
+        let known = feedback.form().coordinates(feedback.has_neuromuscular());
+        let mut count = known.len();
+        let mut place = |coordinate: Coordinate| {
+            let common = matches!(coordinate, Coordinate::LogOmega | Coordinate::LogZeta);
+            let found = known.iter().position(|c| common && *c == coordinate);
+            found.unwrap_or_else(|| {
+                count += 1;
+                count - 1
+            })
+        };
+        let of_target = task.feedforward.as_ref().map_or_else(Vec::new, |seen| {
+            let own = seen.operator.form().coordinates(seen.operator.has_neuromuscular());
+            own.into_iter().map(&mut place).collect()
+        });
+        Self { count, of_target }
+    }
+
+    /// The gradient of a quantity of B.
+    pub fn feedback(&self, own: &[f64]) -> DVector<f64> {
+        DVector::from_fn(self.count, |k, _| own.get(k).copied().unwrap_or(0.0))
+    }
+
+    /// The gradient of a quantity of F.
+    fn target(&self, own: &[f64]) -> DVector<f64> {
+        let mut all = DVector::zeros(self.count);
+        self.of_target.iter().zip(own).for_each(|(k, g)| all[*k] = *g);
+        all
+    }
+
+    /// `dB E + dF X`.
+    pub fn derivatives(
+        &self,
+        (of_error, error): (&[Complex64], Complex64),
+        (of_target, target): (&[Complex64], Complex64),
+    ) -> DVector<Complex64> {
+        let mut all = DVector::from_element(self.count, Complex64::default());
+        of_error.iter().enumerate().for_each(|(k, g)| all[k] += g * error);
+        let own = self.of_target.iter().zip(of_target);
+        own.for_each(|(k, g)| all[*k] += g * target);
+        all
+    }
+
+    /// The parameters of both responses.
+    pub fn parameters(&self, task: &Task) -> Vec<Quantity> {
+        let feedback = &task.state.operator;
+        let mut all: Vec<Quantity> = feedback
+            .named_gradients()
+            .iter()
+            .map(|(p, gradient)| Quantity::relative(p, p.name, self.feedback(gradient)))
+            .collect();
+        let Some(seen) = &task.feedforward else { return all };
+        let common = |p: &NamedParameter| matches!(p.coordinate, Some(Coordinate::LogOmega | Coordinate::LogZeta));
+        for (p, gradient) in &seen.operator.named_gradients() {
+            if common(p) && feedback.has_neuromuscular() {
+                continue;
+            }
+            let mut one = Quantity::relative(p, name_of_target(p), self.target(gradient));
+            if p.coordinate == Some(Coordinate::Delay) {
+                // Zero is an ordinary value of this delay: its error is one in s.
+                one.value -= seen.preview_s;
+                one.scale = 1.0;
+                one.size = feedback.tau_e_s();
+            }
+            all.push(one);
+        }
+        all
+    }
+
+    /// The covariance of the coordinates of B, by rows.
+    pub fn of_feedback(&self, covariance: &DMatrix<f64>, operator: &FamilyOperator) -> Vec<f64> {
+        block(covariance, &(0..operator.coordinates().len()).collect::<Vec<_>>())
+    }
+
+    /// The covariance of the coordinates of F, by rows.
+    pub fn of_feedforward(&self, covariance: &DMatrix<f64>) -> Vec<f64> {
+        block(covariance, &self.of_target)
+    }
+}
+
+fn block(covariance: &DMatrix<f64>, places: &[usize]) -> Vec<f64> {
+    let pairs = places.iter().flat_map(|&a| places.iter().map(move |&b| (a, b)));
+    pairs.map(|pair| covariance[pair]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_model::family_scenario::Display;
+
+    use super::*;
+    use crate::experiment::{Remnant, adapted::population, seen};
+
+    fn task() -> Task {
+        let state = population(&"90/(s(s+6))".parse().unwrap(), None).unwrap().0.state;
+        Task {
+            feedforward: Some(seen::typical(&state, Display::Preview).unwrap()),
+            state,
+            remnant: Remnant::default(),
+        }
+    }
+
+    /// The same task with one joint coordinate at another value.
+    fn moved(task: &Task, joint: &Joint, place: usize, by: f64) -> Task {
+        let change = |operator: &FamilyOperator, places: &[usize]| {
+            let x = operator.coordinates().iter().zip(places);
+            let x: Vec<f64> = x.map(|(x, k)| if *k == place { x + by } else { *x }).collect();
+            FamilyOperator::new(operator.form(), operator.has_neuromuscular(), &x).unwrap()
+        };
+        let own: Vec<usize> = (0..task.state.operator.coordinates().len()).collect();
+        let mut other = task.clone();
+        other.state.operator = change(&task.state.operator, &own);
+        let seen = other.feedforward.as_mut().unwrap();
+        seen.operator = change(&seen.operator, &joint.of_target);
+        other
+    }
+
+    #[test]
+    fn derivatives_are_those_of_finite_differences() {
+        let task = task();
+        let joint = Joint::of(&task);
+        // K, omega_nm, zeta_nm, tau_e of B; K_d, T_L and the delay of F; one arm.
+        assert_eq!((joint.count, joint.of_target.as_slice()), (7, &[4, 5, 1, 2, 6][..]));
+        let (error, target) = (Complex64::new(0.7, -0.4), Complex64::new(-0.2, 1.1));
+        for omega in [0.5, 3.0, 12.0] {
+            let answer = |task: &Task| {
+                let seen = &task.feedforward.as_ref().unwrap().operator;
+                task.state.operator.response(omega) * error + seen.response(omega) * target
+            };
+            let b = task.state.operator.response_and_gradient(omega);
+            let f = task.feedforward.as_ref().unwrap().operator.response_and_gradient(omega);
+            let found = joint.derivatives((&b.gradient, error), (&f.gradient, target));
+            for k in 0..joint.count {
+                let step = 1e-6;
+                let [up, down] = [step, -step].map(|by| answer(&moved(&task, &joint, k, by)));
+                let slope = (up - down) / (2.0 * step);
+                assert!(
+                    (found[k] - slope).norm() < 1e-6 * (1.0 + slope.norm()),
+                    "{omega} {k}: {} {slope}",
+                    found[k]
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn parameters_move_with_their_coordinates() {
+        let task = task();
+        let joint = Joint::of(&task);
+        let all = joint.parameters(&task);
+        let names: Vec<&str> = all.iter().map(|q| q.name).collect();
+        assert_eq!(names, ["K", "omega_nm", "zeta_nm", "tau_e", "K_f", "T_L_f", "tau_f"]);
+        for (i, quantity) in all.iter().enumerate() {
+            for k in 0..joint.count {
+                let step = 1e-6;
+                let of = |by: f64| joint.parameters(&moved(&task, &joint, k, by))[i].value;
+                let slope = (of(step) - of(-step)) / (2.0 * step);
+                assert!(
+                    (quantity.gradient[k] - slope).abs() < 1e-6 * (1.0 + slope.abs()),
+                    "{names:?} {i} {k}"
+                );
+            }
+        }
+        // With preview F anticipates; its error counts in s.
+        let tau = all.last().unwrap();
+        assert!(tau.value < 0.0 && tau.scale == 1.0);
+    }
+}

@@ -1,0 +1,181 @@
+//! Search for the places and amplitudes of the lines: the shares q of the lines in the response of u that minimise
+//! `J = sum over wanted g' I^-1 g/s^2`, `I = sum q_k M_k` (`designing`).
+//!
+//! - **Amplitudes.** J is convex in q. From equal shares, `q_k <- q_k sqrt(d_k/sum q d)`,
+//!   `d_k = sum g' I^-1 M_k I^-1 g/s^2`, decreases J in every step (D. M. Titterington, *Applied Statistics* 27 (1978)
+//!   227-234; Y. Yu, *Ann. Stat.* 38 (2010) 1593-1606). Each line keeps at least a part of an equal share, for people
+//!   who differ from the assumed operator.
+//! - **Frequencies.** Each line in turn is moved to multiples near it and keeps the one with the smallest J (V. V.
+//!   Fedorov, *Theory of Optimal Experiments*, 1972), on condition that no line is a harmonic of another.
+//! - **Two forcing functions.** A person who sees the target answers it and the error: lines of a target and of a disturbance,
+//!   in turns along the frequency, separate the two (`joint`). Their shares are searched together, the limits hold for each.
+//! - **Limits.** If a target has much power above the crossover frequency, people lower their crossover frequency (D.
+//!   T. McRuer and H. R. Jex, *IEEE Trans. Human Factors in Electronics* 8 (1967) 231-249): lines there form a shelf,
+//!   with amplitudes up to a given part of the geometric mean of those below. Lines below are between half and twice
+//!   that mean. The size is then the largest that satisfies the limits of the rms of e and u.
+//!   Between two lines there is room (`spacing`): power of a person who varies over a run is near a line, not at it alone,
+//!   and the remnant at a line is estimated from the bins next to it.
+
+use std::f64::consts::TAU;
+
+use hoid_model::forcing::Sinusoid;
+use hoid_numerics::statistics::mean;
+use nalgebra::{DMatrix, DVector};
+
+use super::{
+    DesignError, Enters,
+    information::{Loop, inverse},
+};
+
+/// Largest ratio of the amplitude of a line below the crossover to their geometric mean; its inverse is the smallest.
+const WITHIN: f64 = 2.0;
+/// Part of an equal share that each line keeps at least.
+const LEAST_SHARE: f64 = 0.1;
+/// Steps of the iteration of the shares, and steps if a line is moved for a trial.
+const STEPS: usize = 400;
+const STEPS_OF_TRIAL: usize = 60;
+/// Multiples by which a line is moved, and number of rounds.
+const MOVES: [i32; 10] = [-16, -8, -4, -2, -1, 1, 2, 4, 8, 16];
+const ROUNDS: usize = 3;
+/// Least relative improvement for which a line is moved.
+const WORTH: f64 = 1e-3;
+
+/// A line: its multiple of the fundamental, and where it enters.
+pub(super) type Place = (u32, Enters);
+
+pub(super) struct Search<'a> {
+    pub all: &'a Loop<'a>,
+    pub gradients: Vec<DVector<f64>>,
+    pub period_s: f64,
+    pub shelf: f64,
+}
+
+impl Search<'_> {
+    fn omega(&self, multiple: u32) -> f64 {
+        f64::from(multiple) * TAU / self.period_s
+    }
+
+    fn line(&self, (multiple, enters): Place) -> (Enters, f64) {
+        (enters, self.omega(multiple))
+    }
+
+    /// Moves the lines one after the other as long as J decreases, to multiples that are admissible, and returns them with
+    /// their shares.
+    pub fn places(
+        &self,
+        mut places: Vec<Place>,
+        admissible: impl Fn(&[Place], usize, u32) -> bool,
+    ) -> Result<(Vec<Place>, Vec<f64>), DesignError> {
+        let (mut shares, mut best) = self.shares(&places, STEPS)?;
+        for _ in 0..ROUNDS {
+            let before = best;
+            for k in 0..places.len() {
+                for by in MOVES {
+                    let Some(moved) = places[k].0.checked_add_signed(by) else {
+                        continue;
+                    };
+                    if !admissible(&places, k, moved) {
+                        continue;
+                    }
+                    let mut trial = places.clone();
+                    trial[k].0 = moved;
+                    if let Ok((found, criterion)) = self.shares(&trial, STEPS_OF_TRIAL)
+                        && criterion < best * (1.0 - WORTH)
+                    {
+                        (places, shares, best) = (trial, found, criterion);
+                    }
+                }
+            }
+            if best >= before {
+                break;
+            }
+        }
+        let (found, _) = self.shares(&places, STEPS).unwrap_or((shares, best));
+        Ok((places, found))
+    }
+
+    /// Returns the best shares of lines at these frequencies, and J.
+    fn shares(&self, places: &[Place], steps: usize) -> Result<(Vec<f64>, f64), DesignError> {
+        let by_share: Vec<DMatrix<f64>> = places
+            .iter()
+            .map(|place| self.all.information_by_share(self.line(*place)))
+            .collect();
+        let n = places.len();
+        let mut shares = vec![1.0 / n as f64; n];
+        let mut last = f64::INFINITY;
+        for step in 0..steps {
+            let information = by_share.iter().zip(&shares).fold(
+                DMatrix::zeros(by_share[0].nrows(), by_share[0].ncols()),
+                |sum, (m, q)| sum + m * *q,
+            );
+            let covariance = inverse(&information).ok_or(DesignError::NotIdentifiable {
+                lines: n,
+                coordinates: information.nrows(),
+            })?;
+            let directions: Vec<DVector<f64>> = self.gradients.iter().map(|g| &covariance * g).collect();
+            let criterion: f64 = directions.iter().zip(&self.gradients).map(|(c, g)| c.dot(g)).sum();
+            last = criterion;
+            if step + 1 == steps {
+                break;
+            }
+            let slope = |m: &DMatrix<f64>| -> f64 { directions.iter().map(|c| (m * c).dot(c)).sum() };
+            let moved: Vec<f64> = by_share
+                .iter()
+                .zip(&shares)
+                .map(|(m, q)| q * (slope(m) / criterion).sqrt())
+                .collect();
+            let whole: f64 = moved.iter().sum();
+            let least = LEAST_SHARE / n as f64;
+            shares = moved.iter().map(|q| (q / whole).max(least)).collect();
+            self.limit(places, &mut shares);
+        }
+        Ok((shares, last))
+    }
+
+    /// Limits the amplitudes of the lines of each forcing function, redistributes the rest, and normalises the sum to one.
+    fn limit(&self, places: &[Place], shares: &mut [f64]) {
+        for enters in [Enters::Target, Enters::Disturbance] {
+            let mut lines: Vec<(f64, bool, &mut f64)> = (places.iter().zip(shares.iter_mut()))
+                .filter(|((_, at), _)| *at == enters)
+                .map(|(place, q)| {
+                    let line = self.line(*place);
+                    (self.all.control_by_power(line), line.1 > self.all.crossover_rad_s, q)
+                })
+                .collect();
+            let below = lines.iter().filter(|(_, beyond, _)| !beyond);
+            let logarithms: Vec<f64> = below.map(|(control, _, q)| (**q / control).ln()).collect();
+            if logarithms.is_empty() {
+                continue;
+            }
+            let level = mean(&logarithms).exp();
+            for (control, beyond, q) in &mut lines {
+                let power = **q / *control;
+                **q = *control
+                    * match beyond {
+                        true => power.min(self.shelf * self.shelf * level),
+                        false => power.clamp(level / (WITHIN * WITHIN), level * WITHIN * WITHIN),
+                    };
+            }
+        }
+        let whole: f64 = shares.iter().sum();
+        shares.iter_mut().for_each(|q| *q /= whole);
+    }
+
+    /// Returns lines with these shares; the first forcing function has an rms of one.
+    pub fn lines(&self, places: &[Place], shares: &[f64]) -> Vec<(Enters, Sinusoid)> {
+        let power = |(place, q): (&Place, &f64)| q / self.all.control_by_power(self.line(*place));
+        let powers: Vec<f64> = places.iter().zip(shares).map(power).collect();
+        let first = places.first().map(|(_, enters)| *enters);
+        let own = places.iter().zip(&powers).filter(|((_, at), _)| Some(*at) == first);
+        let whole: f64 = own.map(|(_, p)| p).sum();
+        let line = |((m, enters), p): (&Place, &f64)| {
+            let line = Sinusoid {
+                amplitude_deg: (2.0 * p / whole).sqrt(),
+                omega_rad_s: self.omega(*m),
+                phase_rad: 0.0,
+            };
+            (*enters, line)
+        };
+        places.iter().zip(&powers).map(line).collect()
+    }
+}

@@ -1,0 +1,131 @@
+//! The loop of an experiment, and what excites it.
+//!
+//! `e = f - y`, `u = B e + F f + n`, `y = P (u + d)`: the target f and the disturbance d at the input of the controlled
+//! element P, a person who answers the error (B) and, on a display that shows it, the target (F), and the remnant n.
+
+use hoid_model::{
+    ModelError,
+    family_scenario::{FamilyState, Feedforward},
+    forcing::{ForcingFunction, Sinusoid},
+};
+use serde::{Deserialize, Serialize};
+
+/// Time between samples of an experiment, s, if the length of a run is a whole number of them.
+pub(super) const SAMPLE_S: f64 = 0.01;
+
+/// Point at which a forcing function enters the loop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Enters {
+    /// It is the target signal.
+    #[default]
+    Target,
+    /// It is added at the input of the controlled element.
+    Disturbance,
+}
+
+hoid_model::named_choice!(Enters, "point of entry of the forcing function", 2, {
+    Target => "target",
+    Disturbance => "disturbance",
+});
+
+/// The remnant of a person.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Remnant {
+    /// Its share of the variance of u.
+    pub share: f64,
+    /// Time constant T_n in s; zero for white noise.
+    pub time_constant_s: f64,
+    /// Order m.
+    pub order: i32,
+}
+
+impl Default for Remnant {
+    /// A fifth of the variance of u, of first order with a time constant of .06 s.
+    fn default() -> Self {
+        Self {
+            share: 0.2,
+            time_constant_s: 0.06,
+            order: 1,
+        }
+    }
+}
+
+/// The loop of an experiment: person, controlled element and remnant.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Task {
+    /// The person and the controlled element.
+    pub state: FamilyState,
+    /// The response to a target that is shown; `None` for a display of the error only.
+    #[serde(default, with = "written")]
+    pub feedforward: Option<Feedforward>,
+    /// Remnant of the person.
+    pub remnant: Remnant,
+}
+
+/// A response to the target as operator and preview.
+mod written {
+    use hoid_model::{FamilyOperator, family_scenario::Feedforward};
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub fn serialize<S: Serializer>(seen: &Option<Feedforward>, writer: S) -> Result<S::Ok, S::Error> {
+        let parts = seen.as_ref().map(|seen| (&seen.operator, seen.preview_s));
+        parts.serialize(writer)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(reader: D) -> Result<Option<Feedforward>, D::Error> {
+        let parts: Option<(FamilyOperator, f64)> = Deserialize::deserialize(reader)?;
+        Ok(parts.map(|(operator, preview_s)| Feedforward { operator, preview_s }))
+    }
+}
+
+/// The forcing functions of an experiment: a target, a disturbance, or both.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Forcing {
+    lines: Vec<(Enters, Sinusoid)>,
+}
+
+impl Forcing {
+    /// One forcing function.
+    pub fn of(enters: Enters, function: &ForcingFunction) -> Self {
+        let lines = function.sinusoids().iter().map(|line| (enters, *line)).collect();
+        Self { lines }
+    }
+
+    /// Both of them.
+    pub fn both(target: &ForcingFunction, disturbance: &ForcingFunction) -> Self {
+        let mut all = Self::of(Enters::Target, target);
+        all.lines.extend(Self::of(Enters::Disturbance, disturbance).lines);
+        all
+    }
+
+    /// Lines with their points of entry.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] as [`ForcingFunction::new`] for the lines of each point.
+    pub fn new(lines: Vec<(Enters, Sinusoid)>) -> Result<Self, ModelError> {
+        let all = Self { lines };
+        for enters in [Enters::Target, Enters::Disturbance] {
+            all.function(enters)?;
+        }
+        Ok(all)
+    }
+
+    /// The lines, each with its point of entry.
+    pub fn lines(&self) -> &[(Enters, Sinusoid)] {
+        &self.lines
+    }
+
+    /// The lines that enter at a point.
+    pub fn sinusoids(&self, enters: Enters) -> Vec<Sinusoid> {
+        let here = self.lines.iter().filter(|(at, _)| *at == enters);
+        here.map(|(_, line)| *line).collect()
+    }
+
+    /// The forcing function of a point; without lines it is at rest.
+    ///
+    /// # Errors
+    /// As [`ForcingFunction::new`].
+    pub fn function(&self, enters: Enters) -> Result<ForcingFunction, ModelError> {
+        ForcingFunction::new(self.sinusoids(enters))
+    }
+}
