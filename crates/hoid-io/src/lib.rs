@@ -46,11 +46,14 @@ mod formats;
 mod input_file;
 mod output;
 mod preparation;
+#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod record;
 mod results;
 mod scenario;
 mod survey;
+#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod table;
+#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod time;
 mod wording;
 

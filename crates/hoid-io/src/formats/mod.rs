@@ -20,6 +20,7 @@
 #[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 pub(crate) mod arrays;
 mod budget;
+#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod csv;
 mod format;
 mod guarded;

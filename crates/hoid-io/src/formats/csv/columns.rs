@@ -33,18 +33,20 @@ impl RowWriter for CsvColumns {
             for column in columns {
                 cell.clear();
                 let written = match column {
-                    Values::Real(values) if values[row].is_nan() => Ok(()),
                     // The fewest digits, with a point or an exponent, which distinguishes them from
                     // integers.
-                    Values::Real(values) => write!(cell, "{:?}", values[row]),
-                    Values::Whole(values) => write!(cell, "{}", values[row]),
+                    Values::Real(values) => {
+                        (values.get(row).filter(|value| !value.is_nan())).map(|value| write!(cell, "{value:?}"))
+                    }
+                    Values::Whole(values) => values.get(row).map(|value| write!(cell, "{value}")),
                     Values::Text(values) => {
-                        csv.write_field(harmless(&values[row]).as_bytes())?;
+                        let text = values.get(row).map_or("", String::as_str);
+                        csv.write_field(harmless(text).as_bytes())?;
                         continue;
                     }
                 };
                 // Writing into a String does not fail.
-                debug_assert!(written.is_ok());
+                debug_assert!(written.is_none_or(|written| written.is_ok()));
                 csv.write_field(&cell)?;
             }
             csv.write_record(None::<&[u8]>)?;
@@ -132,7 +134,7 @@ fn survey(text: &str, file: &str, separator: u8) -> Result<(Vec<String>, Vec<Col
     let mut record = csv::ByteRecord::new();
     let mut names: Vec<String> = Vec::new();
     let mut kinds = Vec::new();
-    let mut rows = 0;
+    let mut rows = 0_usize;
     // The reader fails only on I/O errors, which cannot occur here.
     while matches!(reader.read_byte_record(&mut record), Ok(true)) {
         let line = || {
@@ -163,7 +165,7 @@ fn survey(text: &str, file: &str, separator: u8) -> Result<(Vec<String>, Vec<Col
                 expected: names.len(),
             });
         }
-        rows += 1;
+        rows = rows.saturating_add(1);
         for (kind, cell) in kinds.iter_mut().zip(&record) {
             let cell = utf8(cell);
             *kind = match *kind {

@@ -41,14 +41,14 @@ pub(super) fn made_plain(bytes: &mut Vec<u8>) -> Vec<String> {
 
 /// Decodes UTF-16 text, recognised by its byte order mark.
 fn utf16(bytes: &[u8]) -> Option<String> {
-    let unit: fn([u8; 2]) -> u16 = match bytes {
-        [0xff, 0xfe, ..] => u16::from_le_bytes,
-        [0xfe, 0xff, ..] => u16::from_be_bytes,
+    let (unit, rest): (fn([u8; 2]) -> u16, _) = match bytes {
+        [0xff, 0xfe, rest @ ..] => (u16::from_le_bytes, rest),
+        [0xfe, 0xff, rest @ ..] => (u16::from_be_bytes, rest),
         _ => return None,
     };
-    let rest = &bytes[2..];
-    let units: Vec<u16> = rest.chunks_exact(2).map(|pair| unit([pair[0], pair[1]])).collect();
-    String::from_utf16(&units).ok().filter(|_| rest.len().is_multiple_of(2))
+    let (pairs, []) = rest.as_chunks() else { return None };
+    let units: Vec<u16> = pairs.iter().map(|pair| unit(*pair)).collect();
+    String::from_utf16(&units).ok()
 }
 
 /// True if each non-ASCII byte may occur in a name or a unit.
@@ -90,27 +90,29 @@ fn between_tabs(text: &str) -> Option<String> {
 /// Marks the lines above the header as comments, and returns their number. The header is the first
 /// line of words over a line of as many cells, most of them numbers.
 fn without_preamble(text: &str) -> Option<(usize, String)> {
-    let lines: Vec<&str> = text.lines().take(LINES).collect();
-    let filled: Vec<usize> = (0..lines.len()).filter(|at| !is_aside(lines[*at])).collect();
-    let is_header = |pair: &&[usize]| {
-        let (header, row) = (lines[pair[0]], lines[pair[1]]);
+    let lines = text.lines().take(LINES).enumerate();
+    let filled: Vec<(usize, &str)> = lines.filter(|(_, line)| !is_aside(line)).collect();
+    let is_header = |pair: &[(usize, &str)]| {
+        let [(_, header), (_, row)] = pair else { return false };
         let mark = char::from(separator(header));
         let names = header.split(mark).count();
         let cells: Vec<&str> = row.split(mark).collect();
         let numbers = cells.iter().filter(|cell| is_number(cell)).count();
-        names > 1 && names == cells.len() && 2 * numbers > names && !header.split(mark).any(is_number)
+        names > 1 && names == cells.len() && numbers > names / 2 && !header.split(mark).any(is_number)
     };
-    let header = filled.windows(2).find(is_header)?[0];
-    let above: Vec<usize> = filled.into_iter().filter(|at| *at < header).collect();
-    let mark = char::from(separator(lines[header]));
-    let cells = |at: usize| lines[at].split(mark).count();
+    let header = filled.windows(2).position(is_header)?;
+    let (above, [(_, header), ..]) = filled.split_at_checked(header)? else {
+        return None;
+    };
+    let mark = char::from(separator(header));
+    let cells = |line: &str| line.split(mark).count();
     // A line of as many cells is the header; the units are below it.
-    if above.is_empty() || above.iter().any(|at| cells(*at) == cells(header)) {
+    if above.is_empty() || above.iter().any(|(_, line)| cells(line) == cells(header)) {
         return None;
     }
     // Line breaks are kept.
     let marked = |(at, line): (usize, &str)| {
-        if above.contains(&at) {
+        if above.iter().any(|(above, _)| *above == at) {
             format!("#{line}")
         } else {
             line.to_owned()

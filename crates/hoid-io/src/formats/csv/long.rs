@@ -76,15 +76,18 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
     };
     let end = SpanEnd::of(&parsed, file, options);
     // Room for all rows, from the length of the first ones: unfilled room takes no memory.
-    let bytes_per_row = (text.at / parsed.rows).max(1);
-    let rows = if end.is_some() { 0 } else { text.length / bytes_per_row };
+    let parts = text.length as f64 / text.at as f64;
+    let rows = if end.is_some() { 0.0 } else { parsed.rows as f64 * parts };
     for (column, _) in parsed.columns.iter_mut().zip(&wanted).filter(|(_, wanted)| **wanted) {
-        column.values.reserve(rows.saturating_sub(parsed.rows));
+        // A file of holes may be longer than any memory; its rows are not.
+        let _ = column.values.try_reserve((rows as usize).saturating_sub(parsed.rows));
     }
     let mut may_end = end.is_some();
     while let Some(base) = text.advance()? {
-        let read = plain_rows(&text.buffer[..text.lines], 0, layout, |run| {
-            run.starts.iter().for_each(|start| parsed.starts.push(base + start));
+        let read = plain_rows(text.lines(), 0, layout, |run| {
+            run.starts
+                .iter()
+                .for_each(|start| parsed.starts.push(base.saturating_add(*start)));
             let each = parsed.columns.iter_mut().zip(run.values).zip(run.precision);
             for ((column, values), precision) in each {
                 column.values.extend(values);
@@ -116,7 +119,7 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
         source: Box::new(source),
         notes: parsed.notes,
     };
-    Ok(Some(selected(table, |at, _| wanted[at])))
+    Ok(Some(selected(table, |at, _| wanted.get(at) == Some(&true))))
 }
 
 /// A file that is read from its start to its end.
@@ -139,7 +142,7 @@ impl Text {
         let Some(line) = bytes.iter().rposition(|byte| *byte == b'\n') else {
             return Ok(None);
         };
-        bytes.truncate(line + 1);
+        bytes.truncate(line.saturating_add(1));
         self.at = bytes.len();
         let last = self.bytes(self.length.saturating_sub(1), 1)?;
         let is_marked = bytes.starts_with(b"\xef\xbb\xbf");
@@ -157,18 +160,24 @@ impl Text {
         Ok(parsed.filter(is_plain))
     }
 
+    /// The lines that were read last.
+    fn lines(&self) -> &[u8] {
+        self.buffer.get(..self.lines).unwrap_or(&self.buffer)
+    }
+
     /// Reads the next lines; returns the position of the first, `None` at the end.
     fn advance(&mut self) -> io::Result<Option<usize>> {
         // One buffer for all blocks.
         self.buffer.drain(..self.lines);
-        let base = self.at - self.buffer.len();
+        let base = self.at.saturating_sub(self.buffer.len());
         loop {
             let from = self.buffer.len();
             let read = (&mut self.file).take(self.next as u64).read_to_end(&mut self.buffer)?;
-            self.at += read;
-            self.next = (2 * self.next).min(LARGEST);
-            let line = self.buffer[from..].iter().rposition(|byte| *byte == b'\n');
-            self.lines = line.map_or(self.buffer.len(), |line| from + line + 1);
+            self.at = self.at.saturating_add(read);
+            self.next = self.next.saturating_mul(2).min(LARGEST);
+            let mut new = self.buffer.iter().enumerate().skip(from);
+            let line = new.rfind(|(_, byte)| **byte == b'\n');
+            self.lines = line.map_or(self.buffer.len(), |(at, _)| at.saturating_add(1));
             if line.is_some() || read == 0 {
                 return Ok((self.lines > 0).then_some(base));
             }
@@ -186,10 +195,11 @@ impl Text {
     /// Values of a column at places from here to the end, in their order; NaN where there is none.
     fn probed(&mut self, column: usize, separator: u8) -> io::Result<Vec<f64>> {
         let here = self.at;
-        let from = here - (self.buffer.len() - self.lines);
-        let rest = (self.length - from) as f64;
+        let from = here.saturating_sub(self.buffer.len().saturating_sub(self.lines));
+        // A file that grows while it is read may be beyond its length already.
+        let rest = self.length.saturating_sub(from) as f64;
         let value = |text: &mut Self, part: f64| -> io::Result<f64> {
-            let bytes = text.bytes(from + (rest * part) as usize, PROBE)?;
+            let bytes = text.bytes(from.saturating_add((rest * part) as usize), PROBE)?;
             // A place is in the middle of a line; the next one is whole.
             let line = bytes.split(|byte| *byte == b'\n').nth(1).unwrap_or_default();
             let row = nth_row(line, 0, separator);
@@ -224,18 +234,20 @@ struct LongSource<'a> {
 impl LongSource<'_> {
     /// Position of a row, and its cells.
     fn row(&self, row: usize) -> Option<(usize, csv::ByteRecord)> {
-        let (kept, from) = self.starts.before(row)?;
+        let (from, behind) = self.starts.before(row)?;
         let mut file = File::open(&self.path).ok()?;
         file.seek(SeekFrom::Start(from as u64)).ok()?;
         // The rows up to the next one whose position is known, or up to the last.
         let end = self
             .starts
-            .before(kept + RowStarts::KEPT)
-            .map_or(self.starts.last()? + PROBE, |next| next.1);
+            .before(row.saturating_add(RowStarts::KEPT))
+            .map_or(self.starts.last()?.saturating_add(PROBE), |next| next.0);
         let mut bytes = Vec::new();
-        file.take((end - from) as u64).read_to_end(&mut bytes).ok()?;
-        let (start, record) = nth_row(&bytes, row - kept, self.separator)?;
-        Some((from + start, record))
+        file.take(end.saturating_sub(from) as u64)
+            .read_to_end(&mut bytes)
+            .ok()?;
+        let (start, record) = nth_row(&bytes, behind, self.separator)?;
+        Some((from.saturating_add(start), record))
     }
 }
 
@@ -248,15 +260,15 @@ impl Source for LongSource<'_> {
         let count = || {
             let (start, _) = self.row(row)?;
             let mut before = BufReader::new(File::open(&self.path).ok()?).take(start as u64);
-            let mut lines = 0;
+            let mut line = 1_usize;
             while before.skip_until(b'\n').ok()? > 0 {
-                lines += 1;
+                line = line.saturating_add(1);
             }
-            Some(lines)
+            Some(line)
         };
         count().map_or_else(
-            || format!("row {}", row + 1),
-            |lines: usize| format!("line {}", lines + 1),
+            || format!("row {}", row.saturating_add(1)),
+            |line| format!("line {line}"),
         )
     }
 

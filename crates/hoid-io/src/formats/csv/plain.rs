@@ -36,7 +36,7 @@ impl RowStarts {
         if self.rows.is_multiple_of(Self::KEPT) {
             self.kept.push(start);
         }
-        self.rows += 1;
+        self.rows = self.rows.saturating_add(1);
         self.last = start;
     }
 
@@ -50,10 +50,9 @@ impl RowStarts {
         (self.rows > 0).then_some(self.last)
     }
 
-    /// The nearest row at or before `row` whose position is kept, and that position.
+    /// The position of the nearest row at or before `row` that is kept, and the number of rows from there to `row`.
     pub(super) fn before(&self, row: usize) -> Option<(usize, usize)> {
-        let at = self.kept.get(row / Self::KEPT)?;
-        Some((row / Self::KEPT * Self::KEPT, *at))
+        Some((*self.kept.get(row / Self::KEPT)?, row % Self::KEPT))
     }
 }
 
@@ -129,9 +128,9 @@ pub(super) fn plain_rows(bytes: &[u8], from: usize, layout: Layout<'_>, mut take
 
 /// End of the part that starts at `start`: the first line end after `length` bytes.
 fn end_of_part(bytes: &[u8], start: usize, length: usize) -> usize {
-    let behind = start.saturating_add(length).min(bytes.len());
-    let line = bytes[behind..].iter().position(|byte| *byte == b'\n');
-    line.map_or(bytes.len(), |line| behind + line + 1)
+    let mut behind = bytes.iter().enumerate().skip(start.saturating_add(length));
+    let line = behind.find(|(_, byte)| **byte == b'\n');
+    line.map_or(bytes.len(), |(at, _)| at.saturating_add(1))
 }
 
 impl Plain {
@@ -150,83 +149,92 @@ impl Plain {
 fn run(bytes: &[u8], part: Range<usize>, layout: Layout<'_>) -> Plain {
     let columns = layout.with_precision.len();
     let mut found = Plain::nothing(layout, part.start);
+    let mut rest = bytes.get(part.clone()).unwrap_or_default();
+    let at = |rest: &[u8]| part.end.saturating_sub(rest.len());
     // Rows are about as long as the first one.
-    let line = bytes[part.clone()].iter().position(|byte| *byte == b'\n').unwrap_or(0) + 1;
-    let rows = part.len() / line + part.len() / line / 16 + 1;
+    let line = rest
+        .split_inclusive(|byte| *byte == b'\n')
+        .next()
+        .map_or(1, <[u8]>::len);
+    let rows = (rest.len() as f64 / line as f64 * 1.07) as usize;
     for (values, wanted) in found.values.iter_mut().zip(layout.wanted) {
         values.reserve(if *wanted { rows } else { 0 });
     }
     found.starts.reserve(rows);
     let mut row = vec![f64::NAN; columns];
-    let mut printed = vec![0..0; columns];
-    while found.end < part.end {
-        let start = found.end;
+    let mut printed: Vec<&[u8]> = vec![b""; columns];
+    while let [first, behind @ ..] = rest {
         // Blank lines are not rows.
-        if matches!(bytes[start], b'\n' | b'\r') {
-            found.end += 1;
+        if matches!(first, b'\n' | b'\r') {
+            rest = behind;
             continue;
         }
-        let Some(end) = plain_row(&bytes[..part.end], start, layout, &mut row, &mut printed) else {
+        let Some(behind) = plain_row(rest, layout, &mut row, &mut printed) else {
             break;
         };
-        found.starts.push(start);
-        for (column, value) in row.iter().enumerate() {
-            if !layout.wanted[column] {
+        found.starts.push(at(rest));
+        let columns = found.values.iter_mut().zip(&mut found.precision);
+        let asked = layout.wanted.iter().zip(layout.with_precision);
+        for (((values, precision), (wanted, with_precision)), (value, printed)) in
+            columns.zip(asked).zip(row.iter().zip(&printed))
+        {
+            if !*wanted {
                 continue;
             }
-            found.values[column].push(*value);
-            if layout.with_precision[column] && !value.is_nan() {
-                found.precision[column].add_bytes(&bytes[printed[column].clone()]);
+            values.push(*value);
+            if *with_precision && !value.is_nan() {
+                precision.add_bytes(printed);
             }
         }
-        found.end = end;
+        rest = behind;
     }
+    found.end = at(rest);
     found
 }
 
-/// The numbers of a row with their positions in the text, and the end of the row; `None` if it is not plain.
+/// The numbers of a row with their texts, and the rest from the end of the row on; `None` if it is not plain.
 #[inline]
-fn plain_row(
-    bytes: &[u8],
-    start: usize,
+fn plain_row<'a>(
+    mut rest: &'a [u8],
     layout: Layout<'_>,
     row: &mut [f64],
-    printed: &mut [Range<usize>],
-) -> Option<usize> {
-    let blanks = |mut at: usize| {
-        while bytes.get(at) == Some(&b' ') {
-            at += 1;
-        }
-        at
-    };
-    let (mut at, last) = (start, row.len() - 1);
+    printed: &mut [&'a [u8]],
+) -> Option<&'a [u8]> {
+    let last = row.len().checked_sub(1)?;
     let mut empty = true;
-    for (column, (value, place)) in row.iter_mut().zip(printed).enumerate() {
-        if !layout.wanted[column] {
-            let ends = |byte: &u8| *byte == layout.separator || matches!(byte, b'\n' | b'\r' | b'"');
-            let length = bytes[at..].iter().position(ends).unwrap_or(bytes.len() - at);
-            empty &= length == 0;
-            at += length;
-        } else {
-            at = blanks(at);
+    for (column, ((value, printed), wanted)) in row.iter_mut().zip(printed).zip(layout.wanted).enumerate() {
+        if *wanted {
+            rest = without_blanks(rest);
             *value = f64::NAN;
-            if matches!(bytes.get(at), Some(b'0'..=b'9' | b'-' | b'+' | b'.')) {
-                let (number, length) = fast_float2::parse_partial::<f64, _>(&bytes[at..]).ok()?;
+            if matches!(rest, [b'0'..=b'9' | b'-' | b'+' | b'.', ..]) {
+                let (number, length) = fast_float2::parse_partial::<f64, _>(rest).ok()?;
                 if !number.is_finite() {
                     return None;
                 }
                 *value = number;
-                *place = at..at + length;
-                at = blanks(at + length);
+                (*printed, rest) = rest.split_at_checked(length)?;
+                rest = without_blanks(rest);
                 empty = false;
             }
+        } else {
+            let ends = |byte: &u8| *byte == layout.separator || matches!(byte, b'\n' | b'\r' | b'"');
+            let length = rest.iter().position(ends).unwrap_or(rest.len());
+            empty &= length == 0;
+            rest = rest.get(length..)?;
         }
-        match bytes.get(at) {
-            Some(byte) if *byte == layout.separator && column < last => at += 1,
-            Some(b'\n' | b'\r') | None if column == last => {}
+        match rest {
+            [byte, behind @ ..] if *byte == layout.separator && column < last => rest = behind,
+            [b'\n' | b'\r', ..] | [] if column == last => {}
             _ => return None,
         }
     }
     // Rows without values may be left over by a spreadsheet after its table.
-    (!empty).then_some(at)
+    (!empty).then_some(rest)
+}
+
+fn without_blanks(mut rest: &[u8]) -> &[u8] {
+    while let [b' ', behind @ ..] = rest {
+        rest = behind;
+    }
+    rest
 }

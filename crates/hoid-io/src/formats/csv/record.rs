@@ -31,8 +31,9 @@ fn write(file: &mut dyn Write, record: &Record, separator: u8) -> io::Result<()>
     }
     csv.write_record(None::<&[u8]>)?;
     let mut text = String::new();
+    let mut columns: Vec<_> = channels.iter().map(|channel| channel.values.iter().copied()).collect();
     for k in 0..record.len() {
-        let row = channels.iter().map(|c| c.values[k]);
+        let row = columns.iter_mut().filter_map(Iterator::next);
         for value in std::iter::once(record.time_s(k)).chain(row) {
             text.clear();
             shortest(&mut text, value);

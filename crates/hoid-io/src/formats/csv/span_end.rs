@@ -26,7 +26,7 @@ impl Source for Nowhere<'_> {
     }
 
     fn place(&self, row: usize) -> String {
-        format!("row {}", row + 1)
+        format!("row {}", row.saturating_add(1))
     }
 
     fn cell(&self, _: usize, _: usize) -> String {
@@ -56,20 +56,23 @@ impl SpanEnd {
             notes: Vec::new(),
         };
         let table = with_time(first_rows, options.time.as_ref()).ok()?;
-        let column = table.columns.iter().position(|column| column.name == "t");
-        let start_s = column.map_or(0.0, |column| table.columns[column].values[0]);
-        match (options.sampling_hz, column) {
-            (Some(hz), column) if column.is_none() || !options.repair.resample => {
+        let mut columns = table.columns.iter().zip(&head.columns).enumerate();
+        let time = columns.find(|(_, (column, _))| column.name == "t");
+        let first = time.and_then(|(_, (t, _))| t.values.first());
+        let start_s = first.copied().unwrap_or(0.0);
+        match (options.sampling_hz, time) {
+            (Some(hz), time) if time.is_none() || !options.repair.resample => {
                 let rows = ((to_s - start_s) * hz).ceil() + 2.0;
                 (rows > 2.0).then_some(Self::Row(rows as usize))
             }
             (_, None) => None,
-            (_, Some(column)) => {
+            (_, Some((column, (t, written)))) => {
                 // t is the written time moved and in another unit.
-                let (t, written) = (&table.columns[column].values, &head.columns[column].values);
-                let last = t.len() - 1;
-                let unit = (written[last] - written[0]) / (t[last] - t[0]);
-                let as_written = |s: f64| written[0] + (s - start_s) * unit;
+                let (&[first, .., last], &[written, .., last_written]) = (&*t.values, &*written.values) else {
+                    return None;
+                };
+                let unit = (last_written - written) / (last - first);
+                let as_written = |s: f64| written + (s - start_s) * unit;
                 let (from, to) = (
                     as_written(options.span_s.0.unwrap_or(f64::NEG_INFINITY)),
                     as_written(to_s),
@@ -83,10 +86,10 @@ impl SpanEnd {
     pub(super) fn is_reached(&self, read: &Parsed) -> bool {
         match *self {
             Self::Row(rows) => read.starts.len() >= rows,
-            Self::Time { column, from, to } => {
-                let t = &read.columns[column].values;
+            Self::Time { column, from, to } => read.columns.get(column).is_some_and(|column| {
+                let t = &column.values;
                 t.last().is_some_and(|t| *t > to) && t.iter().any(|t| *t >= from && *t < to)
-            }
+            }),
         }
     }
 
@@ -104,8 +107,8 @@ impl SpanEnd {
         let Some(column) = self.time_column() else {
             return true;
         };
-        let t = read.columns[column].values.iter();
         let rest = probed.iter().filter(|t| !t.is_nan());
-        t.chain(rest).is_sorted()
+        let column = read.columns.get(column);
+        column.is_some_and(|column| column.values.iter().chain(rest).is_sorted())
     }
 }

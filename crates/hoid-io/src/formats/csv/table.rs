@@ -14,7 +14,7 @@
 //! without rounding the value that t gives only up to its last digit; it is used if t agrees with
 //! it.
 
-use std::collections::HashMap;
+use std::collections::HashSet;
 use std::ops::Range;
 
 use super::plain::{Layout, RowStarts, plain_rows};
@@ -40,27 +40,17 @@ struct CsvSource<'a> {
 impl CsvSource<'_> {
     /// Position of a row, and its cells.
     fn row(&self, row: usize) -> Option<(usize, csv::ByteRecord)> {
-        let (kept, from) = self.starts.before(row)?;
-        let (start, record) = nth_row(&self.text.as_bytes()[from..], row - kept, self.separator)?;
-        Some((from + start, record))
+        let (from, behind) = self.starts.before(row)?;
+        let (start, record) = nth_row(self.text.as_bytes().get(from..)?, behind, self.separator)?;
+        Some((from.saturating_add(start), record))
     }
 }
 
 /// Position and cells of the n-th row of a text that starts with a row.
 pub(super) fn nth_row(bytes: &[u8], n: usize, separator: u8) -> Option<(usize, csv::ByteRecord)> {
-    let mut reader = reader(bytes, separator);
-    let mut record = csv::ByteRecord::new();
-    let mut rows = 0;
-    while matches!(reader.read_byte_record(&mut record), Ok(true)) {
-        if is_blank_line(&record) {
-            continue;
-        }
-        if rows == n {
-            return Some((row_start(bytes, position(&record)), record));
-        }
-        rows += 1;
-    }
-    None
+    let records = reader(bytes, separator).into_byte_records().map_while(Result::ok);
+    let record = records.filter(|record| !is_blank_line(record)).nth(n)?;
+    Some((row_start(bytes, position(&record)), record))
 }
 
 /// Position of a record, including the bytes that the reader skips before it.
@@ -91,7 +81,7 @@ impl Source for CsvSource<'_> {
 
     fn is_open(&self, row: usize) -> bool {
         let begins_there = |open| self.starts.last().is_some_and(|last| last >= open);
-        row + 1 == self.starts.len() && self.open.is_some_and(begins_there)
+        self.starts.len().checked_sub(1) == Some(row) && self.open.is_some_and(begins_there)
     }
 }
 
@@ -119,9 +109,8 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
         open: open_line(text),
     };
     let mut notes = parsed.notes;
-    if source.is_open(parsed.rows - 1) {
-        notes.extend(cut_number(&source, parsed.rows));
-    }
+    let last = parsed.rows.checked_sub(1).filter(|last| source.is_open(*last));
+    notes.extend(last.and_then(|last| cut_number(&source, last)));
     Ok(Table {
         columns: parsed.columns,
         rows: parsed.rows,
@@ -166,7 +155,7 @@ pub(super) fn parsed(text: &str, file: &str) -> Result<Parsed, IoError> {
         starts, empty_at_end, ..
     } = rows;
     // Spreadsheets leave rows of separators only after the table.
-    let count = starts.len() - empty_at_end;
+    let count = starts.len().saturating_sub(empty_at_end);
     for column in &mut columns {
         column.values.truncate(count);
     }
@@ -250,18 +239,18 @@ impl Rows<'_> {
 
     /// Reads at most [`WHOLE`] rows from `from` on as full CSV; returns the position of the next row.
     fn whole(&mut self, from: usize, columns: &mut [Column]) -> Result<usize, IoError> {
-        let mut reader = reader(&self.bytes[from..], self.separator);
+        let mut reader = reader(self.bytes.get(from..).unwrap_or_default(), self.separator);
         let mut record = csv::ByteRecord::new();
         for _ in 0..WHOLE {
             if !matches!(reader.read_byte_record(&mut record), Ok(true)) {
                 return Ok(self.bytes.len());
             }
             if !is_blank_line(&record) {
-                let start = row_start(self.bytes, from + position(&record));
+                let start = row_start(self.bytes, from.saturating_add(position(&record)));
                 self.row(&record, start, columns)?;
             }
         }
-        Ok(from + reader.position().byte() as usize)
+        Ok(from.saturating_add(reader.position().byte() as usize))
     }
 
     fn row(&mut self, record: &csv::ByteRecord, start: usize, columns: &mut [Column]) -> Result<(), IoError> {
@@ -283,7 +272,7 @@ impl Rows<'_> {
             });
         }
         let blank = record.iter().all(|cell| cell.trim_ascii().is_empty());
-        self.empty_at_end = if blank { self.empty_at_end + 1 } else { 0 };
+        self.empty_at_end = if blank { self.empty_at_end.saturating_add(1) } else { 0 };
         self.starts.push(start);
         let each = columns.iter_mut().zip(&self.times).zip(&mut self.moments).zip(record);
         for (((column, is_time), moments), cell) in each {
@@ -313,10 +302,10 @@ const COMPARED: usize = 8;
 /// Detects a truncated last number: the last line has no line end, and its last cell is at least
 /// two characters shorter than that of each of the [`COMPARED`] lines before, which have digits
 /// after a point.
-fn cut_number(source: &CsvSource<'_>, rows: usize) -> Option<String> {
+fn cut_number(source: &CsvSource<'_>, last: usize) -> Option<String> {
     let last_cell = |row: usize| {
         let (start, _) = source.row(row)?;
-        let line = source.text[start..].lines().next().unwrap_or_default();
+        let line = source.text.get(start..)?.lines().next().unwrap_or_default();
         Some(
             line.rsplit(char::from(source.separator))
                 .next()
@@ -324,10 +313,10 @@ fn cut_number(source: &CsvSource<'_>, rows: usize) -> Option<String> {
                 .trim(),
         )
     };
-    let last = rows.checked_sub(1)?;
     let compared = last.checked_sub(COMPARED)?;
     let cut = last_cell(last)?;
-    let is_longer = |row: usize| last_cell(row).is_some_and(|cell| cell.contains('.') && cell.len() > cut.len() + 1);
+    let length = cut.len().saturating_add(1);
+    let is_longer = |row: usize| last_cell(row).is_some_and(|cell| cell.contains('.') && cell.len() > length);
     (compared..last).all(is_longer).then(|| {
         format!(
             "the file ends without the end of its last line, whose last number ({}) is shorter than those above it: it may be \
@@ -370,14 +359,14 @@ fn header(
 /// Makes names unique: columns with the same name are numbered by their position, so that a signal can be selected
 /// among them and the others do no harm.
 fn told_apart(names: Vec<String>, notes: &mut Vec<String>) -> Vec<String> {
-    let mut count: HashMap<&str, usize> = HashMap::new();
-    names.iter().for_each(|name| *count.entry(name).or_default() += 1);
-    let several = |name: &str| !name.is_empty() && count[name] > 1;
-    let different = |(at, name): (usize, &String)| match several(name) {
-        true => format!("{name} (column {})", at + 1),
+    let mut known: HashSet<&str> = HashSet::new();
+    let named = names.iter().map(String::as_str).filter(|name| !name.is_empty());
+    let several: HashSet<&str> = named.filter(|name| !known.insert(name)).collect();
+    let different = |(number, name): (usize, &String)| match several.contains(name.as_str()) {
+        true => format!("{name} (column {number})"),
         false => name.clone(),
     };
-    let found: Vec<String> = names.iter().enumerate().map(different).collect();
+    let found: Vec<String> = (1..).zip(&names).map(different).collect();
     let renamed: Vec<&str> = found
         .iter()
         .zip(&names)

@@ -50,7 +50,7 @@ pub(crate) fn as_meant(cell: &str) -> &str {
 /// Position of the last line, if it has no line end.
 pub(crate) fn open_line(text: &str) -> Option<usize> {
     let ends = ['\n', '\r'];
-    (!text.ends_with(ends)).then(|| text.rfind(ends).map_or(0, |at| at + 1))
+    (!text.ends_with(ends)).then(|| text.trim_end_matches(|c| !ends.contains(&c)).len())
 }
 
 pub(crate) fn reader(bytes: &[u8], separator: u8) -> csv::Reader<&[u8]> {
@@ -69,17 +69,14 @@ pub(crate) fn is_aside(line: &str) -> bool {
 /// The most frequent separator in the header; the comma if there is none.
 pub(crate) fn separator(header: &str) -> u8 {
     let mut quoted = false;
-    let mut counts = [(b',', 0), (b';', 0), (b'\t', 0)];
-    for byte in header.bytes() {
-        quoted ^= byte == b'"';
-        for (separator, count) in &mut counts {
-            *count += usize::from(byte == *separator && !quoted);
-        }
-    }
-    counts
-        .into_iter()
-        .reduce(|best, next| if next.1 > best.1 { next } else { best })
-        .map_or(b',', |best| best.0)
+    let is_plain = |byte: &u8| {
+        quoted ^= *byte == b'"';
+        !quoted
+    };
+    let plain: Vec<u8> = header.bytes().filter(is_plain).collect();
+    let count = |separator: &u8| plain.iter().filter(|byte| *byte == separator).count();
+    // Of equal ones the last counts.
+    [b'\t', b';', b','].into_iter().max_by_key(count).unwrap_or(b',')
 }
 
 /// Refuses a table separated by blanks, which would be read as one column: a header without
@@ -142,27 +139,25 @@ pub(crate) fn comments(text: &str) -> impl Iterator<Item = &str> {
 }
 
 /// Position of a row after the comments and blank lines that the reader skips with it.
-pub(crate) fn row_start(bytes: &[u8], mut at: usize) -> usize {
-    while let Some(byte) = bytes.get(at) {
-        match byte {
-            b'\n' | b'\r' => at += 1,
-            b'#' => at += bytes[at..].iter().position(|b| *b == b'\n').unwrap_or(bytes.len() - at),
-            _ => break,
+pub(crate) fn row_start(bytes: &[u8], at: usize) -> usize {
+    let mut rest = bytes.get(at..).unwrap_or_default();
+    loop {
+        rest = match rest {
+            [b'\n' | b'\r', behind @ ..] => behind,
+            [b'#', behind @ ..] => {
+                let end = behind.iter().position(|b| *b == b'\n');
+                end.and_then(|end| behind.get(end..)).unwrap_or_default()
+            }
+            _ => return bytes.len().saturating_sub(rest.len()),
         }
     }
-    at
 }
 
 pub(crate) fn place(bytes: &[u8], at: usize) -> String {
-    let before = &bytes[..at.min(bytes.len())];
-    let count = |end| before.iter().filter(|b| **b == end).count();
+    let before = bytes.get(..at).unwrap_or(bytes);
     // A file with bare carriage returns has lines too.
-    let lines = if bytes.contains(&b'\n') {
-        count(b'\n')
-    } else {
-        count(b'\r')
-    };
-    format!("line {}", lines + 1)
+    let end = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
+    format!("line {}", before.split(|b| *b == end).count())
 }
 
 #[cfg(test)]
