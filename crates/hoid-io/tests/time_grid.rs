@@ -318,6 +318,25 @@ fn resample_goes_over_gaps_and_jitter() {
     assert!(back.contains("expected increasing time"), "{back}");
 }
 
+/// The time is a signal too: it has a sample in each row, and is on the grid.
+#[test]
+fn the_time_is_resampled_as_a_signal() {
+    let options = ReadOptions {
+        repair: RESAMPLE,
+        output: "t".parse().unwrap(),
+        ..defaults()
+    };
+    let text = "t,e,u\n0.0,1,2\n0.1,2,3\n0.2,3,4\n0.3,4,5\n0.6,7,8\n0.7,8,9\n";
+    let read = Desk::new().read(text, &options).unwrap().record;
+    assert_eq!(read.len(), 8);
+    assert!(
+        read.times_s()
+            .iter()
+            .zip(read.output())
+            .all(|(a, b)| (a - b).abs() < 1e-12)
+    );
+}
+
 /// The remainder of a truncated file, or a short span of one.
 #[test]
 fn one_sample_is_not_resampled() {

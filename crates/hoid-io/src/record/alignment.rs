@@ -115,7 +115,10 @@ fn moved_within(
     let (record, of_late) = late.apply(record).ok()?;
     let record = record.span(begin_s, end_s).ok()?.labelled(label);
     let at_start = ((record.time_s(0) - begin_s) / ts_s).round() as usize;
-    let lost = (at_start, (narrow.len() - at_start).saturating_sub(record.len()));
+    let lost = (
+        at_start,
+        narrow.len().saturating_sub(at_start).saturating_sub(record.len()),
+    );
     steps.extend(of_late);
     for step in &mut steps {
         if let Step::Offset { cut_samples, .. } = step {

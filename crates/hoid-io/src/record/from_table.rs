@@ -9,7 +9,7 @@ use super::time_grid::TimeGrid;
 use crate::IoError;
 use crate::data_quality::{QualityIssue, issues_of_signals};
 use crate::preparation::{Preparation, Step};
-use crate::table::{ColumnExpression, Signal, Table};
+use crate::table::{Column, ColumnExpression, Signal, Table};
 use crate::wording::{list, named};
 
 /// A record, the steps applied to it, and notes on reading.
@@ -91,14 +91,14 @@ impl TableReader<'_> {
     ) -> Result<ReadRecord, IoError> {
         let signals = || input.into_iter().chain([output]);
         let used = |column: usize| signals().any(|(signal, _)| signal.columns().any(|used| used == column));
-        let mut columns: Vec<Option<Channel>> = Vec::with_capacity(self.table.columns.len());
-        for column in 0..self.table.columns.len() {
-            let name = self.table.columns[column].name.clone();
+        let about = |column: &Column| (column.name.clone(), column.unit.clone(), column.is_held);
+        let all: Vec<(String, String, bool)> = self.table.columns.iter().map(about).collect();
+        let mut columns: Vec<Option<Channel>> = Vec::with_capacity(all.len());
+        for (column, (name, unit, is_held)) in all.into_iter().enumerate() {
             if !used(column) && (name.is_empty() || Some(column) == time) {
                 columns.push(None);
                 continue;
             }
-            let unit = self.table.columns[column].unit.clone();
             let of_time = grid.t.as_ref().filter(|_| Some(column) == time);
             let values = match of_time {
                 Some(t) => Ok(t.clone()),
@@ -108,10 +108,7 @@ impl TableReader<'_> {
                 Ok(values) => {
                     let values = match grid.t.as_ref().zip(grid.resampled) {
                         None => values,
-                        Some((t, n)) => {
-                            let is_held = self.table.columns[column].is_held;
-                            repair::resample(t, &values, (grid.start_s, grid.sample_time.s()), n, is_held)
-                        }
+                        Some((t, n)) => repair::resample(t, &values, (grid.start_s, grid.sample_time.s()), n, is_held),
                     };
                     columns.push(Some(Channel::new(name, unit, values)));
                 }
@@ -130,7 +127,7 @@ impl TableReader<'_> {
             .collect();
         for ((signal, _), made) in signals().zip(&mut made) {
             if let Signal::Column(column) = signal {
-                *made = columns[column].take().unwrap_or_else(nothing);
+                *made = (columns.get_mut(column).and_then(Option::take)).unwrap_or_else(nothing);
             }
         }
         let output = made.pop().unwrap_or_else(nothing);
@@ -160,7 +157,7 @@ fn nothing() -> Channel {
 /// expression; a difference has a unit if both terms share it.
 fn combine(signal: Signal, expression: &ColumnExpression, columns: &[Option<Channel>]) -> Channel {
     let nothing = nothing();
-    let column = |index: usize| columns[index].as_ref().unwrap_or(&nothing);
+    let column = |index: usize| columns.get(index).and_then(Option::as_ref).unwrap_or(&nothing);
     match signal {
         Signal::Column(_) => nothing,
         Signal::Negative(a) => {

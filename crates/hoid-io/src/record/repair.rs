@@ -8,6 +8,7 @@ use std::ops::Range;
 
 use crate::preparation::Step;
 use crate::table::{Table, kept};
+use crate::time::sampling::pairs;
 
 /// Part of a step within which a time on the grid is that of a row: the rounding of times.
 const ROUNDING: f64 = 1e-6;
@@ -33,18 +34,17 @@ pub(super) struct Bridged {
 pub(super) fn fill(values: &mut [f64], t: Option<&[f64]>) -> Result<Bridged, OpenEnd> {
     let mut bridged = Bridged::default();
     let mut at = 0;
+    let x = |row: usize| t.map_or(Some(row as f64), |t| t.get(row).copied()).unwrap_or(f64::NAN);
     while let Some(run) = next_run(values, at) {
-        let (before, behind) = match (run.start.checked_sub(1), values.get(run.end)) {
-            (None, _) => return Err(OpenEnd::Start),
-            (_, None) => return Err(OpenEnd::End),
-            (Some(row), Some(value)) => ((row, values[row]), (run.end, *value)),
+        let last_before = run.start.checked_sub(1).ok_or(OpenEnd::Start)?;
+        let (Some(&before), Some(&behind)) = (values.get(last_before), values.get(run.end)) else {
+            return Err(OpenEnd::End);
         };
-        let x = |row: usize| t.map_or(row as f64, |t| t[row]);
-        let (from, to) = (x(before.0), x(behind.0));
-        for row in run.clone() {
-            values[row] = line(before.1, behind.1, (x(row) - from) / (to - from));
+        let (from, to) = (x(last_before), x(run.end));
+        for (row, value) in values.iter_mut().enumerate().take(run.end).skip(run.start) {
+            *value = line(before, behind, (x(row) - from) / (to - from));
         }
-        bridged.values += run.len();
+        bridged.values = bridged.values.saturating_add(run.len());
         bridged.longest = bridged.longest.max(run.len());
         at = run.end;
     }
@@ -53,24 +53,25 @@ pub(super) fn fill(values: &mut [f64], t: Option<&[f64]>) -> Result<Bridged, Ope
 
 /// Drops each row that equals the row before in all columns, including the time.
 pub(super) fn drop_repeated(table: Table<'_>) -> (Table<'_>, Option<Step>) {
-    let same = |row: &usize| {
+    let same = |(before, row): (usize, usize)| {
         table.columns.iter().enumerate().all(|(index, column)| {
-            let (a, b) = (column.values[row - 1], column.values[*row]);
-            let texts = [row - 1, *row].map(|row| column.texts.binary_search(&row).is_ok());
+            let [a, b] = [before, row].map(|row| table.value(index, row));
+            let texts = [before, row].map(|row| column.texts.binary_search(&row).is_ok());
             match texts {
                 [false, false] => a == b || a.is_nan() && b.is_nan(),
-                [true, true] => table.source.cell(row - 1, index) == table.source.cell(*row, index),
+                [true, true] => table.source.cell(before, index) == table.source.cell(row, index),
                 _ => false,
             }
         })
     };
-    let repeated: Vec<usize> = (1..table.rows).filter(same).collect();
+    let pairs = (0..).zip(1..table.rows);
+    let repeated: Vec<usize> = pairs.filter(|pair| same(*pair)).map(|(_, row)| row).collect();
     let Some(first) = repeated.first() else {
         return (table, None);
     };
     let step = Step::DropRepeated {
         rows: repeated.len(),
-        first_row: first + 1,
+        first_row: first.saturating_add(1),
     };
     let rows: Vec<usize> = (0..table.rows)
         .filter(|row| repeated.binary_search(row).is_err())
@@ -79,30 +80,33 @@ pub(super) fn drop_repeated(table: Table<'_>) -> (Table<'_>, Option<Step>) {
 }
 
 fn next_run(values: &[f64], from: usize) -> Option<Range<usize>> {
-    let start = from + values[from..].iter().position(|v| v.is_nan())?;
-    let end = values[start..]
-        .iter()
-        .position(|v| !v.is_nan())
-        .map_or(values.len(), |n| start + n);
-    Some(start..end)
+    let mut rest = values.iter().enumerate().skip(from);
+    let (start, _) = rest.find(|(_, v)| v.is_nan())?;
+    let end = rest.find(|(_, v)| !v.is_nan());
+    Some(start..end.map_or(values.len(), |(end, _)| end))
 }
 
 /// Values between the points `(t, value)` at `start + k step`, k = 0 .. n; t increases. They are on straight lines, or
 /// those of the last point if the signal is held, which counts as reached [`ROUNDING`] of a step before it.
 pub(super) fn resample(t: &[f64], values: &[f64], (start, step): (f64, f64), n: usize, is_held: bool) -> Vec<f64> {
     let early = if is_held { ROUNDING * step } else { 0.0 };
-    let mut left = 0;
-    (0..n)
-        .map(|k| {
-            let time = start + k as f64 * step + early;
-            while left + 2 < t.len() && t[left + 1] <= time {
-                left += 1;
-            }
-            let share = ((time - t[left]) / (t[left + 1] - t[left])).clamp(0.0, 1.0);
-            let share = if is_held { share.floor() } else { share };
-            line(values[left], values[left + 1], share)
-        })
-        .collect()
+    let mut lines = pairs(t).zip(pairs(values));
+    let Some(mut this) = lines.next() else {
+        return Vec::new();
+    };
+    let value = |k| {
+        let time = start + k as f64 * step + early;
+        while this.0.1 <= time
+            && let Some(next) = lines.next()
+        {
+            this = next;
+        }
+        let ((from, to), (before, behind)) = this;
+        let share = ((time - from) / (to - from)).clamp(0.0, 1.0);
+        let share = if is_held { share.floor() } else { share };
+        line(before, behind, share)
+    };
+    (0..n).map(value).collect()
 }
 
 fn line(a: f64, b: f64, share: f64) -> f64 {

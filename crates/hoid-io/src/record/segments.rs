@@ -108,17 +108,17 @@ fn read_trial(
     let (quality_issues, rows) = issues_of_record(&table, options)?;
     let time = table.names().iter().position(|name| *name == "t");
     let at = |row: usize| match (time, options.sampling_hz) {
-        (Some(time), None) => table.columns[time].values[row],
+        (Some(time), None) => table.value(time, row),
         // Samples are counted from the first t.
         (time, Some(hz)) => {
-            let first = time.map_or(0.0, |time| table.columns[time].values[0]);
+            let first = time.map_or(0.0, |time| table.value(time, 0));
             if first.is_finite() { first } else { 0.0 }.max(f64::MIN) + row as f64 / hz
         }
         (None, None) => f64::NAN,
     };
     let mut segments = Vec::new();
     for segment in between(&quality_issues, mask, rows.clone()) {
-        let (from, last) = (at(segment.start), at(segment.end - 1));
+        let (from, last) = (at(segment.start), at(segment.end.saturating_sub(1)));
         // NaN is not long enough either.
         let is_long = last - from >= shortest_s;
         if !is_long {
@@ -167,24 +167,24 @@ fn read_trial(
 fn between(issues: &[QualityIssue], mask: &[QualityIssueKind], rows: Range<usize>) -> Vec<Range<usize>> {
     // Excluded rows, and rows before which the record is cut.
     let mut out = vec![false; rows.len()];
-    let mut cut = vec![false; rows.len() + 1];
+    let mut cut = out.clone();
     for found in issues.iter().filter(|found| mask.contains(&found.kind)) {
         for place in &found.places {
-            let first = (place.row - 1).saturating_sub(rows.start);
+            // Its rows count from 1.
+            let first = place.row.saturating_sub(1).saturating_sub(rows.start);
             if found.kind == QualityIssueKind::Gap {
-                cut[(first + 1).min(rows.len())] = true;
+                cut.iter_mut().skip(first).skip(1).take(1).for_each(|cut| *cut = true);
             } else {
-                let end = (first + place.rows).min(rows.len());
-                out[first.min(end)..end].fill(true);
+                out.iter_mut().skip(first).take(place.rows).for_each(|out| *out = true);
             }
         }
     }
     let mut segments: Vec<Range<usize>> = Vec::new();
-    for row in (0..rows.len()).filter(|row| !out[*row]) {
-        let at = rows.start + row;
+    for (row, (_, cut)) in rows.zip(out.iter().zip(cut)).filter(|(_, (out, _))| !**out) {
+        let end = row.saturating_add(1);
         match segments.last_mut() {
-            Some(segment) if segment.end == at && !cut[row] => segment.end = at + 1,
-            _ => segments.push(at..at + 1),
+            Some(segment) if segment.end == row && !cut => segment.end = end,
+            _ => segments.push(row..end),
         }
     }
     segments

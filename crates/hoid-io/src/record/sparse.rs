@@ -38,8 +38,11 @@ pub(super) fn without_gaps<'a>(mut table: Table<'a>, options: &ReadOptions) -> R
     let mut dropped: Vec<usize> = Vec::new();
     let columns = columns(&table, options)?;
     for &(column, how) in &columns {
-        let gaps = Gaps::of(&table.columns[column]);
-        let name = named(&table.columns[column].name);
+        let Some(sparse) = table.columns.get_mut(column) else {
+            continue;
+        };
+        let gaps = Gaps::of(sparse);
+        let name = named(&sparse.name);
         let Some(own) = gaps.own.clone() else {
             let found = format!("column {name} has no value in {} rows", table.rows);
             return Err(refused(&table, found, "a column with some values; check the recording"));
@@ -50,10 +53,10 @@ pub(super) fn without_gaps<'a>(mut table: Table<'a>, options: &ReadOptions) -> R
             continue;
         }
         bounds = bounds.start.max(own.start)..bounds.end.min(own.end);
-        steps.push(gaps.step(&table.columns[column].name, how, &x));
+        steps.push(gaps.step(&sparse.name, how, &x));
         match how {
             Sparse::Drop => dropped.extend(gaps.missing),
-            Sparse::Hold | Sparse::Linear => gaps.close(&mut table.columns[column], how, &x),
+            Sparse::Hold | Sparse::Linear => gaps.close(sparse, how, &x),
         }
     }
     dropped.sort_unstable();
@@ -62,7 +65,8 @@ pub(super) fn without_gaps<'a>(mut table: Table<'a>, options: &ReadOptions) -> R
         .filter(|row| dropped.binary_search(row).is_err())
         .collect();
     if rows.is_empty() {
-        let names: Vec<&str> = columns.iter().map(|(at, _)| table.columns[*at].name.as_str()).collect();
+        let named = columns.iter().filter_map(|(at, _)| table.columns.get(*at));
+        let names: Vec<&str> = named.map(|column| column.name.as_str()).collect();
         let found = format!(
             "no row between the first and the last value of each of {}",
             list(&names)
@@ -77,8 +81,8 @@ pub(super) fn without_gaps<'a>(mut table: Table<'a>, options: &ReadOptions) -> R
 }
 
 fn note_cut(table: &mut Table<'_>, bounds: &Range<usize>) {
-    let (before, behind) = (bounds.start, table.rows - bounds.end);
-    if before + behind > 0 {
+    let (before, behind) = (bounds.start, table.rows.saturating_sub(bounds.end));
+    if (before, behind) != (0, 0) {
         table.notes.push(format!(
             "{before} rows at the start and {behind} at the end are cut: a sparse column has no value before its first or after its last"
         ));
@@ -121,7 +125,10 @@ fn columns(table: &Table<'_>, options: &ReadOptions) -> Result<Vec<(usize, Spars
         }
         for column in found {
             if all.iter().any(|(known, _)| *known == column) {
-                let found = format!("column {} is named twice", named(names[column]));
+                let found = format!(
+                    "column {} is named twice",
+                    names.get(column).map_or_else(String::new, |name| named(name))
+                );
                 return Err(refused(table, found, "each column once"));
             }
             all.push((column, *how));
@@ -140,6 +147,11 @@ fn abscissa(table: &Table<'_>, options: &ReadOptions) -> Vec<f64> {
     }
 }
 
+/// The value of a row; NaN if there is none.
+fn at(values: &[f64], row: usize) -> f64 {
+    values.get(row).copied().unwrap_or(f64::NAN)
+}
+
 /// Where a column has values.
 struct Gaps {
     /// From the first to after the last row with a value; none if there is none.
@@ -155,19 +167,20 @@ impl Gaps {
         let first = rows.clone().find(|row| !is_missing(row));
         let last = rows.clone().rev().find(|row| !is_missing(row));
         Self {
-            own: first.zip(last).map(|(first, last)| first..last + 1),
+            own: first.zip(last).map(|(first, last)| first..last.saturating_add(1)),
             missing: rows.filter(is_missing).collect(),
         }
     }
 
-    /// Runs of missing rows with a value on both sides.
-    fn runs(&self) -> Vec<Range<usize>> {
+    /// Runs of missing rows with a value on both sides, each with the row before it.
+    fn runs(&self) -> Vec<(usize, Range<usize>)> {
         let own = self.own.clone().unwrap_or_default();
-        let mut runs: Vec<Range<usize>> = Vec::new();
+        let mut runs: Vec<(usize, Range<usize>)> = Vec::new();
         for row in self.missing.iter().copied().filter(|row| own.contains(row)) {
+            let end = row.saturating_add(1);
             match runs.last_mut() {
-                Some(run) if run.end == row => run.end = row + 1,
-                _ => runs.push(row..row + 1),
+                Some((_, run)) if run.end == row => run.end = end,
+                _ => runs.push((row.saturating_sub(1), row..end)),
             }
         }
         runs
@@ -175,17 +188,16 @@ impl Gaps {
 
     fn step(&self, name: &str, how: Sparse, x: &[f64]) -> Step {
         let runs = self.runs();
-        let inside: usize = runs.iter().map(Range::len).sum();
+        let inside: usize = runs.iter().map(|(_, run)| run.len()).sum();
         let own = self.own.as_ref().map_or(0, Range::len);
-        let span = |run: &Range<usize>| x[run.end] - x[run.start - 1];
-        let ages = runs
-            .iter()
-            .flat_map(|run| run.clone().map(|row| x[row] - x[run.start - 1]));
+        let since = |before: usize, row: usize| at(x, row) - at(x, before);
+        let span = |(before, run): &(usize, Range<usize>)| since(*before, run.end);
+        let ages = (runs.iter()).flat_map(|(before, run)| run.clone().map(move |row| since(*before, row)));
         let mean_age_s = ages.sum::<f64>() / own.max(1) as f64;
         Step::Sparse {
             channel: name.to_owned(),
             how: how.name(),
-            own: own - inside,
+            own: own.saturating_sub(inside),
             rows: inside,
             longest_s: runs.iter().map(span).fold(0.0, f64::max),
             mean_age_s: (how == Sparse::Hold && mean_age_s.is_finite()).then_some(mean_age_s),
@@ -195,12 +207,12 @@ impl Gaps {
     /// Gives each missing row inside a value.
     fn close(&self, column: &mut Column, how: Sparse, x: &[f64]) {
         let values = &mut column.values;
-        for run in self.runs() {
-            let (before, behind) = (run.start - 1, run.end);
-            let (a, b) = (values[before], values[behind]);
-            for row in run {
-                let share = (x[row] - x[before]) / (x[behind] - x[before]);
-                values[row] = match how {
+        for (before, run) in self.runs() {
+            let (a, b) = (at(values, before), at(values, run.end));
+            let (from, to) = (at(x, before), at(x, run.end));
+            for (value, x) in (values.iter_mut().zip(x)).take(run.end).skip(run.start) {
+                let share = (x - from) / (to - from);
+                *value = match how {
                     // Times that stand have no line between them.
                     Sparse::Linear if share.is_finite() => a * (1.0 - share) + b * share,
                     _ => a,

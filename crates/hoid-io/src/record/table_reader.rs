@@ -8,7 +8,7 @@ use super::read_options::ReadOptions;
 use super::repair::{self, OpenEnd};
 use crate::IoError;
 use crate::preparation::Step;
-use crate::table::Table;
+use crate::table::{Column, Table};
 use crate::wording::{named, sparse_option};
 
 /// The table, and the steps applied to it.
@@ -35,7 +35,7 @@ impl TableReader<'_> {
         if !self.options.repair.fill {
             return rows;
         }
-        let finite = |column: &usize, row: &usize| self.table.columns[*column].values[*row].is_finite();
+        let finite = |column: &usize, row: &usize| self.table.value(*column, *row).is_finite();
         let begins = |column: &usize| rows.clone().find(|row| finite(column, row));
         let ends = |column: &usize| rows.clone().rev().find(|row| finite(column, row));
         let first = self.signals.iter().map(begins).collect::<Option<Vec<_>>>();
@@ -44,11 +44,11 @@ impl TableReader<'_> {
         let Some((first, last)) = bounds.filter(|(first, last)| first < last) else {
             return rows;
         };
-        let (before, behind) = (first - rows.start, rows.end - 1 - last);
-        if before + behind > 0 {
-            let names: Vec<String> = (self.signals.iter())
-                .map(|column| named(&self.table.columns[*column].name))
-                .collect();
+        let kept = first..last.saturating_add(1);
+        let (before, behind) = (kept.start.saturating_sub(rows.start), rows.end.saturating_sub(kept.end));
+        if (before, behind) != (0, 0) {
+            let columns = self.signals.iter().filter_map(|column| self.table.columns.get(*column));
+            let names: Vec<String> = columns.map(|column| named(&column.name)).collect();
             self.table.notes.push(format!(
                 "{before} rows at the start and {behind} at the end are left out: {} have not all a value there to bridge to",
                 names.join(" and ")
@@ -57,51 +57,63 @@ impl TableReader<'_> {
         // The first and the last row of the range lie between values outside it.
         for at in [first, last] {
             for &column in &self.signals {
-                if let Some(value) = self.between(column, at, &rows, time) {
-                    self.table.columns[column].values[at] = value;
+                let value = self.between(column, at, &rows, time);
+                let place = self.table.columns.get_mut(column);
+                if let (Some(value), Some(place)) = (value, place.and_then(|column| column.values.get_mut(at))) {
+                    *place = value;
                 }
             }
         }
-        first..last + 1
+        kept
     }
 
     /// A missing value of a column in a row, interpolated between its neighbours; `None` if it is not missing, or one
     /// side has no value.
     fn between(&self, column: usize, at: usize, rows: &Range<usize>, time: Option<usize>) -> Option<f64> {
-        let source = &self.table.columns[column];
-        if !source.values[at].is_nan() || source.texts.binary_search(&at).is_ok() {
+        let source = self.table.columns.get(column)?;
+        if !source.values.get(at)?.is_nan() || source.texts.binary_search(&at).is_ok() {
             return None;
         }
-        let finite = |row: &usize| source.values[*row].is_finite();
-        let (before, behind) = ((rows.start..at).rev().find(finite)?, (at + 1..rows.end).find(finite)?);
-        let x = |row: usize| time.map_or(row as f64, |time| self.table.columns[time].values[row]);
+        let finite = |row: &usize| self.table.value(column, *row).is_finite();
+        let (before, behind) = (
+            (rows.start..at).rev().find(finite)?,
+            (at..rows.end).skip(1).find(finite)?,
+        );
+        let x = |row: usize| time.map_or(row as f64, |time| self.table.value(time, row));
         let part = (x(at) - x(before)) / (x(behind) - x(before));
-        let value = source.values[before] + part * (source.values[behind] - source.values[before]);
+        let [before, behind] = [before, behind].map(|row| self.table.value(column, row));
+        let value = before + part * (behind - before);
         value.is_finite().then_some(value)
     }
 
     /// The times of the signal with the most samples, if there are fewer than rows: each of two topics in one table has
     /// its own clock.
-    pub(super) fn own_times(&self, rows: &Range<usize>, t: &[f64]) -> Option<Vec<f64>> {
-        let of = |column: &usize| -> Vec<f64> {
-            let values = self.table.columns[*column].own_values(rows.clone());
+    pub(super) fn own_times(&self, rows: &Range<usize>, time: usize, t: &[f64]) -> Option<Vec<f64>> {
+        // As a signal the time has a sample in each row. Its values were taken from the table.
+        if self.signals.contains(&time) {
+            return None;
+        }
+        let of = |column: &Column| -> Vec<f64> {
+            let values = column.own_values(rows.clone());
             // The first and the last row may be filled.
             let inside = values.iter().zip(t).skip(1).take(values.len().saturating_sub(2));
             let own = inside.filter(|(value, _)| value.is_finite());
             own.map(|(_, t)| *t).collect()
         };
-        let densest = self.signals.iter().map(of).max_by_key(Vec::len)?;
-        (densest.len() > 2 && densest.len() + 2 < t.len()).then_some(densest)
+        let signals = self.signals.iter().filter_map(|column| self.table.columns.get(*column));
+        let densest = signals.map(of).max_by_key(Vec::len)?;
+        (densest.len() > 2 && t.len().saturating_sub(densest.len()) > 2).then_some(densest)
     }
 
     /// The values of a column in use: all finite, the missing ones interpolated if requested.
     pub(super) fn values(&mut self, column: usize, rows: Range<usize>, t: Option<&[f64]>) -> Result<Vec<f64>, IoError> {
-        let lacks = self.table.columns[column].is_sparse(rows.clone());
-        let source = &mut self.table.columns[column];
+        let Some(source) = self.table.columns.get_mut(column) else {
+            return Ok(Vec::new());
+        };
+        let lacks = source.is_sparse(rows.clone());
         let may_fill = self.options.repair.fill;
-        let bridgeable =
-            |row: &usize| may_fill && source.values[*row].is_nan() && source.texts.binary_search(row).is_err();
-        let bad = |row: &usize| !source.values[*row].is_finite() && !bridgeable(row);
+        let finite = |row: &usize| source.values.get(*row).is_some_and(|value| value.is_finite());
+        let bad = |row: &usize| !(finite(row) || may_fill && source.is_missing(*row));
         if let Some(row) = rows.clone().find(bad) {
             return Err(self.table.bad_value(column, row, rows));
         }
@@ -112,7 +124,7 @@ impl TableReader<'_> {
         let bridged = repair::fill(&mut values, t).map_err(|open| {
             let (row, end) = match open {
                 OpenEnd::Start => (rows.start, "start"),
-                OpenEnd::End => (rows.end - 1, "end"),
+                OpenEnd::End => (rows.end.saturating_sub(1), "end"),
             };
             IoError::NothingToBridgeTo {
                 file: self.file.clone(),

@@ -48,18 +48,21 @@ impl TableReader<'_> {
 
     /// Samples counted from the first at a given frequency.
     fn counted_grid(&mut self, time: Option<usize>, sample_time: SampleTime) -> Result<TimeGrid, IoError> {
-        let first = time.map(|time| self.table.columns[time].values[0]);
+        let t = time
+            .and_then(|time| self.table.columns.get(time))
+            .map(|column| &column.values);
+        let first = t.and_then(|t| t.first().copied());
         let start = first.filter(|t| t.is_finite()).unwrap_or(0.0);
         let ts = sample_time.s();
-        match (time, first) {
+        match (t, first) {
             (None, _) if self.options.repair.resample => {
                 self.table.notes.push(String::from(
                     "there is no column t to resample along: the samples count as even",
                 ));
             }
-            (Some(time), Some(first)) if first.is_finite() => {
-                let t = &self.table.columns[time].values;
-                let stated = (t[t.len() - 1] - first) / (t.len() - 1) as f64;
+            (Some(t), Some(first)) if first.is_finite() => {
+                let last = t.last().copied().unwrap_or(first);
+                let stated = (last - first) / t.len().saturating_sub(1) as f64;
                 // More than one percent is more than a clock error.
                 if (stated - ts).abs() > 0.01 * ts {
                     self.table.notes.push(format!(
@@ -77,11 +80,12 @@ impl TableReader<'_> {
             }
             _ => {}
         }
-        let times: Vec<f64> = (0..self.table.rows).map(|k| start + k as f64 * ts).collect();
+        let time_s = |row: usize| start + row as f64 * ts;
+        let times: Vec<f64> = (0..self.table.rows).map(time_s).collect();
         let rows = self.rows(&times)?;
         let rows = self.between_values(rows, None);
         Ok(TimeGrid {
-            start_s: times[rows.start],
+            start_s: time_s(rows.start),
             rows,
             sample_time,
             resampled: None,
@@ -91,10 +95,13 @@ impl TableReader<'_> {
 
     /// The sampling of the column t, or the sampling to which it is resampled.
     fn grid_of_t(&mut self, time: usize, given: Option<SampleTime>) -> Result<TimeGrid, IoError> {
-        let rows = self.rows(&self.table.columns[time].values)?;
+        let too_few = |this: &Self| this.uneven(Uneven::TooFew, &(0..0), &[]);
+        let column = self.table.columns.get(time).ok_or_else(|| too_few(self))?;
+        let precision = column.precision;
+        let rows = self.rows(&column.values)?;
         let rows = self.between_values(rows, Some(time));
         let t = self.values(time, rows.clone(), None)?;
-        let precision = self.table.columns[time].precision;
+        let start_s = *t.first().ok_or_else(|| too_few(self))?;
         let stated = self.table.sample_time_s;
         let sampled = match (sampling::even(&t, precision, stated), given) {
             (Ok(even), Some(given)) if !given.matches(self.sample_time(even.sample_time_s)?) => Ok(given),
@@ -102,7 +109,7 @@ impl TableReader<'_> {
                 self.table.notes.extend(even.note);
                 return Ok(TimeGrid {
                     rows,
-                    start_s: t[0],
+                    start_s,
                     sample_time: given.map_or_else(|| self.sample_time(even.sample_time_s), Ok)?,
                     resampled: None,
                     t: Some(t),
@@ -110,7 +117,7 @@ impl TableReader<'_> {
             }
             (Err(Uneven::Gap { .. } | Uneven::Jitter { .. }), Some(given)) => Ok(given),
             (Err(Uneven::Gap { .. } | Uneven::Jitter { .. }), None) if self.options.repair.resample => {
-                let own = self.own_times(&rows, &t);
+                let own = self.own_times(&rows, time, &t);
                 match sampling::typical(own.as_deref().unwrap_or(&t), precision) {
                     Ok(ts) => Ok(self.sample_time(ts)?),
                     Err(uneven) => Err(uneven),
@@ -130,14 +137,14 @@ impl TableReader<'_> {
         precision: Precision,
     ) -> Result<TimeGrid, IoError> {
         // A single sample does not define a line.
-        if t.len() < 2 {
+        let &[start_s, .., end_s] = t.as_slice() else {
             return Err(self.uneven(Uneven::TooFew, &rows, &t));
-        }
-        let (start_s, end_s, ts) = (t[0], t[t.len() - 1], sample_time.s());
+        };
+        let ts = sample_time.s();
         // The rounding of the last t must not remove the last sample.
         let slack = 1e-6 + (precision.unit(end_s) / ts).min(0.5);
         let samples = ((end_s - start_s) / ts + slack).floor() + 1.0;
-        if samples > (LARGEST_FACTOR * t.len()) as f64 || !samples.is_finite() {
+        if samples > LARGEST_FACTOR.saturating_mul(t.len()) as f64 || !samples.is_finite() {
             return Err(IoError::ResampledTooLong {
                 file: self.file.clone(),
                 start_s,
@@ -147,7 +154,7 @@ impl TableReader<'_> {
                 factor: LARGEST_FACTOR,
             });
         }
-        let longest = t.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+        let longest = sampling::steps(&t).fold(0.0, f64::max);
         self.steps.push(Step::Interpolate {
             from_samples: t.len(),
             to_samples: samples as usize,
@@ -171,14 +178,15 @@ impl TableReader<'_> {
 
     fn uneven(&self, uneven: Uneven, rows: &Range<usize>, t: &[f64]) -> IoError {
         let file = self.file.clone();
-        let place = |row: usize| self.table.source.place(rows.start + row);
+        let place = |row: usize| self.table.source.place(rows.start.saturating_add(row));
+        let at = |row: usize| t.get(row).copied().unwrap_or(f64::NAN);
         match uneven {
             Uneven::TooFew => IoError::TooFewSamples { file, found: t.len() },
             Uneven::NotIncreasing { row } => IoError::NotIncreasing {
                 file,
                 place: place(row),
-                found: t[row],
-                previous: t[row - 1],
+                found: at(row),
+                previous: at(row.saturating_sub(1)),
             },
             Uneven::Gap {
                 row,
@@ -188,8 +196,8 @@ impl TableReader<'_> {
             } => IoError::Gap {
                 file,
                 place: place(row),
-                after_s: t[row],
-                next_s: t[row + 1],
+                after_s: at(row),
+                next_s: at(row.saturating_add(1)),
                 missing,
                 gaps,
                 sample_time_s,
@@ -202,7 +210,7 @@ impl TableReader<'_> {
             } => IoError::Jitter {
                 file,
                 place: place(row),
-                found: t[row],
+                found: at(row),
                 deviation_s,
                 tolerance_s,
                 sample_time_s,
@@ -230,8 +238,9 @@ impl TableReader<'_> {
             Some(from) => times.iter().position(|t| *t >= from - slack),
         };
         let rows = start.map(|start| {
-            let length = to.and_then(|to| times[start..].iter().position(|t| *t >= to - slack));
-            start..length.map_or(times.len(), |length| start + length)
+            let mut rest = times.iter().enumerate().skip(start);
+            let end = to.and_then(|to| rest.find(|(_, t)| **t >= to - slack));
+            start..end.map_or(times.len(), |(end, _)| end)
         });
         let whole = [from, to].iter().flatten().all(|bound| !bound.is_nan());
         match rows {

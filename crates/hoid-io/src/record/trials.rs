@@ -13,6 +13,7 @@ use super::read_options::TrialChoice;
 use crate::IoError;
 use crate::formats::arrays::Contents;
 use crate::table::{Column, Table, kept};
+use crate::time::sampling::pairs;
 use crate::wording::{did_you_mean, list, shown};
 
 /// Smallest number of rows of a part that is recognised as a trial automatically.
@@ -43,9 +44,11 @@ pub(crate) fn of_table<'a>(table: Table<'a>, choice: Option<&TrialChoice>) -> Re
                 });
             }
         },
-        None if parts.len() == 1 => parts[0].1.clone(),
-        None if parts.is_empty() => return Err(IoError::NoRows { file: file() }),
-        None => return Err(several(file(), &by, names)),
+        None => match parts.as_slice() {
+            [(_, rows)] => rows.clone(),
+            [] => return Err(IoError::NoRows { file: file() }),
+            _ => return Err(several(file(), &by, names)),
+        },
     };
     Ok(kept(table, rows.collect()))
 }
@@ -61,12 +64,11 @@ fn several(file: String, by: &str, names: Vec<&str>) -> IoError {
 /// Rows where t decreases.
 fn falls(table: &Table<'_>) -> Vec<usize> {
     let time = table.columns.iter().find(|column| column.name == "t");
-    let falls = |t: &Column| {
-        (1..t.values.len())
-            .filter(|row| t.values[*row] < t.values[row - 1])
-            .collect()
-    };
-    time.map_or_else(Vec::new, falls)
+    let pairs = (1..).zip(time.into_iter().flat_map(|t| pairs(&t.values)));
+    pairs
+        .filter(|(_, (before, t))| t < before)
+        .map(|(row, _)| row)
+        .collect()
 }
 
 /// Rows between the starting positions.
@@ -78,11 +80,11 @@ fn between(begins: &[usize], rows: usize) -> Vec<Range<usize>> {
 
 /// Content of a cell; nothing if it is empty.
 fn cell(table: &Table<'_>, at: usize, row: usize) -> Option<String> {
-    let value = table.columns[at].values[row];
-    if value.is_finite() {
+    let column = table.columns.get(at)?;
+    if let Some(value) = column.values.get(row).filter(|value| value.is_finite()) {
         return Some(value.to_string());
     }
-    let is_text = table.columns[at].texts.binary_search(&row).is_ok();
+    let is_text = column.texts.binary_search(&row).is_ok();
     is_text.then(|| table.source.cell(row, at))
 }
 
@@ -90,8 +92,7 @@ fn cell(table: &Table<'_>, at: usize, row: usize) -> Option<String> {
 fn parts_by(table: &Table<'_>, choice: &TrialChoice) -> Result<Parts, IoError> {
     let mut begins = falls(table);
     if choice.column == "t" {
-        let counted = between(&begins, table.rows).into_iter().enumerate();
-        return Ok(counted.map(|(at, rows)| ((at + 1).to_string(), rows)).collect());
+        return Ok(numbered(between(&begins, table.rows)));
     }
     let names = table.names();
     let Some(at) = names.iter().position(|name| *name == choice.column) else {
@@ -104,10 +105,19 @@ fn parts_by(table: &Table<'_>, choice: &TrialChoice) -> Result<Parts, IoError> {
         });
     };
     let labels: Vec<Option<String>> = (0..table.rows).map(|row| cell(table, at, row)).collect();
-    begins.extend((1..table.rows).filter(|row| labels[*row] != labels[row - 1]));
+    let pairs = (1..).zip(labels.iter().zip(labels.iter().skip(1)));
+    begins.extend(pairs.filter(|(_, (before, label))| before != label).map(|(row, _)| row));
     begins.sort_unstable();
     begins.dedup();
-    Ok(named(between(&begins, table.rows), |row| labels[row].clone()))
+    Ok(named(between(&begins, table.rows), |row| {
+        labels.get(row).cloned().flatten()
+    }))
+}
+
+/// Parts named by their number.
+fn numbered(parts: Vec<Range<usize>>) -> Parts {
+    let counted = (1_usize..).zip(parts);
+    counted.map(|(number, rows)| (number.to_string(), rows)).collect()
 }
 
 /// Parts named by the value in their first row, without those that have none; repeated values are
@@ -119,9 +129,9 @@ fn named(parts: Vec<Range<usize>>, label: impl Fn(usize) -> Option<String>) -> P
         let before = found.iter().filter(|(known, ..)| *known == value).count();
         found.push((value, before, rows));
     }
-    let name = |(value, before, rows)| match before {
+    let name = |(value, before, rows): (String, usize, _)| match before {
         0 => (value, rows),
-        before => (format!("{value} ({})", before + 1), rows),
+        before => (format!("{value} ({})", before.saturating_add(1)), rows),
     };
     found.into_iter().map(name).collect()
 }
@@ -129,35 +139,30 @@ fn named(parts: Vec<Range<usize>>, label: impl Fn(usize) -> Option<String>) -> P
 /// The parts between restarts of t, and the column that counts them; `t` if there is none.
 fn restarts(table: &Table<'_>) -> Option<(String, Parts)> {
     let begins = falls(table);
-    let t = &table.columns.iter().find(|column| column.name == "t")?.values;
+    let time = table.columns.iter().position(|column| column.name == "t")?;
+    let t = |row: usize| table.value(time, row);
     let parts = between(&begins, table.rows);
-    let starts_again = parts.windows(2).all(|pair| {
-        let (first, last) = (t[pair[0].start], t[pair[0].end - 1]);
-        last - t[pair[1].start] >= 0.5 * (last - first)
+    let starts_again = parts.iter().zip(parts.iter().skip(1)).all(|(part, next)| {
+        let (first, last) = (t(part.start), t(part.end.saturating_sub(1)));
+        last - t(next.start) >= 0.5 * (last - first)
     });
     if begins.is_empty() || !starts_again || parts.iter().any(|rows| rows.len() < SHORTEST) {
         return None;
     }
-    let counts = |at: &usize| {
+    let counts = |at: usize| {
         let same = |rows: &Range<usize>| {
-            let first = cell(table, *at, rows.start);
-            first.is_some() && rows.clone().all(|row| cell(table, *at, row) == first)
+            let first = cell(table, at, rows.start);
+            first.is_some() && rows.clone().all(|row| cell(table, at, row) == first)
         };
-        let steps = |row: &usize| cell(table, *at, *row) != cell(table, *at, row - 1);
+        let steps = |row: &usize| cell(table, at, *row) != cell(table, at, row.saturating_sub(1));
         // The changes first: they are few.
         begins.iter().all(steps) && parts.iter().all(same)
     };
-    let is_named = |at: &usize| !table.columns[*at].name.is_empty() && table.columns[*at].name != "t";
-    Some(match (0..table.columns.len()).filter(is_named).find(counts) {
-        Some(at) => (table.columns[at].name.clone(), named(parts, |row| cell(table, at, row))),
-        None => (
-            String::from("t"),
-            parts
-                .into_iter()
-                .enumerate()
-                .map(|(at, rows)| ((at + 1).to_string(), rows))
-                .collect(),
-        ),
+    let is_named = |column: &Column| !column.name.is_empty() && column.name != "t";
+    let mut columns = table.columns.iter().enumerate();
+    Some(match columns.find(|(at, column)| is_named(column) && counts(*at)) {
+        Some((at, column)) => (column.name.clone(), named(parts, |row| cell(table, at, row))),
+        None => (String::from("t"), numbered(parts)),
     })
 }
 

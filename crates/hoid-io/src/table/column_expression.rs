@@ -52,12 +52,19 @@ impl ColumnExpression {
     pub(crate) fn terms(&self) -> Vec<&str> {
         let mut terms = vec![self.text.as_str()];
         terms.extend(self.text.strip_prefix('-'));
-        for (at, _) in self.text.match_indices('-') {
-            terms.extend([&self.text[..at], &self.text[at + 1..]]);
-        }
+        terms.extend(self.splits().flat_map(|(left, right)| [left, right]));
         terms.iter_mut().for_each(|term| *term = term.trim());
         terms.retain(|term| !term.is_empty());
         terms
+    }
+
+    /// What is on both sides of each hyphen.
+    fn splits(&self) -> impl Iterator<Item = (&str, &str)> {
+        let hyphens = self.text.match_indices('-');
+        hyphens.filter_map(|(at, hyphen)| {
+            let (left, rest) = self.text.split_at_checked(at)?;
+            Some((left, rest.strip_prefix(hyphen)?))
+        })
     }
 
     /// True if the expression is valid for these columns.
@@ -92,9 +99,7 @@ impl ColumnExpression {
             meanings.extend(find(name).map(Signal::Negative));
         }
         let splits: Vec<(&str, &str)> = self
-            .text
-            .match_indices('-')
-            .map(|(at, _)| (&self.text[..at], &self.text[at + 1..]))
+            .splits()
             .filter(|(left, right)| !left.trim().is_empty() && !right.trim().is_empty())
             .collect();
         for (left, right) in &splits {

@@ -41,30 +41,30 @@ pub(crate) struct Column {
 impl Column {
     /// True if a row holds nothing: neither a number nor a text.
     pub(crate) fn is_missing(&self, row: usize) -> bool {
-        self.values[row].is_nan() && self.texts.binary_search(&row).is_err()
+        self.values.get(row).is_none_or(|value| value.is_nan()) && self.texts.binary_search(&row).is_err()
     }
 
     /// True if missing values are at many places: what a topic of another rate leaves, and no dropout.
     pub(crate) fn is_sparse(&self, rows: Range<usize>) -> bool {
         let missing = |row: &usize| self.is_missing(*row);
-        let first = rows.start;
-        let places = rows
-            .clone()
-            .filter(|row| missing(row) && (*row == first || !missing(&(row - 1))));
+        let follows = |row: &usize| {
+            row.checked_sub(1)
+                .is_some_and(|row| rows.contains(&row) && missing(&row))
+        };
+        let places = rows.clone().filter(|row| missing(row) && !follows(row));
         let count = rows.clone().filter(missing).count();
         places.count() >= SPARSE.0 && count as f64 >= SPARSE.1 * rows.len() as f64
     }
 
     /// The values of some rows, NaN where they are not the column's own.
     pub(crate) fn own_values(&self, rows: Range<usize>) -> Cow<'_, [f64]> {
+        let values = self.values.get(rows.clone()).unwrap_or_default();
         if self.made.is_empty() {
-            return Cow::Borrowed(&self.values[rows]);
+            return Cow::Borrowed(values);
         }
-        let mut own = self.values[rows.clone()].to_vec();
-        for row in self.made.iter().filter(|row| rows.contains(row)) {
-            own[row - rows.start] = f64::NAN;
-        }
-        Cow::Owned(own)
+        let is_made = |row: &usize| self.made.binary_search(row).is_ok();
+        let own = |(row, value): (usize, &f64)| if is_made(&row) { f64::NAN } else { *value };
+        Cow::Owned(rows.zip(values).map(own).collect())
     }
 }
 
@@ -98,6 +98,12 @@ impl Table<'_> {
         self.columns.iter().map(|c| c.name.as_str()).collect()
     }
 
+    /// The value of a column in a row; NaN if there is none.
+    pub(crate) fn value(&self, column: usize, row: usize) -> f64 {
+        let value = self.columns.get(column).and_then(|column| column.values.get(row));
+        value.copied().unwrap_or(f64::NAN)
+    }
+
     /// True if no column has a number in a row, as in a row of units.
     pub(crate) fn has_no_number_in(&self, row: usize) -> bool {
         let has_none = |column: &Column| column.values.get(row).is_none_or(|value| value.is_nan());
@@ -107,17 +113,16 @@ impl Table<'_> {
     /// Returns the reason why the value at `row` of a column, which is not finite, cannot be used.
     /// `rows` are the rows in use.
     pub(crate) fn bad_value(&self, at: usize, row: usize, rows: Range<usize>) -> IoError {
-        let Column {
-            name, values, texts, ..
-        } = &self.columns[at];
+        let unknown = Column::default();
+        let column = self.columns.get(at).unwrap_or(&unknown);
         let file = self.source.file().to_owned();
         let place = self.source.place(row);
         let found = self.source.cell(row, at);
-        let is_last_cell = at + 1 == self.columns.len();
-        let column = named(name);
+        let is_last_cell = self.columns.len().checked_sub(1) == Some(at);
+        let name = named(&column.name);
         // At the end of a truncated file a sign or a point is the start of a number.
         let begun = is_last_cell && self.source.is_open(row) && matches!(found.as_str(), "-" | ".");
-        if begun || texts.binary_search(&row).is_ok() {
+        if begun || column.texts.binary_search(&row).is_ok() {
             let remedy = if has_decimal_comma(&found) {
                 DECIMAL_COMMA
             } else if is_moment(&found) {
@@ -132,28 +137,27 @@ impl Table<'_> {
             return IoError::NotANumber {
                 file,
                 place,
-                column,
+                column: name,
                 found,
                 remedy,
             };
         }
-        if values[row].is_infinite() {
+        if column.values.get(row).is_some_and(|value| value.is_infinite()) {
             return IoError::Infinite {
                 file,
                 place,
-                column,
+                column: name,
                 found,
             };
         }
-        let source = &self.columns[at];
-        let count = rows.clone().filter(|row| source.is_missing(*row)).count();
+        let count = rows.clone().filter(|row| column.is_missing(*row)).count();
         let examined = rows.len();
         let found = if found.is_empty() { String::from("empty") } else { found };
-        if source.is_sparse(rows) {
+        if column.is_sparse(rows) {
             return IoError::Sparse {
                 file,
                 place,
-                column,
+                column: name,
                 found,
                 count,
                 rows: examined,
@@ -162,7 +166,7 @@ impl Table<'_> {
         IoError::Missing {
             file,
             place,
-            column,
+            column: name,
             found,
             count,
             rows: examined,
@@ -178,15 +182,15 @@ pub(crate) const UNITS_ROW: &str =
 pub(crate) fn check_names(names: &[String], file: &str, notes: &mut Vec<String>) -> Result<(), IoError> {
     check_number(names.len(), file)?;
     let mut known: HashMap<&str, usize> = HashMap::new();
-    for (second, name) in names.iter().enumerate() {
+    for (second, name) in (1..).zip(names) {
         if name.is_empty() {
-            notes.push(format!("column {} has no name and is left out", second + 1));
+            notes.push(format!("column {second} has no name and is left out"));
         } else if let Some(first) = known.insert(name, second) {
             return Err(IoError::DuplicateColumn {
                 file: file.to_owned(),
                 name: shown(name),
-                first: first + 1,
-                second: second + 1,
+                first,
+                second,
             });
         }
     }
@@ -263,11 +267,10 @@ pub(crate) fn kept(table: Table<'_>, rows: Vec<usize>) -> Table<'_> {
         mut columns, source, ..
     } = table;
     for column in &mut columns {
-        column.values = rows.iter().map(|row| column.values[*row]).collect();
+        column.values = rows.iter().filter_map(|row| column.values.get(*row).copied()).collect();
         let still = |of: &[usize]| {
-            (0..rows.len())
-                .filter(|row| of.binary_search(&rows[*row]).is_ok())
-                .collect()
+            let found = rows.iter().enumerate().filter(|(_, row)| of.binary_search(row).is_ok());
+            found.map(|(at, _)| at).collect()
         };
         (column.texts, column.made) = (still(&column.texts), still(&column.made));
     }

@@ -47,27 +47,23 @@ impl Precision {
 
     /// Takes another printed number without surrounding blanks into account.
     pub(crate) fn add_bytes(&mut self, text: &[u8]) {
-        let (mut behind, mut significant, mut point) = (0, 0, false);
-        let mut exponent = 0;
-        for (at, byte) in text.iter().enumerate() {
-            match byte {
-                b'0'..=b'9' => {
-                    behind += i32::from(point);
-                    significant += i32::from(significant > 0 || *byte != b'0');
-                }
-                b'.' => point = true,
-                b'e' | b'E' => {
-                    let written = std::str::from_utf8(&text[at + 1..])
-                        .ok()
-                        .and_then(|text| text.parse().ok());
-                    exponent = written.map_or(0, |exponent: i32| exponent.clamp(-400, 400));
-                    break;
-                }
-                _ => {}
-            }
-        }
-        self.decimals = Some(self.decimals.unwrap_or(i32::MIN).max(behind - exponent));
-        self.significant = self.significant.max(significant);
+        let mut parts = text.splitn(2, |byte| matches!(byte, b'e' | b'E'));
+        let digits = parts.next().unwrap_or_default();
+        let written = parts
+            .next()
+            .and_then(|text| std::str::from_utf8(text).ok()?.parse().ok());
+        let exponent = written.map_or(0, |exponent: i32| exponent.clamp(-400, 400));
+        let behind = digits
+            .iter()
+            .skip_while(|byte| **byte != b'.')
+            .filter(|byte| byte.is_ascii_digit());
+        let significant = digits
+            .iter()
+            .filter(|byte| byte.is_ascii_digit())
+            .skip_while(|byte| **byte == b'0');
+        let decimals = count(behind).saturating_sub(exponent);
+        self.decimals = Some(self.decimals.unwrap_or(i32::MIN).max(decimals));
+        self.significant = self.significant.max(count(significant));
     }
 
     /// Takes all numbers of another part of the column into account.
@@ -84,7 +80,7 @@ impl Precision {
     /// Precision of the same numbers times a power of ten.
     pub(crate) fn shifted(self, power: i32) -> Self {
         Self {
-            decimals: self.decimals.map(|decimals| decimals - power),
+            decimals: self.decimals.map(|decimals| decimals.saturating_sub(power)),
             ..self
         }
     }
@@ -93,8 +89,11 @@ impl Precision {
     pub(crate) fn fixed_unit(self) -> (f64, f64) {
         match self.decimals {
             None => (f64::INFINITY, 0.0),
-            Some(decimals) if self.significant == 0 => (f64::INFINITY, 10_f64.powi(-decimals)),
-            Some(decimals) => (10_f64.powi(self.significant - decimals), 10_f64.powi(-decimals)),
+            Some(decimals) if self.significant == 0 => (f64::INFINITY, last_digit(decimals)),
+            Some(decimals) => (
+                10_f64.powi(self.significant.saturating_sub(decimals)),
+                last_digit(decimals),
+            ),
         }
     }
 
@@ -102,13 +101,23 @@ impl Precision {
     /// unit everywhere; with a fixed number of significant digits the unit grows with the value.
     pub(crate) fn unit(self, value: f64) -> f64 {
         let Some(decimals) = self.decimals else { return 0.0 };
-        let fixed = 10_f64.powi(-decimals);
+        let fixed = last_digit(decimals);
         let magnitude = value.abs().log10().floor();
         if self.significant == 0 || !magnitude.is_finite() {
             return fixed;
         }
-        fixed.max(10_f64.powi(magnitude as i32 + 1 - self.significant))
+        let digits = (magnitude as i32).saturating_add(1);
+        fixed.max(10_f64.powi(digits.saturating_sub(self.significant)))
     }
+}
+
+/// One unit of the last of some decimals.
+fn last_digit(decimals: i32) -> f64 {
+    10_f64.powi(decimals.saturating_neg())
+}
+
+fn count(digits: impl Iterator) -> i32 {
+    i32::try_from(digits.count()).unwrap_or(i32::MAX)
 }
 
 #[cfg(test)]

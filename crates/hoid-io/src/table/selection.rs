@@ -33,7 +33,8 @@ impl Source for Selected<'_> {
 /// The table with the columns for which `keep` is true.
 pub(crate) fn selected<'a>(table: Table<'a>, keep: impl Fn(usize, &str) -> bool) -> Table<'a> {
     let names = table.names();
-    let columns: Vec<usize> = (0..names.len()).filter(|at| keep(*at, names[*at])).collect();
+    let columns = names.iter().enumerate().filter(|(at, name)| keep(*at, name));
+    let columns: Vec<usize> = columns.map(|(at, _)| at).collect();
     if columns.len() == table.columns.len() {
         return table;
     }

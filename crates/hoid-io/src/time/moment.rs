@@ -90,10 +90,14 @@ impl Moments {
 /// Time between two clock times, s.
 pub(crate) fn seconds(ns: i64, from: i64) -> f64 {
     // Exact below 2^53 ns, a hundred days.
-    (i128::from(ns) - i128::from(from)) as f64 / NS_PER_S as f64
+    i128::from(ns).saturating_sub(i128::from(from)) as f64 / NS_PER_S as f64
 }
 
 /// Days since 1970: year first between hyphens or slashes, day first between points.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "numbers of at most five digits, in 64 bits"
+)]
 fn days_of(date: &str) -> Option<i64> {
     let mark = date.chars().find(|c| ['-', '/', '.'].contains(c))?;
     let parts: Vec<&str> = date.split(mark).collect();
@@ -126,6 +130,10 @@ fn days_of(date: &str) -> Option<i64> {
 }
 
 /// ns since midnight UTC, and decimals: `10:11:12.5`, optionally followed by `Z`, `+02:00`, AM or PM.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "numbers of at most three digits and a fraction of 1e9 ns, in 64 bits"
+)]
 fn time_of_day(text: &str) -> Option<(i64, usize)> {
     let (text, half_day) = match text.rsplit_once(' ') {
         Some((text, half)) if half.eq_ignore_ascii_case("pm") => (text, Some(12)),
@@ -158,6 +166,10 @@ fn time_of_day(text: &str) -> Option<(i64, usize)> {
 }
 
 /// Minutes east of UTC: `Z`, `+02:00`, `-0530`, `+02`.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "numbers of at most three digits, in 64 bits"
+)]
 fn zone(text: &str) -> Option<i64> {
     if text.eq_ignore_ascii_case("z") {
         return Some(0);

@@ -50,7 +50,7 @@ pub fn even_times(t: &[f64]) -> Result<f64, usize> {
     match even(t, Precision::of_times(t, false), None) {
         Ok(sampling) => Ok(sampling.sample_time_s),
         Err(Uneven::TooFew) => Err(0),
-        Err(Uneven::Gap { row, .. }) => Err(row + 1),
+        Err(Uneven::Gap { row, .. }) => Err(row.saturating_add(1)),
         Err(Uneven::NotIncreasing { row } | Uneven::Jitter { row, .. }) => Err(row),
     }
 }
@@ -72,20 +72,25 @@ pub(crate) fn even(t: &[f64], precision: Precision, stated_s: Option<f64>) -> Re
     gap(t, rounding, typical_s)?;
     let mean_s = (last - first) / steps;
     let first_unit = rounding.unit(first);
-    let tolerance = |k: usize| (JITTER * mean_s).max(rounding.unit(t[k]).max(first_unit) * (1.0 + 1e-6));
+    let tolerance = |t: f64| (JITTER * mean_s).max(rounding.unit(t).max(first_unit) * (1.0 + 1e-6));
     // The excess over the tolerance decides; NaN, from times that overflow, is excess as well.
-    let deviation = |k: usize| (t[k] - (first + k as f64 * mean_s)).abs();
-    let excess = |k: &usize| deviation(*k) - tolerance(*k);
-    let worst = (0..t.len()).max_by(|a, b| excess(a).total_cmp(&excess(b))).unwrap_or(0);
-    if !(excess(&worst) <= 0.0 && mean_s.is_finite() && mean_s > 0.0) {
+    let deviation = |k: usize, t: f64| (t - (first + k as f64 * mean_s)).abs();
+    let excess = t
+        .iter()
+        .enumerate()
+        .map(|(k, t)| (deviation(k, *t) - tolerance(*t), k, *t));
+    let (excess, row, worst) = excess
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .unwrap_or((f64::NAN, 0, first));
+    if !(excess <= 0.0 && mean_s.is_finite() && mean_s > 0.0) {
         return Err(Uneven::Jitter {
-            row: worst,
-            deviation_s: deviation(worst),
+            row,
+            deviation_s: deviation(row, worst),
             tolerance_s: tolerance(worst),
             sample_time_s: mean_s,
         });
     }
-    let end_tolerance = tolerance(t.len() - 1);
+    let end_tolerance = tolerance(last);
     let moves_end = |ts: f64| steps * (ts - mean_s).abs() > end_tolerance;
     if let Some(stated) = stated_s {
         if !moves_end(stated) {
@@ -118,17 +123,29 @@ pub(crate) fn typical(t: &[f64], precision: Precision) -> Result<f64, Uneven> {
     };
     increasing(t)?;
     let rounding = Rounding::of(t, precision);
-    let slack_s = rounding.unit(first.abs().max(last.abs())) / (t.len() - 1) as f64;
+    let slack_s = rounding.unit(first.abs().max(last.abs())) / t.len().saturating_sub(1) as f64;
     Ok(whole_hz(typical_step(t, rounding), slack_s))
 }
 
 fn increasing(t: &[f64]) -> Result<(), Uneven> {
     // Written so that NaN fails as well.
-    let standing = |pair: &[f64]| pair[1].partial_cmp(&pair[0]) != Some(std::cmp::Ordering::Greater);
-    match t.windows(2).position(standing) {
+    let standing =
+        |(_, (before, next)): &(usize, (f64, f64))| next.partial_cmp(before) != Some(std::cmp::Ordering::Greater);
+    match (1..).zip(pairs(t)).find(standing) {
         None => Ok(()),
-        Some(at) => Err(Uneven::NotIncreasing { row: at + 1 }),
+        Some((row, _)) => Err(Uneven::NotIncreasing { row }),
     }
+}
+
+/// Each value with the next one.
+pub(crate) fn pairs(values: &[f64]) -> impl Iterator<Item = (f64, f64)> {
+    let next = values.get(1..).unwrap_or_default();
+    values.iter().copied().zip(next.iter().copied())
+}
+
+/// The steps from each value to the next one.
+pub(crate) fn steps(values: &[f64]) -> impl Iterator<Item = f64> {
+    pairs(values).map(|(value, next)| next - value)
 }
 
 /// Every how many steps of a long time suffice for its median: a million.
@@ -147,8 +164,7 @@ struct Rounding {
 
 impl Rounding {
     fn of(t: &[f64], precision: Precision) -> Self {
-        let pairs = t.windows(2).step_by(every(t.len()));
-        let mut steps: Vec<f64> = pairs.map(|pair| pair[1] - pair[0]).collect();
+        let mut steps: Vec<f64> = steps(t).step_by(every(t.len())).collect();
         let middle = steps.len() / 2;
         Self {
             precision,
@@ -170,28 +186,29 @@ impl Rounding {
 /// for the rounding of t.
 fn typical_step(t: &[f64], rounding: Rounding) -> f64 {
     let median = rounding.median_step_s;
-    let (sum, count) = t
-        .windows(2)
-        .map(|pair| (pair[1] - pair[0], rounding.unit(pair[1])))
+    let (sum, count) = pairs(t)
+        .map(|(before, next)| (next - before, rounding.unit(next)))
         .filter(|(step, unit)| *step < 1.5 * median + unit)
-        .fold((0.0, 0_usize), |(sum, count), (step, _)| (sum + step, count + 1));
-    if count == 0 { median } else { sum / count as f64 }
+        .fold((0.0, 0.0), |(sum, count), (step, _)| (sum + step, count + 1.0));
+    if count == 0.0 { median } else { sum / count }
 }
 
 /// Detects missing samples. Rounding makes steps longer than the sample time by one unit, as in
 /// 0.00, 0.02, 0.03 at 60 Hz, but not by a whole unit if the sample time is itself a multiple of
 /// the unit.
 fn gap(t: &[f64], rounding: Rounding, typical_s: f64) -> Result<(), Uneven> {
-    let is_gap = |k: &usize| {
-        let step = t[k + 1] - t[*k];
-        step >= 1.5 * typical_s && step - typical_s > 0.95 * rounding.unit(t[k + 1])
+    let is_gap = |(_, (before, next)): &(usize, (f64, f64))| {
+        let step = next - before;
+        step >= 1.5 * typical_s && step - typical_s > 0.95 * rounding.unit(*next)
     };
-    let mut gaps = (0..t.len() - 1).filter(is_gap);
-    let Some(row) = gaps.next() else { return Ok(()) };
+    let mut gaps = pairs(t).enumerate().filter(is_gap);
+    let Some((row, (before, next))) = gaps.next() else {
+        return Ok(());
+    };
     Err(Uneven::Gap {
         row,
-        missing: (((t[row + 1] - t[row]) / typical_s).round() - 1.0).max(1.0) as u64,
-        gaps: 1 + gaps.count(),
+        missing: (((next - before) / typical_s).round() - 1.0).max(1.0) as u64,
+        gaps: gaps.count().saturating_add(1),
         sample_time_s: typical_s,
     })
 }

@@ -13,6 +13,7 @@
 //! that count from 1970 (1e11 s would be the year 5138); otherwise from the steps: integers at least 5 apart are not s
 //! but the unit of which 2 to 2000 steps make a second. The choice is reported.
 
+use super::sampling::{pairs, steps};
 use super::time_choice::{TimeChoice, Unit};
 use crate::IoError;
 use crate::table::{Column, Precision, Table};
@@ -56,7 +57,10 @@ fn column_role(name: &str) -> ColumnRole {
         .collect();
     let unit = words.last().filter(|_| words.len() > 1).and_then(|last| Unit::of(last));
     let unit = unit.filter(|unit| !matches!(unit, Unit::Iso | Unit::SecondsAndNanoseconds));
-    let base = words[..words.len() - usize::from(unit.is_some())].join(" ");
+    let base = match (words.as_slice(), unit) {
+        ([base @ .., _], Some(_)) => base.join(" "),
+        (all, _) => all.join(" "),
+    };
     if WORDS.contains(&base.as_str()) {
         return ColumnRole::Time(unit);
     }
@@ -118,12 +122,11 @@ fn chosen(table: &Table<'_>, choice: &TimeChoice) -> Result<(usize, Option<Unit>
         return Ok((at, Some(Unit::SecondsAndNanoseconds)));
     }
     if unit == Some(Unit::SecondsAndNanoseconds) {
-        let seconds = (0..table.columns.len()).find(|at| {
-            let name = &table.columns[*at].name;
+        let seconds = table.columns.iter().enumerate().find(|(at, Column { name, .. })| {
             let ours = *name == choice.column || name.strip_prefix(&choice.column).is_some_and(|end| end.len() < 9);
             ours && nanoseconds_of(table, *at).is_some()
         });
-        if let Some(at) = seconds {
+        if let Some((at, _)) = seconds {
             return Ok((at, unit));
         }
     } else if let Some(at) = position(&choice.column) {
@@ -139,29 +142,33 @@ fn chosen(table: &Table<'_>, choice: &TimeChoice) -> Result<(usize, Option<Unit>
     })
 }
 
-/// The only one of some columns; none if there are several.
-fn only(mut columns: impl Iterator<Item = usize>) -> Option<usize> {
-    columns.next().filter(|_| columns.next().is_none())
+/// The only column that is meant; none if there are several.
+fn only(table: &Table<'_>, is_meant: impl Fn(usize, &Column) -> bool) -> Option<usize> {
+    let all = table.columns.iter().enumerate();
+    let mut meant = all.filter(|(at, column)| is_meant(*at, column)).map(|(at, _)| at);
+    meant.next().filter(|_| meant.next().is_none())
 }
 
 /// The column that is the time by its name, type or position.
 fn found(table: &Table<'_>) -> Option<(usize, Option<Unit>)> {
-    let columns = &table.columns;
-    let is_constant = |column: &Column| column.values.iter().all(|value| *value == column.values[0]);
-    let of = |meant: &dyn Fn(&Column) -> bool| only((0..columns.len()).filter(|at| meant(&columns[*at])));
-    let unit = |at: usize| match column_role(&columns[at].name) {
-        ColumnRole::Time(unit) => unit,
-        ColumnRole::Stamp | ColumnRole::Other => None,
+    let is_constant = |values: &[f64]| values.iter().all(|value| values.first() == Some(value));
+    let unit = |at: usize| match table.columns.get(at).map(|column| column_role(&column.name)) {
+        Some(ColumnRole::Time(unit)) => unit,
+        _ => None,
     };
-    let by_name = || of(&|column| matches!(column_role(&column.name), ColumnRole::Time(_)) && column.texts.is_empty());
-    let by_type = || of(&|column| column.moments && !is_constant(column));
+    let by_name = || {
+        only(table, |_, column| {
+            matches!(column_role(&column.name), ColumnRole::Time(_)) && column.texts.is_empty()
+        })
+    };
+    let by_type = || only(table, |_, column| column.moments && !is_constant(&column.values));
     let by_stamp = || {
-        of(&|column| {
+        only(table, |_, column| {
             column_role(&column.name) == ColumnRole::Stamp
                 && column.values.iter().all(|value| *value >= STAMP || value.is_nan())
         })
     };
-    let pair = || only((0..columns.len()).filter(|at| nanoseconds_of(table, *at).is_some()));
+    let pair = || only(table, |at, _| nanoseconds_of(table, at).is_some());
     by_name()
         .or_else(by_type)
         .or_else(by_stamp)
@@ -174,31 +181,31 @@ fn found(table: &Table<'_>) -> Option<(usize, Option<Unit>)> {
 fn nanoseconds_of(table: &Table<'_>, at: usize) -> Option<usize> {
     let split = |name: &str| -> Option<(String, Option<Unit>)> {
         let lower = name.to_lowercase();
-        let from = lower.rfind(['.', '_', '/', ' ']).map_or(0, |mark| mark + 1);
-        Some((lower[..from].to_owned(), Unit::of(&lower[from..])))
+        let last = lower.rsplit(['.', '_', '/', ' ']).next()?;
+        Some((lower.strip_suffix(last)?.to_owned(), Unit::of(last)))
     };
-    let (prefix, unit) = split(&table.columns[at].name)?;
+    let column = table.columns.get(at)?;
+    let (prefix, unit) = split(&column.name)?;
     let is_whole = |column: &Column| column.values.iter().all(|value| value.fract() == 0.0);
-    if unit != Some(Unit::Power(0)) || !is_whole(&table.columns[at]) {
+    if unit != Some(Unit::Power(0)) || !is_whole(column) {
         return None;
     }
-    only((0..table.columns.len()).filter(|other| {
-        let column = &table.columns[*other];
+    only(table, |_, column| {
         split(&column.name) == Some((prefix.clone(), Some(Unit::Power(-9))))
             && column.values.iter().all(|ns| (0.0..1e9).contains(ns))
-    }))
+    })
 }
 
 /// A first column without a name, or the first line of a matrix, that increases like a time.
 fn first_line(table: &Table<'_>) -> Option<usize> {
-    let is_first = |(at, column): (usize, &Column)| {
+    let is_first = |at: usize, column: &Column| {
         let line = ["(1,:)", "(:,1)", "[0,:]", "[:,0]", "[0]"];
         (at == 0 && column.name.is_empty()) || line.iter().any(|line| column.name.ends_with(line))
     };
-    let first = only((0..table.columns.len()).filter(|at| is_first((*at, &table.columns[*at]))))?;
-    let values = &table.columns[first].values;
-    let rises = values.windows(2).all(|pair| pair[1] > pair[0]);
-    let counts = values.windows(2).all(|pair| pair[1] - pair[0] == 1.0);
+    let first = only(table, is_first)?;
+    let values = &table.columns.get(first)?.values;
+    let rises = pairs(values).all(|(value, next)| next > value);
+    let counts = steps(values).all(|step| step == 1.0);
     (values.len() > 2 && rises && !counts && values.iter().all(|value| value.is_finite())).then_some(first)
 }
 
@@ -214,11 +221,7 @@ fn unit_of(values: &[f64]) -> Unit {
     if !values.iter().all(|value| value.fract() == 0.0) {
         return Unit::Power(0);
     }
-    let mut steps: Vec<f64> = values
-        .windows(2)
-        .map(|pair| pair[1] - pair[0])
-        .filter(|step| *step > 0.0)
-        .collect();
+    let mut steps: Vec<f64> = steps(values).filter(|step| *step > 0.0).collect();
     if steps.len() < 2 {
         return Unit::Power(0);
     }
@@ -238,17 +241,16 @@ fn unit_of(values: &[f64]) -> Unit {
 /// Makes a column the time t.
 fn take(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
     let beside = nanoseconds_of(table, at).filter(|_| unit == Some(Unit::SecondsAndNanoseconds));
-    let nanoseconds = beside.map(|beside| (table.columns[beside].name.clone(), table.columns[beside].values.clone()));
-    let was_t = table.columns[at].name == "t";
-    if let Some(other) = table
-        .columns
-        .iter()
-        .position(|column| column.name == "t")
-        .filter(|other| *other != at)
+    let beside = beside.and_then(|beside| table.columns.get(beside));
+    let nanoseconds = beside.map(|column| (column.name.clone(), column.values.clone()));
+    let mut columns = table.columns.iter_mut().enumerate();
+    if let Some((other, column)) = columns.find(|(_, column)| column.name == "t")
+        && other != at
     {
-        table.columns[other].name = String::from("t as recorded");
+        column.name = String::from("t as recorded");
     }
-    let time = &mut table.columns[at];
+    let Some(time) = table.columns.get_mut(at) else { return };
+    let was_t = time.name == "t";
     let unit = match unit {
         _ if time.moments => Unit::Iso,
         Some(unit) => unit,
@@ -305,7 +307,7 @@ fn take(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
         }
         Unit::Power(0) => format!("{name} is taken as t, in s"),
         Unit::Power(power) => {
-            let parts = 10_f64.powi(-power);
+            let parts = 10_f64.powi(power.saturating_neg());
             let from_first = first / parts >= STAMP;
             scale(time, parts, if from_first { first } else { 0.0 }, true);
             time.precision = time.precision.shifted(power);

@@ -282,6 +282,7 @@ impl Source for LongSource<'_> {
 #[cfg(test)]
 mod tests {
     use std::fmt::Write as _;
+    use std::io::Write as _;
 
     use super::super::table::parse;
     use super::*;
@@ -349,6 +350,39 @@ mod tests {
         let quoted = format!("{},\"go\",{}", &text[..last], &text[last + 4..]);
         let found = of_length(self::file(&quoted).path(), "run.csv", &options, 0).unwrap();
         assert!(found.is_none());
+    }
+
+    /// A recorder may still write to it.
+    #[test]
+    fn a_file_may_grow_while_it_is_read() {
+        let written = text(40_000, 40_000);
+        let file = file(&written);
+        let mut growing = Text {
+            file: File::open(file.path()).unwrap(),
+            at: 0,
+            buffer: Vec::new(),
+            lines: 0,
+            length: 1000,
+            next: BLOCK,
+        };
+        growing.advance().unwrap();
+        assert!(growing.lines > growing.length);
+        assert_eq!(growing.probed(0, b',').unwrap().len(), PROBES as usize);
+    }
+
+    /// Room for the rows of a length that no memory has.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_file_of_holes_is_left_to_the_reader_of_whole_texts() {
+        let rows = "1,2\n".repeat(100_000);
+        let file = file(&format!("t,e\n{rows}x,\"y\"\n"));
+        let mut whole = File::options().write(true).open(file.path()).unwrap();
+        // Where the file system has no files of this length, there is nothing to test.
+        let end = whole.set_len(1 << 43).and_then(|()| whole.seek(SeekFrom::End(-1)));
+        if end.and_then(|_| whole.write_all(b"\n")).is_ok() {
+            let found = of_length(file.path(), "run.csv", &ReadOptions::default(), 0);
+            assert!(found.unwrap().is_none());
+        }
     }
 
     #[test]
