@@ -1,6 +1,6 @@
 //! Errors that were predicted against the scatter of simulated experiments: a sample of `cargo xtask slow design-errors`.
 //!
-//! Of 100 experiments the standard deviation of a parameter has an error of 7 %: 22 % are three of them.
+//! Of 200 experiments the standard deviation of a parameter has an error of 5 %: 15 % are three of them.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "common/simulated.rs"]
@@ -8,7 +8,7 @@ mod simulated;
 
 use simulated::CASES;
 
-const EXPERIMENTS: u64 = 100;
+const EXPERIMENTS: u64 = 200;
 
 #[test]
 fn the_scatter_is_what_was_predicted() {
@@ -19,7 +19,7 @@ fn the_scatter_is_what_was_predicted() {
                 "{}: {} {:.3}, predicted {:.4}, {:.3} of it, off by {:.2}",
                 case.name, q.name, q.value, q.predicted, q.ratio, q.off
             );
-            assert!((q.ratio - 1.0).abs() < 0.22, "{}: {} {}", case.name, q.name, q.ratio);
+            assert!((q.ratio - 1.0).abs() < 0.15, "{}: {} {}", case.name, q.name, q.ratio);
         }
     }
 }
