@@ -64,6 +64,7 @@ impl State for DelayBank {
             member.visit(each);
         }
         visit_all(&mut [&mut self.evidence.as_mut_slice(), &mut self.best], each);
+        self.best = self.best.min(self.members.len().saturating_sub(1));
     }
 }
 

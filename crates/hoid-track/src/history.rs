@@ -22,6 +22,7 @@ pub struct History {
 impl State for History {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         visit_all(&mut [&mut self.values.as_mut_slice(), &mut self.at], each);
+        self.at = self.at.min(self.n);
     }
 }
 
@@ -71,6 +72,16 @@ mod tests {
                 assert_eq!(past.newest(), expected);
             }
         }
+    }
+
+    /// Restored from numbers that were changed.
+    #[test]
+    fn the_newest_ones_are_within() {
+        let mut past = History::new(3);
+        past.visit(&mut |number| *number = 1e18);
+        assert_eq!(past.newest().len(), 3);
+        past.push(1.0);
+        assert_eq!(past.newest()[0], 1.0);
     }
 
     #[test]

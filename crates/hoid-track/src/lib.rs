@@ -72,6 +72,7 @@ mod guard;
 mod history;
 mod idle;
 mod kernel;
+#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod live;
 mod memory;
 mod method;
@@ -87,10 +88,13 @@ mod recursion;
 mod reported;
 mod request;
 mod response;
+#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod saved;
+#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod seal;
 mod setup;
 mod shared_options;
+#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod stage;
 mod start;
 mod start_noise;

@@ -85,10 +85,11 @@ impl Tracker {
             reason: "the numbers of the saved tracker were changed or cut since; save it again".to_owned(),
         })?;
         let p = options.parameter_names().len();
+        let square = p.saturating_mul(p);
         let mut start = StartState {
             values: vec![0.0; p],
-            covariance: vec![0.0; p * p],
-            spread: vec![0.0; p * p],
+            covariance: vec![0.0; square],
+            spread: vec![0.0; square],
             variance: 0.0,
             residuals: 0.0,
             from_fit: false,
@@ -118,5 +119,55 @@ impl Tracker {
             return Err(wrong());
         }
         Ok(tracker)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_model::scenario::{Condition, Scenario};
+    use hoid_sim::{RunSeed, Simulator};
+
+    use super::*;
+    use crate::{Method, TrackOptions};
+
+    /// Each number in turn, sealed again after the change: no index, length or difference of counters ends the process.
+    fn each_number_may_be_anything(with: &[(&str, &str)], saved_at: usize, to: usize) {
+        let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();
+        let record = simulator.run(RunSeed::default(), false).unwrap();
+        let span = record.span(0.0, 20.0).unwrap();
+        let options = TrackOptions::default_for(Method::rpem(), 29).with(with).unwrap();
+        let mut tracker = Tracker::new(&options, Some(&span), record.sample_time()).unwrap();
+        // A gap, within which the tracker is saved.
+        let step = |tracker: &mut Tracker, k: usize| {
+            let gap = (2300..2360).contains(&k);
+            tracker.step(record.input()[k], if gap { f64::NAN } else { record.output()[k] })
+        };
+        for k in 2000..saved_at {
+            step(&mut tracker, k);
+        }
+        let numbers = tracker.saved();
+        for at in 0..numbers.len() - 1 {
+            for number in [0.0, 1e18] {
+                let mut changed = numbers[..numbers.len() - 1].to_vec();
+                changed[at] = number;
+                let restored = Tracker::restored(&options, record.sample_time(), &sealed(changed));
+                let Ok(mut restored) = restored else { continue };
+                for k in saved_at..to {
+                    step(&mut restored, k);
+                }
+                assert!(restored.since_restart_s().is_none_or(|s| s < 1e18), "number {at}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_guard_takes_any_numbers() {
+        each_number_may_be_anything(&[("guard", "yes")], 2350, 2600);
+    }
+
+    #[test]
+    fn a_bank_of_delays_takes_any_numbers() {
+        each_number_may_be_anything(&[("track_delay", "0.28..0.3")], 2050, 2060);
     }
 }

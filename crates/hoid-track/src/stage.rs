@@ -19,6 +19,8 @@ pub type Choose<'a> = &'a dyn Fn(&Record) -> Result<(TrackOptions, Option<Choice
 const QUARTER: usize = 4;
 /// Length that is kept of a warm-up that continues, as a multiple of its length.
 const KEPT: usize = 2;
+/// Place of the number of kept samples in a saved warm-up.
+const COUNT: usize = 4;
 /// Longest run of faulty samples within a warm-up, s; after a longer one the warm-up restarts.
 const LONGEST_FAULT_S: f64 = 1.0;
 
@@ -114,7 +116,8 @@ impl Stage {
                 }
             }
             Err(error) => {
-                warm_up.needed = warm_up.collected + (warm_up.length / QUARTER).max(1);
+                let more = (warm_up.length / QUARTER).max(1);
+                warm_up.needed = warm_up.collected.saturating_add(more);
                 warm_up.trouble = Some(error.to_string());
                 LiveOutcome::default()
             }
@@ -178,7 +181,10 @@ impl WarmUp {
     /// that were changed or cut.
     pub fn restored(sample_time: SampleTime, numbers: &[f64]) -> Option<Self> {
         let mut warm_up = Self::new(0, sample_time);
-        let mut left = opened(numbers)?.iter();
+        let numbers = opened(numbers)?;
+        // Room for the samples is made before they are read: there are no more of them than numbers.
+        numbers.get(COUNT).filter(|kept| **kept <= numbers.len() as f64)?;
+        let mut left = numbers.iter();
         let mut lacking = false;
         warm_up.visit(&mut |number| match left.next() {
             Some(saved) => *number = *saved,
@@ -202,7 +208,7 @@ impl WarmUp {
     /// Takes a sample. The collection starts with a sound sample, and restarts after a long fault.
     fn collect(&mut self, sample: Sample) {
         let sound = sample.e.is_finite() && sample.u.is_finite();
-        self.faulty = if sound { 0 } else { self.faulty + 1 };
+        self.faulty = if sound { 0 } else { self.faulty.saturating_add(1) };
         if self.samples.is_empty() && !sound {
             return;
         }
@@ -213,11 +219,11 @@ impl WarmUp {
             ));
             return;
         }
-        if self.samples.len() == KEPT * self.length {
+        if self.samples.len() >= KEPT.saturating_mul(self.length) {
             self.samples.pop_front();
         }
         self.samples.push_back(sample);
-        self.collected += 1;
+        self.collected = self.collected.saturating_add(1);
     }
 
     /// Leaves out the idle head, and collects as many samples in its place; false if there is none.
@@ -228,7 +234,7 @@ impl WarmUp {
             return false;
         }
         self.samples.drain(..idle.min(self.samples.len()));
-        self.needed = self.collected + idle;
+        self.needed = self.collected.saturating_add(idle);
         self.trouble = Some(format!(
             "neither e nor u moved for {:.1} s: left out, the warm-up continues",
             idle as f64 * self.sample_time.s()
@@ -265,5 +271,37 @@ impl WarmUp {
         }
         let reference = channel("f_t", |s| s.reference.unwrap_or(f64::NAN));
         Ok(record.with_channel(reference)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_warm_up_has_no_more_samples_than_its_numbers() {
+        let sample_time = SampleTime::new(0.01).unwrap();
+        let mut warm_up = WarmUp::new(100, sample_time);
+        let sample = Sample {
+            e: 1.0,
+            u: 2.0,
+            reference: Some(3.0),
+        };
+        (0..3).for_each(|_| warm_up.collect(sample));
+        let numbers = warm_up.saved();
+        assert_eq!(WarmUp::restored(sample_time, &numbers).unwrap().saved(), numbers);
+        // Changed and sealed again: room for 1e15 samples would end the process.
+        for kept in [4.0, 1e15, f64::INFINITY, f64::NAN] {
+            let mut changed = opened(&numbers).unwrap().to_vec();
+            (changed[0], changed[COUNT]) = (1e15, kept);
+            assert!(WarmUp::restored(sample_time, &sealed(changed)).is_none());
+        }
+        // A length of any size is one that is never reached.
+        let mut changed = opened(&numbers).unwrap().to_vec();
+        changed[0] = f64::INFINITY;
+        let mut restored = WarmUp::restored(sample_time, &sealed(changed)).unwrap();
+        restored.collect(sample);
+        assert_eq!(restored.samples.len(), 4);
     }
 }

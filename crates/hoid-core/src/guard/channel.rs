@@ -88,9 +88,14 @@ pub struct ChannelGuard {
 
 crate::state!([] ChannelGuard {
     last, differences, known, quantiles, inner, heavy, averaged, watching, resting, order, floor, held, size, base, slope, damping,
-});
+}, bounded);
 
 impl ChannelGuard {
+    fn bounded(&mut self) {
+        self.known = self.known.min(ORDERS);
+        self.order = self.order.min(ORDERS - 1);
+    }
+
     /// A signal without prior knowledge: all samples pass until [`ChannelGuard::set_quantiles`].
     pub fn new(sample_time: f64) -> Self {
         Self {

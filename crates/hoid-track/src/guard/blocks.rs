@@ -14,7 +14,7 @@ impl Guard {
     pub(super) fn end_block(&mut self, recursion: &mut dyn Recursion) {
         self.channels.iter_mut().for_each(ChannelGuard::end_block);
         let block = self.block.means();
-        let enough = 2 * block.samples >= self.block_length;
+        let enough = block.samples >= self.block_length.div_ceil(2);
         self.block = Block::default();
         self.in_block = 0;
         if !enough {

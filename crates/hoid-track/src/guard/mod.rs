@@ -46,6 +46,7 @@ mod holding;
 mod options;
 mod pausing;
 mod prime;
+#[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod snapshot;
 
 use hoid_core::{
@@ -195,8 +196,11 @@ impl State for Guard {
         if let Some(reference) = &mut self.reference {
             reference.visit(each);
         }
-        // The next held-back sample takes its place.
+        // The next held-back sample takes its place. A pause, a snapshot and a restart are not later than now.
         self.in_ring = self.in_ring.min(self.ring.len().saturating_sub(1));
+        self.pause.first = self.pause.first.min(self.samples);
+        self.sound_at = self.sound_at.map(|at| at.min(self.samples));
+        self.restarted_at = self.restarted_at.min(self.samples);
         self.pause.kind = self.pause.kind.min(GuardKind::ALL.len());
         self.pause.channel = self.pause.channel.min(GuardChannel::ALL.len() - 1);
     }
