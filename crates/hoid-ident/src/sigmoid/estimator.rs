@@ -17,10 +17,12 @@ use crate::{
     family::{FamilyEstimator, Intersample},
     informative_data::{check_record, common_sample_time},
     level::without_level,
+    optimize::Reason,
 };
 
-/// Highest order of the noise model that is chosen.
+/// Highest order of the noise model that is chosen, and the order without a choice: for exact data and a given start.
 const MOST_NOISE: usize = 12;
+const DEFAULT_NOISE: usize = 1;
 /// Number of lower minima that the walks along t_M and G may find before the fit is stopped at the last one.
 const MOST_LOWER: usize = 10;
 
@@ -48,12 +50,15 @@ impl SigmoidChange {
             };
             ordered.fit_from(records, (sample_time, off_level), guess.as_deref())
         };
-        match self.nd.or(order) {
-            None => with_noise(self.nd_of_start()),
-            // Exact data determine no noise model; that of first order has a start of its own.
-            Some(nd) if self.nd.is_none() && nd > 1 => with_noise(nd).or_else(|_| with_noise(1)),
-            Some(nd) => with_noise(nd),
-        }
+        let chosen = match self.nd.or(order) {
+            // Exact data determine no noise model: the one of first order is as good as any.
+            Some(nd) if self.nd.is_none() && nd > 1 => {
+                let is_exact = |fit: &SigmoidFit| fit.termination().reason == Reason::ExactFit;
+                with_noise(nd).ok().filter(|fit| !is_exact(fit))
+            }
+            _ => None,
+        };
+        chosen.map_or_else(|| with_noise(self.nd.unwrap_or(DEFAULT_NOISE)), Ok)
     }
 
     /// The operator without a change, of which starts are made.
@@ -66,13 +71,6 @@ impl SigmoidChange {
             intersample: Intersample::Zoh,
             ..FamilyEstimator::default()
         }
-    }
-
-    /// Order of the noise that a given start has; 1 without one.
-    fn nd_of_start(&self) -> usize {
-        let others = Layout::new(self.form, self.neuromuscular, 0).len();
-        let of_start = self.start.as_ref().map(|start| start.len().saturating_sub(others));
-        of_start.unwrap_or(1)
     }
 
     fn fit_from(
@@ -134,11 +132,7 @@ impl SigmoidChange {
     }
 
     fn layout(&self) -> Layout {
-        Layout::new(
-            self.form,
-            self.neuromuscular,
-            self.nd.unwrap_or_else(|| self.nd_of_start()),
-        )
+        Layout::new(self.form, self.neuromuscular, self.nd.unwrap_or(DEFAULT_NOISE))
     }
 
     /// Returns name and theta of each start.

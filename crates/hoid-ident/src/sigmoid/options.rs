@@ -28,7 +28,7 @@ pub struct SigmoidChange {
     /// Prior knowledge of the person; that of T_L is used before and after the change. Default: none.
     pub prior: OperatorPrior,
     /// Order nd of D; `None` for the best by Schwarz's criterion, from 1 to 12, for the part of u that one operator
-    /// leaves. Default `None`.
+    /// leaves; 1 with a given start. Default `None`.
     pub nd: Option<usize>,
     /// Shortest and longest delay tau_e, s; any fraction of a sample. Equal ends fix it.
     pub delay_range_s: (f64, f64),
@@ -107,13 +107,15 @@ impl BatchOptions for SigmoidChange {
             shared::prior("none", |how: &mut Self| &mut how.prior)
                 .printed("prior", |how, _| Some(how.prior.to_string())),
             BatchOption::new(
-                shared::orders("nd of its noise by BIC, up to 12"),
+                shared::orders("nd=1..12"),
                 |how: &mut Self, option, text| {
                     *how = how.clone().with_noise_orders(&option.read(text)?)?;
                     Ok(())
                 },
             )
-            .printed("orders", |how, _| how.nd.map(|nd| format!("nd={nd}"))),
+            .printed("orders", |how, _| {
+                Some(how.nd.map_or("nd=1..12".to_owned(), |nd| format!("nd={nd}")))
+            }),
             shared::delay_range(
                 default.delay_range_s,
                 |how: &mut Self| &mut how.delay_range_s,
