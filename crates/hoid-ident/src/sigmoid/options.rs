@@ -106,13 +106,10 @@ impl BatchOptions for SigmoidChange {
                 .printed("neuromuscular", |how, _| Some(shared::yes_words(how.neuromuscular))),
             shared::prior("none", |how: &mut Self| &mut how.prior)
                 .printed("prior", |how, _| Some(how.prior.to_string())),
-            BatchOption::new(
-                shared::orders("nd=1..12"),
-                |how: &mut Self, option, text| {
-                    *how = how.clone().with_noise_orders(&option.read(text)?)?;
-                    Ok(())
-                },
-            )
+            BatchOption::new(shared::orders("nd=1..12"), |how: &mut Self, option, text| {
+                *how = how.clone().with_noise_orders(&option.read(text)?)?;
+                Ok(())
+            })
             .printed("orders", |how, _| {
                 Some(how.nd.map_or("nd=1..12".to_owned(), |nd| format!("nd={nd}")))
             }),
