@@ -50,14 +50,12 @@ impl SigmoidChange {
             };
             ordered.fit_from(records, (sample_time, off_level), guess.as_deref())
         };
-        let chosen = match self.nd.or(order) {
-            // Exact data determine no noise model: the one of first order is as good as any.
-            Some(nd) if self.nd.is_none() && nd > 1 => {
-                let is_exact = |fit: &SigmoidFit| fit.termination().reason == Reason::ExactFit;
-                with_noise(nd).ok().filter(|fit| !is_exact(fit))
-            }
-            _ => None,
-        };
+        // Exact data determine no noise model: the one of first order is as good as any.
+        let is_exact = |fit: &SigmoidFit| fit.termination().reason == Reason::ExactFit;
+        let chosen = order
+            .filter(|nd| self.nd.is_none() && *nd > DEFAULT_NOISE)
+            .and_then(|nd| with_noise(nd).ok())
+            .filter(|fit| !is_exact(fit));
         chosen.map_or_else(|| with_noise(self.nd.unwrap_or(DEFAULT_NOISE)), Ok)
     }
 
@@ -125,8 +123,8 @@ impl SigmoidChange {
         }
     }
 
-    /// Returns the names of the parameters of this form and noise model (of first order if its order is chosen): `K_e1`, `K_e2`, `T_L1`, `T_L2`, `t_M`, `G`,
-    /// `omega_nm`, `zeta_nm`, `tau_e`, `d1` ... for a gain and a lead.
+    /// Returns the names of the parameters of this form and noise model (of first order if its order is chosen): `K_e1`,
+    /// `K_e2`, `T_L1`, `T_L2`, `t_M`, `G`, `omega_nm`, `zeta_nm`, `tau_e`, `d1` ... for a gain and a lead.
     pub fn names(&self) -> Vec<String> {
         self.layout().names()
     }
