@@ -129,6 +129,11 @@ impl SigmoidChange {
         self.layout().names()
     }
 
+    /// Returns the names of all parameters that a fit may have: as [`Self::names`], with every `d` that can be chosen.
+    pub fn most_names(&self) -> Vec<String> {
+        Layout::new(self.form, self.neuromuscular, self.nd.unwrap_or(MOST_NOISE)).names()
+    }
+
     fn layout(&self) -> Layout {
         Layout::new(self.form, self.neuromuscular, self.nd.unwrap_or(DEFAULT_NOISE))
     }

@@ -19,6 +19,9 @@ const MISSING: [&str; 16] = [
     "-1.#qnan",
 ];
 
+/// U+2212.
+const MINUS: char = '\u{2212}';
+
 impl Cell {
     /// Interprets the text of a cell: empty cells, NaN and the words of [`MISSING`] are missing values.
     pub(crate) fn parse(text: &str) -> Self {
@@ -27,6 +30,11 @@ impl Cell {
             Ok(value) if value.is_nan() => Self::Missing,
             Ok(value) => Self::Number(value),
             Err(_) if MISSING.iter().any(|word| text.eq_ignore_ascii_case(word)) => Self::Missing,
+            // The minus sign of typography, which spreadsheets of some languages write.
+            Err(_) if text.contains(MINUS) => match text.replace(MINUS, "-").parse::<f64>() {
+                Ok(value) if !value.is_nan() => Self::Number(value),
+                _ => Self::Text,
+            },
             Err(_) => Self::Text,
         }
     }
@@ -70,17 +78,19 @@ mod tests {
         ] {
             assert_eq!(Cell::parse(missing), Cell::Missing, "{missing:?}");
         }
-        for text in ["1,5", "abc", "1 2", "--1", "0x10", "1_000", "-.", "nothing"] {
+        for text in ["1,5", "abc", "1 2", "--1", "0x10", "1_000", "-.", "nothing", "1\u{2212}2", "\u{2212}\u{2212}1"] {
             assert_eq!(Cell::parse(text), Cell::Text, "{text:?}");
         }
         assert_eq!(Cell::parse(" -1.5e-3 "), Cell::Number(-1.5e-3));
         assert_eq!(Cell::parse("+.5"), Cell::Number(0.5));
+        assert_eq!(Cell::parse("\u{2212}1.5e\u{2212}3"), Cell::Number(-1.5e-3));
         assert_eq!(Cell::parse("1e999"), Cell::Number(f64::INFINITY));
     }
 
     #[test]
     fn decimal_commas_and_moments() {
         assert_eq!(with_decimal_point("-1,5e-3", true), "-1.5e-3");
+        assert_eq!(Cell::parse(&with_decimal_point("\u{2212}1,5", true)), Cell::Number(-1.5));
         for cell in ["1,5", "a,b", "1,234,567", "1.5"] {
             assert_eq!(with_decimal_point(cell, cell != "1,5"), cell);
         }

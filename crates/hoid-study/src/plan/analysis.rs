@@ -117,7 +117,7 @@ pub(crate) fn parameters(asked: &ResolvedRequest) -> Vec<String> {
             how.estimator.forms.iter().flat_map(of).map(str::to_owned).collect()
         }
         ResolvedRequest::Change(how) => {
-            let mut names = how.estimator.names();
+            let mut names = how.estimator.most_names();
             // Not a parameter of the fit, but a product of some that change.
             let all = how.estimator.form.parameters(how.estimator.neuromuscular).into_iter();
             let products = all.filter(|name| matches!(*name, "K" | "K_e_dot"));

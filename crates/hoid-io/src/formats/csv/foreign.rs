@@ -1,5 +1,5 @@
 //! Text of other programs, converted to what the table reader accepts: UTF-16 and Latin 1, lines
-//! above the header, columns separated by blanks.
+//! above the header, a line of units below it, columns separated by blanks.
 //!
 //! The conversion works line by line on the bytes, so that messages still refer to the lines of the file.
 
@@ -29,12 +29,19 @@ pub(super) fn made_plain(bytes: &mut Vec<u8>) -> Vec<String> {
     let Ok(text) = std::str::from_utf8(bytes) else {
         return notes;
     };
+    let above = units_above(text);
+    if above.is_some() {
+        notes.push(String::from("the line below the header is taken as its units"));
+    }
+    let text = above.as_deref().unwrap_or(text);
     if let Some(tabs) = between_tabs(text) {
         *bytes = tabs.into_bytes();
         notes.push(String::from("blanks divide its columns"));
     } else if let Some((lines, without)) = without_preamble(text) {
         *bytes = without.into_bytes();
         notes.push(format!("lines above the header are left out: {lines}"));
+    } else if let Some(above) = above {
+        *bytes = above.into_bytes();
     }
     notes
 }
@@ -85,6 +92,70 @@ fn between_tabs(text: &str) -> Option<String> {
         };
         text.lines().map(|text| line(text) + "\n").collect()
     })
+}
+
+/// Units by which a line of units is recognised; its others may be any short words.
+const UNITS: [&str; 24] = [
+    "s", "sec", "ms", "us", "µs", "min", "deg", "°", "rad", "mrad", "deg/s", "rad/s", "m", "mm", "cm", "ft", "m/s", "v",
+    "mv", "ma", "n", "nm", "%", "hz",
+];
+
+/// The unit that a cell below the header names, without brackets; none if it names something else.
+fn unit(cell: &str) -> Option<&str> {
+    let cell = unquoted(cell);
+    let inside = [('[', ']'), ('(', ')')]
+        .into_iter()
+        .find_map(|(open, close)| cell.strip_prefix(open)?.strip_suffix(close));
+    let unit = inside.unwrap_or(cell).trim();
+    let is_unit = unit.chars().count() <= 12 && !unit.contains([' ', ',']) && !unit.starts_with(|c: char| c.is_ascii_digit());
+    (is_unit && !is_number(unit)).then_some(unit)
+}
+
+fn unquoted(cell: &str) -> &str {
+    cell.trim().trim_matches('"').trim()
+}
+
+/// A line of units between the header and the first numbers becomes the comment `# units: t s, e deg` above the header.
+fn units_above(text: &str) -> Option<String> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let lines = text.lines().take(LINES).enumerate();
+    let filled: Vec<(usize, &str)> = lines.filter(|(_, line)| !is_aside(line)).collect();
+    let found = filled.windows(3).find_map(|lines| {
+        let [(at, header), (below, line), (_, row)] = lines else {
+            return None;
+        };
+        let mark = char::from(separator(header));
+        let cells = |line: &'_ str| -> Vec<String> {
+            match header.contains(mark) {
+                true => line.split(mark).map(str::to_owned).collect(),
+                false => line.split_whitespace().map(str::to_owned).collect(),
+            }
+        };
+        let (names, below_them, numbers) = (cells(header), cells(line), cells(row));
+        let count = names.len();
+        let is_row = numbers.len() == count && numbers.iter().filter(|cell| is_number(cell)).count() > count / 2;
+        if count < 2 || below_them.len() != count || !is_row || names.iter().any(|name| is_number(name)) {
+            return None;
+        }
+        let units: Vec<&str> = below_them.iter().map(|cell| unit(cell)).collect::<Option<_>>()?;
+        let is_known = |unit: &&str| UNITS.iter().any(|known| unit.to_lowercase() == *known);
+        if !units.iter().any(is_known) {
+            return None;
+        }
+        let named = names.iter().zip(units).filter(|(_, unit)| !matches!(*unit, "" | "-"));
+        let named: Vec<String> = named.map(|(name, unit)| format!("{} {unit}", unquoted(name))).collect();
+        Some((*at, *below, format!("# units: {}", named.join(", "))))
+    });
+    let (at, below, units) = found?;
+    let lines: Vec<&str> = text.split_inclusive('\n').collect();
+    let header = lines.get(at)?;
+    let end = if header.ends_with("\r\n") { "\r\n" } else { "\n" };
+    let placed = |(number, line): (usize, &&str)| match number {
+        n if n == at => format!("{units}{end}"),
+        n if n == below => (*header).to_owned(),
+        _ => (*line).to_owned(),
+    };
+    Some(lines.iter().enumerate().map(placed).collect())
 }
 
 /// Marks the lines above the header as comments, and returns their number. The header is the first
@@ -167,7 +238,9 @@ mod tests {
         );
         for same in [
             "t,e,u\n0,1,2\n",
-            "t,e,u\ns,deg,deg\n0,1,2\n",
+            "t,e,u\nstart,here,now\n0,1,2\n",
+            "t,e,u\ns,deg\n0,1,2\n",
+            "t,e,u\ns,deg,deg\na,b,c\n",
             "t e u\n0 1\n",
             "",
             "1,2\n3,4\n",
@@ -175,5 +248,21 @@ mod tests {
         ] {
             assert_eq!(plain(same.as_bytes()), (same.to_owned(), 0), "{same:?}");
         }
+    }
+
+    #[test]
+    fn units_below_the_header() {
+        let with_units = "# units: t s, e deg, u V\nt,e,u\n0,1,2\n";
+        for text in [
+            "t,e,u\ns,deg,V\n0,1,2\n",
+            "\u{feff}t,e,u\n[s],(deg),\"V\"\n0,1,2\n",
+        ] {
+            assert_eq!(plain(text.as_bytes()), (with_units.to_owned(), 1));
+        }
+        let text = b"Session 4\n\"t\";e;u\r\ns;;-\r\n0,0;1;2\r\n";
+        let found = "#Session 4\n# units: t s\r\n\"t\";e;u\r\n0,0;1;2\r\n";
+        assert_eq!(plain(text), (found.to_owned(), 2));
+        let found = "# units: t s, e deg\nt\te\n0\t1\n0.1\t2\n";
+        assert_eq!(plain(b"t e\ns deg\n0 1\n0.1 2\n"), (found.to_owned(), 2));
     }
 }
