@@ -40,6 +40,25 @@ def test_factors_are_given_as_texts_or_names(group_results: Path) -> None:
     assert [d["factor"] for d in both.differences] == ["condition", "training", "condition × training"]
 
 
+def test_a_mixed_model_of_two_conditions_is_the_paired_difference(group_results: Path) -> None:
+    found = pyhoid.compare(group_results, of=["crossover", "tau_e"])
+    unweighted = found.differences[0]["unweighted"]
+    model = found.mixed_model("crossover")
+    assert model.params["C(condition)[T.so]"] == pytest.approx(unweighted["value"], rel=1e-6)
+    assert model.bse["C(condition)[T.so]"] == pytest.approx(unweighted["standard_error"], rel=1e-3)
+    rows = found.to_dataframe("estimates")
+    rows["trained"] = rows["subject"].isin(["P09", "P11"])
+    assert "trained[T.True]" in found.mixed_model("crossover", "trained + condition", rows).params
+    with pytest.raises(pyhoid.OptionError, match="expected crossover, tau_e"):
+        found.mixed_model("speed")
+
+
+def test_a_bayes_factor_is_that_of_the_unweighted_test(group_results: Path) -> None:
+    found = pyhoid.compare(group_results, of=["crossover"])
+    factor = found.differences[0]["bayes_factor"]
+    assert factor > 3 and found.to_dataframe()["bayes_factor"][0] == factor
+
+
 def test_mistakes_are_told(group_results: Path, tmp_path: Path) -> None:
     with pytest.raises(pyhoid.OptionError, match="expected crossover"):
         pyhoid.compare(group_results, of="speed")

@@ -219,7 +219,10 @@ fn errors_name_line_column_and_remedy() {
     );
     says(
         "t,e,u\nframes,counts,counts\n0,1,2\n1,1,2\n",
-        &["line 2, column t: found \"frames\"", "remove it and report them with --unit"],
+        &[
+            "line 2, column t: found \"frames\"",
+            "remove it and report them with --unit",
+        ],
     );
     says(
         "t,e,u\n2024-03-01 10:00:00.00,1,2\n0.02,1,2\n",

@@ -340,6 +340,7 @@ fn of_differences(all: &[Value]) -> Vec<Column> {
         column("t", numbers(&|d| number(&d["t"]))),
         column("p", numbers(&|d| number(&d["p"]))),
         column("p_adjusted", numbers(&|d| number(&d["p_adjusted"]))),
+        column("bayes_factor", numbers(&|d| number(&d["bayes_factor"]))),
         column("effect", text(&|d| word(&d["effect_size"], "name"))),
         column("size", numbers(&|d| number(&d["effect_size"]["value"]))),
     ]

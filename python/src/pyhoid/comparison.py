@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import _pyhoid
 from ._written import Written
+from .errors import OptionError
 
 if TYPE_CHECKING:
     from typing import Literal
@@ -58,6 +59,46 @@ class Comparison(Written):
         import pandas as pd
 
         return pd.DataFrame([_flat(row) for row in getattr(self, table)])
+
+    def mixed_model(self, quantity: str, fixed: str = "C(condition)", data: pd.DataFrame | None = None) -> Any:
+        """A linear mixed model of the estimates, with an intercept of each person (statsmodels, restricted likelihood).
+
+        Each estimate counts the same, whatever its standard error: for designs that `compare` does not have.
+
+        Parameters
+        ----------
+        quantity : str
+            One that was compared.
+        fixed : str
+            The fixed effects, as a formula over the columns of ``to_dataframe("estimates")``.
+        data : pandas.DataFrame, optional
+            That table with columns of your own.
+
+        Returns
+        -------
+        statsmodels.regression.mixed_linear_model.MixedLMResults
+
+        Raises
+        ------
+        OptionError
+            For a quantity that was not compared.
+
+        Examples
+        --------
+        >>> found.mixed_model("crossover").summary()
+        >>> rows = found.to_dataframe("estimates")
+        >>> rows["axis"] = rows["condition"].str[-1]
+        >>> rows["trained"] = rows["subject"].isin(["S3", "S4"])
+        >>> found.mixed_model("crossover", "axis * trained", rows).params
+        """
+        from statsmodels.formula.api import mixedlm  # type: ignore[import-untyped]
+
+        rows = self.to_dataframe("estimates") if data is None else data
+        known = sorted(set(rows["quantity"]))
+        if quantity not in known:
+            raise OptionError(f"quantity: found {quantity!r}, expected {', '.join(known)}")
+        rows = rows[rows["quantity"] == quantity]
+        return mixedlm(f"value ~ {fixed}", rows, groups=rows["subject"]).fit(reml=True)
 
     def to_svg(self) -> str:
         """People by condition with the mean and its interval, as the text of an SVG file.

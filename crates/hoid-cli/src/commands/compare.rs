@@ -78,7 +78,7 @@ fn page(found: &Comparison, verbose: bool) -> String {
     let mut page = format!(
         "{}\n\n{}\n",
         text::verdict(&found.verdict).trim_end(),
-        differences(found)
+        differences(found, verbose)
     );
     page.push_str(
         "Mean over people ± standard error; people are weighted by their errors and the variance between them; intervals of 95 % \
@@ -101,7 +101,7 @@ fn page(found: &Comparison, verbose: bool) -> String {
     page
 }
 
-fn differences(found: &Comparison) -> Rows {
+fn differences(found: &Comparison, verbose: bool) -> Rows {
     let all = &found.differences;
     let several = all.iter().any(|d| d.factor != all[0].factor);
     let adjusted = all.iter().any(|d| d.p_adjusted != d.estimate.p);
@@ -115,6 +115,7 @@ fn differences(found: &Comparison) -> Rows {
     header.extend(several.then_some("factor"));
     header.extend(["levels", "difference", "95 % from", "to", "t (df)", "p"]);
     header.extend(adjusted.then_some("adjusted"));
+    header.extend(verbose.then_some("BF10"));
     header.extend([size.copied().unwrap_or("size"), "n"]);
     let mut rows = text::table(&header);
     for d in all {
@@ -141,6 +142,10 @@ fn differences(found: &Comparison) -> Rows {
             numbers::significant(d.estimate.p, 2),
         ]);
         cells.extend(adjusted.then(|| numbers::significant(d.p_adjusted, 2)));
+        cells.extend(verbose.then(|| {
+            d.bayes_factor
+                .map_or_else(String::new, |factor| numbers::significant(factor, 2))
+        }));
         cells.extend([of_size, d.people.len().to_string()]);
         rows.add_row(cells);
     }

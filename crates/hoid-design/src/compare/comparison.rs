@@ -70,6 +70,9 @@ pub struct Difference {
     pub p_adjusted: f64,
     /// Effect size of the difference.
     pub effect_size: Option<EffectSize>,
+    /// Bayes factor of a difference against none, of the t test with equal weights ([`bayes_factor`](super::bayes_factor)).
+    #[serde(default)]
+    pub bayes_factor: Option<f64>,
     /// Standard deviation of the difference between people, without the errors of their estimates.
     pub tau: f64,
     /// Share of this variance in the variance of a typical estimate.

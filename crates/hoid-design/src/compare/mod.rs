@@ -8,6 +8,7 @@
 //! |---|---|
 //! | [`meta_regression`](fn@meta_regression) | estimates of people with their errors: restricted likelihood, interval by Hartung and Knapp |
 //! | [`EffectSize`] | d_z, Hedges g, with intervals |
+//! | [`bayes_factor`] | evidence for a difference against none |
 //! | [`holm`] | probabilities of several tests |
 //! | [`GroupEstimates`] | estimates of a group for each person, from its directory or its JSON |
 //! | [`Quantity`] | quantities to compare |
@@ -16,6 +17,7 @@
 //! | [`Comparison`] | the result, its JSON and back; `sentence`: each difference for a paper |
 
 mod adjust;
+mod bayes_factor;
 mod comparing;
 mod comparison;
 mod contrast;
@@ -29,6 +31,7 @@ mod quantity;
 mod sentence;
 
 pub use adjust::holm;
+pub use bayes_factor::bayes_factor;
 pub use comparing::{Adjustment, Comparing, Covariate};
 pub use comparison::{Comparison, Difference, Learning, LeftOut, Mean, PersonEstimate};
 pub use effect_size::{EffectSize, d_z, hedges_g};

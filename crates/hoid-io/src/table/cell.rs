@@ -78,7 +78,18 @@ mod tests {
         ] {
             assert_eq!(Cell::parse(missing), Cell::Missing, "{missing:?}");
         }
-        for text in ["1,5", "abc", "1 2", "--1", "0x10", "1_000", "-.", "nothing", "1\u{2212}2", "\u{2212}\u{2212}1"] {
+        for text in [
+            "1,5",
+            "abc",
+            "1 2",
+            "--1",
+            "0x10",
+            "1_000",
+            "-.",
+            "nothing",
+            "1\u{2212}2",
+            "\u{2212}\u{2212}1",
+        ] {
             assert_eq!(Cell::parse(text), Cell::Text, "{text:?}");
         }
         assert_eq!(Cell::parse(" -1.5e-3 "), Cell::Number(-1.5e-3));
@@ -90,7 +101,10 @@ mod tests {
     #[test]
     fn decimal_commas_and_moments() {
         assert_eq!(with_decimal_point("-1,5e-3", true), "-1.5e-3");
-        assert_eq!(Cell::parse(&with_decimal_point("\u{2212}1,5", true)), Cell::Number(-1.5));
+        assert_eq!(
+            Cell::parse(&with_decimal_point("\u{2212}1,5", true)),
+            Cell::Number(-1.5)
+        );
         for cell in ["1,5", "a,b", "1,234,567", "1.5"] {
             assert_eq!(with_decimal_point(cell, cell != "1,5"), cell);
         }

@@ -252,6 +252,47 @@ const steps = {
     writeFileSync(join(session, ticks), text);
   },
 
+  async "an experiment that was designed, done and compared"() {
+    const hoid = (...args) => {
+      const done = spawnSync(program, args, { cwd: folder, encoding: "utf8" });
+      assert.equal(done.status, 0, `hoid ${args.join(" ")}: ${done.stderr}`);
+      return done.stdout;
+    };
+    // The operator does not adapt: half the gain of the element is half the crossover.
+    const conditions = Object.entries({ fast: "4/s", slow: "2/s" }).map(([name, element]) => {
+      hoid("design", "--controlled-element", element, "--length", "40.96", "--max-rms-e", "1", "--out", `design-${name}`);
+      const text = readFileSync(join(folder, `design-${name}`, "lab.toml"), "utf8");
+      const own = text
+        .slice(text.indexOf("[[condition]]"))
+        .replace('name = "design"', `name = "${name}"\nbreak_s = 0`)
+        .replace('"scenario.toml"', `"design-${name}/scenario.toml"`);
+      assert.match(own, /training = 1/);
+      return own.replace("training = 1", "training = 0");
+    });
+    const designed = join(folder, "designed.toml");
+    writeFileSync(designed, `name = "designed"\n[limits]\nframe_ms = 5000\ninput_ms = 5000\n${conditions.join("\n")}`);
+    const out = join(folder, "designed");
+    for (const name of ["P1", "P2", "P3"]) {
+      const server = await lab(program, "--out", out, "--config", designed);
+      const page = await open(server.address, { time: "injected" });
+      await consent(page, name);
+      for (const end of [/^Score/, "Done. Thank you."]) {
+        await startRun(page);
+        await page.evaluate(operator, { injected: true });
+        await heading(page, end);
+      }
+      await page.close();
+      await server.end();
+    }
+    hoid("group", join(out, "group.toml"), "--out", "results");
+    const { differences } = JSON.parse(hoid("compare", "results", "--of", "crossover", "--json"));
+    const { value, interval, people } = differences[0];
+    console.log(`  crossover: ${value.toFixed(2)} rad/s (${interval.map((v) => v.toFixed(2)).join(" to ")}), ${people.length} people`);
+    assert.equal(people.length, 3);
+    // .7 e through 4/s and 2/s cross at 2.8 and 1.4 rad/s.
+    near(Math.abs(value), 1.4, 0.25, "difference of the crossover");
+  },
+
   async "a disk that is full in the middle of a run"() {
     const disk = join(folder, "disk");
     mkdirSync(disk);

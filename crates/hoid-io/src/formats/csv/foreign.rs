@@ -96,8 +96,8 @@ fn between_tabs(text: &str) -> Option<String> {
 
 /// Units by which a line of units is recognised; its others may be any short words.
 const UNITS: [&str; 24] = [
-    "s", "sec", "ms", "us", "µs", "min", "deg", "°", "rad", "mrad", "deg/s", "rad/s", "m", "mm", "cm", "ft", "m/s", "v",
-    "mv", "ma", "n", "nm", "%", "hz",
+    "s", "sec", "ms", "us", "µs", "min", "deg", "°", "rad", "mrad", "deg/s", "rad/s", "m", "mm", "cm", "ft", "m/s",
+    "v", "mv", "ma", "n", "nm", "%", "hz",
 ];
 
 /// The unit that a cell below the header names, without brackets; none if it names something else.
@@ -107,7 +107,8 @@ fn unit(cell: &str) -> Option<&str> {
         .into_iter()
         .find_map(|(open, close)| cell.strip_prefix(open)?.strip_suffix(close));
     let unit = inside.unwrap_or(cell).trim();
-    let is_unit = unit.chars().count() <= 12 && !unit.contains([' ', ',']) && !unit.starts_with(|c: char| c.is_ascii_digit());
+    let is_unit =
+        unit.chars().count() <= 12 && !unit.contains([' ', ',']) && !unit.starts_with(|c: char| c.is_ascii_digit());
     (is_unit && !is_number(unit)).then_some(unit)
 }
 
@@ -253,10 +254,7 @@ mod tests {
     #[test]
     fn units_below_the_header() {
         let with_units = "# units: t s, e deg, u V\nt,e,u\n0,1,2\n";
-        for text in [
-            "t,e,u\ns,deg,V\n0,1,2\n",
-            "\u{feff}t,e,u\n[s],(deg),\"V\"\n0,1,2\n",
-        ] {
+        for text in ["t,e,u\ns,deg,V\n0,1,2\n", "\u{feff}t,e,u\n[s],(deg),\"V\"\n0,1,2\n"] {
             assert_eq!(plain(text.as_bytes()), (with_units.to_owned(), 1));
         }
         let text = b"Session 4\n\"t\";e;u\r\ns;;-\r\n0,0;1;2\r\n";

@@ -1,0 +1,86 @@
+//! Bayes factor of a difference: how much more probable its t is with a difference than without one.
+//!
+//! Without a difference the effect size delta is 0; with one it is drawn from a Cauchy distribution of scale
+//! r = sqrt(2)/2 (the prior of Jeffreys, Zellner and Siow). With t, its nu degrees of freedom and N = n people, or
+//! N = n_1 n_2/(n_1 + n_2) of two groups,
+//!
+//! ```text
+//!           int_0^inf (1 + N g r^2)^(-1/2) (1 + t^2/((1 + N g r^2) nu))^(-(nu + 1)/2) p(g) dg
+//! BF_10 = --------------------------------------------------------------------------------- ,
+//!                              (1 + t^2/nu)^(-(nu + 1)/2)
+//!
+//! p(g) = (2 pi)^(-1/2) g^(-3/2) e^(-1/(2 g))
+//! ```
+//!
+//! (J. N. Rouder et al., *Psychonomic Bulletin & Review* 16 (2009) 225-237, eq. 1). In x = log g the integrand falls at
+//! least exponentially to both sides, and the trapezoidal rule is exact to rounding.
+
+use std::f64::consts::PI;
+
+/// Scale of the effect sizes that are expected.
+const R: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// Steps of the rule in a unit of log g.
+const STEPS: usize = 64;
+
+/// Returns BF_10 of a t test of one group of people, with `second` = 0, or of two; `None` if too few people or a t
+/// that is no number leave none.
+pub fn bayes_factor(t: f64, first: usize, second: usize) -> Option<f64> {
+    let (n1, n2) = (first as f64, second as f64);
+    let (people, nu) = match second {
+        0 => (n1, n1 - 1.0),
+        _ => (n1 * n2 / (n1 + n2), n1 + n2 - 2.0),
+    };
+    if !t.is_finite() || first == 0 || nu < 1.0 {
+        return None;
+    }
+    let power = 0.5 * (nu + 1.0);
+    let without = -power * (t * t / nu).ln_1p();
+    let with = |x: f64| {
+        let spread = people * R * R * x.exp();
+        -0.5 * (x + (-x).exp() + (2.0 * PI).ln() + spread.ln_1p()) - power * (t * t / ((1.0 + spread) * nu)).ln_1p()
+    };
+    // Below, e^(-1/(2 g)) is nothing; above, the integrand falls by e^(-x) once N g r^2 has passed t^2.
+    let (from, to) = (-8.0, 45.0 + (t * t).ln_1p());
+    let count = ((to - from) * STEPS as f64).ceil() as usize;
+    let sum: f64 = (0..=count)
+        .map(|k| (with(from + k as f64 / STEPS as f64) - without).exp())
+        .sum();
+    let found = sum / STEPS as f64;
+    found.is_finite().then_some(found)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    /// Those of pingouin (scipy's adaptive quadrature).
+    #[test]
+    fn the_numbers_of_another_program() {
+        let mut seen = 0;
+        for line in include_str!("../../../../fixtures/compare/bayes.csv").lines().skip(1) {
+            let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+            let found = bayes_factor(cells[0], cells[1] as usize, cells[2] as usize).unwrap();
+            assert!((found / cells[3] - 1.0).abs() < 1e-7, "{line}: {found}");
+            seen += 1;
+        }
+        assert_eq!(seen, 63);
+    }
+
+    #[test]
+    fn what_has_none() {
+        for (t, first, second) in [
+            (f64::NAN, 5, 0),
+            (f64::INFINITY, 5, 0),
+            (1.0, 0, 0),
+            (1.0, 1, 0),
+            (1.0, 1, 1),
+            (1.0, 0, 5),
+        ] {
+            assert_eq!(bayes_factor(t, first, second), None, "{t} {first} {second}");
+        }
+        // Beyond the range of numbers.
+        assert_eq!(bayes_factor(1e12, 400, 0), None);
+        assert!(bayes_factor(1e6, 3, 0).is_some());
+    }
+}
