@@ -3,7 +3,7 @@
 //! | source | typical person | others |
 //! |---|---|---|
 //! | `population` | of the crossover model (`adapted`) | one spread to each side of each parameter of the prior |
-//! | scenario, fit | that one | none |
+//! | scenario, fit (with its response to a target) | that one | none |
 //! | result of a group, `population.json` | medians over people (`group_people`) | each person |
 
 use std::{
@@ -106,12 +106,17 @@ impl People {
             return group_people::of_json(&object, path, given);
         }
         let name = path.display().to_string();
-        let fit = hoid_io::parse_fit(&text, &name)?.operator()?;
+        let file = hoid_io::parse_fit(&text, &name)?;
+        let feedforward = file.feedforward.clone();
+        let fit = file.operator()?;
         let state = FamilyState {
             operator: fit.operator,
             controlled_element: given.element(&name)?,
         };
-        Ok(one(path, state))
+        Ok(Chosen {
+            feedforward,
+            ..one(path, state)
+        })
     }
 }
 

@@ -5,7 +5,9 @@
 
 use std::path::Path;
 
-use hoid_model::{FamilyOperator, FittedOperator, Form, NamedChoice, SampleTime, uncertainty::Estimate};
+use hoid_model::{
+    FamilyOperator, FittedOperator, Form, NamedChoice, SampleTime, family_scenario::Feedforward, uncertainty::Estimate,
+};
 use serde::Deserialize;
 
 use crate::{IoError, read_settings};
@@ -26,6 +28,8 @@ pub struct FitParameter {
 pub struct FitFile {
     /// Parameters that have a value.
     pub parameters: Vec<FitParameter>,
+    /// The response to the target, of a fit with one such input.
+    pub feedforward: Option<Feedforward>,
     operator: Result<FittedOperator, String>,
     source: String,
 }
@@ -74,6 +78,7 @@ pub fn parse_fit(text: &str, source: &str) -> Result<FitFile, IoError> {
     };
     Ok(FitFile {
         parameters: found.parameters.iter().filter_map(of).collect(),
+        feedforward: found.feedforward(),
         operator: found.operator(source),
         source: source.to_owned(),
     })
@@ -99,6 +104,16 @@ struct FitObject {
     innovation_variance: Option<f64>,
     covariance: Option<CovarianceObject>,
     noise: Option<NoiseObject>,
+    #[serde(default)]
+    channels: Vec<ChannelObject>,
+}
+
+#[derive(Deserialize)]
+struct ChannelObject {
+    role: String,
+    preview: Option<f64>,
+    form: Option<String>,
+    parameters: Option<Vec<ParameterObject>>,
 }
 
 #[derive(Deserialize)]
@@ -143,6 +158,32 @@ struct NoiseObject {
 }
 
 impl FitObject {
+    /// The response to the only target. Its delay `tau_f` counts from the present target, and is negative where the future is
+    /// shown; that of [`Feedforward`] counts from the end of the preview.
+    fn feedforward(&self) -> Option<Feedforward> {
+        let mut seen = self.channels.iter().filter(|channel| channel.role == "feedforward");
+        let channel = seen.next().filter(|_| seen.next().is_none())?;
+        let form = Form::of_name(channel.form.as_deref()?).ok()?;
+        let own = channel.parameters.as_ref()?;
+        let value = |name: &str| {
+            let named = |all: &[ParameterObject]| all.iter().find(|p| p.name == name).and_then(|p| p.value);
+            named(own).or_else(|| named(&self.parameters))
+        };
+        let tau_f_s = value("tau_f")?;
+        let preview_s = channel.preview.unwrap_or(0.0).max(-tau_f_s);
+        // Without the products of others.
+        let is_own = |name: &&str| !(*name == "K_e_dot" || *name == "K" && form.has_lag());
+        let names = form.parameters(self.neuromuscular?).into_iter().filter(is_own);
+        let pairs: Option<Vec<(String, f64)>> = names
+            .map(|name| {
+                let found = if name == "tau_e" { Some(tau_f_s + preview_s) } else { value(name) };
+                Some((name.to_owned(), found?))
+            })
+            .collect();
+        let operator = FamilyOperator::of_names(form, &pairs?).ok()?;
+        Some(Feedforward { operator, preview_s })
+    }
+
     fn operator(self, source: &str) -> Result<FittedOperator, String> {
         let Some(form) = self.form else {
             return Err(format!(
@@ -188,6 +229,38 @@ impl FitObject {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+
+    #[test]
+    fn the_response_to_a_target_has_its_delay_behind_the_preview() {
+        let of = |channels: &str| {
+            let channels = format!(", "channels": [{channels}]}}");
+            let text = FIT.trim_end().strip_suffix('}').unwrap().to_owned() + &channels;
+            parse_fit(&text, "fit.json").unwrap().feedforward
+        };
+        let channel = |role: &str, form: &str, tau_f: f64, preview: f64| {
+            format!(
+                "{{"role": "{role}", "preview": {preview}, "form": {form}, "parameters": [
+                 {{"name": "K_e", "value": 0.5}}, {{"name": "K_d", "value": 0.2}},
+                 {{"name": "T_L", "value": 0.4}}, {{"name": "omega_nm", "value": 10.0}},
+                 {{"name": "zeta_nm", "value": 0.3}}, {{"name": "tau_f", "value": {tau_f}}}]}}"
+            )
+        };
+        for (form, tau_f, preview, delay, ahead) in [
+            (""derivative"", 0.2, 0.0, 0.2, 0.0),
+            (""lead"", -0.5, 0.25, 0.0, 0.5),
+            (""derivative-lead"", -0.1, 0.25, 0.15, 0.25),
+        ] {
+            let seen = of(&channel("feedforward", form, tau_f, preview)).unwrap();
+            assert!((seen.operator.tau_e_s() - delay).abs() < 1e-12, "{form}");
+            assert_eq!(seen.preview_s, ahead, "{form}");
+            assert_eq!(seen.operator.neuromuscular().map(|(omega, _)| omega.round()), Some(10.0));
+        }
+        let one = channel("feedforward", ""derivative"", 0.2, 0.0);
+        assert_eq!(of(""), None);
+        assert_eq!(of(&channel("feedback", ""derivative"", 0.2, 0.0)), None);
+        assert_eq!(of(&channel("feedforward", "null", 0.2, 0.0)), None);
+        assert_eq!(of(&format!("{one}, {one}")), None);
+    }
 
     const FIT: &str = r#"{"hoid": "0.1.0", "structure": "grey-box", "form": "gain", "neuromuscular": true,
         "verdict": {"level": "doubtful", "reasons": ["few seconds"]},
