@@ -176,7 +176,11 @@ impl FitObject {
         let names = form.parameters(self.neuromuscular?).into_iter().filter(is_own);
         let pairs: Option<Vec<(String, f64)>> = names
             .map(|name| {
-                let found = if name == "tau_e" { Some(tau_f_s + preview_s) } else { value(name) };
+                let found = if name == "tau_e" {
+                    Some(tau_f_s + preview_s)
+                } else {
+                    value(name)
+                };
                 Some((name.to_owned(), found?))
             })
             .collect();
@@ -233,32 +237,40 @@ mod tests {
     #[test]
     fn the_response_to_a_target_has_its_delay_behind_the_preview() {
         let of = |channels: &str| {
-            let channels = format!(", "channels": [{channels}]}}");
-            let text = FIT.trim_end().strip_suffix('}').unwrap().to_owned() + &channels;
-            parse_fit(&text, "fit.json").unwrap().feedforward
+            let text = FIT.trim_end().strip_suffix('}').unwrap();
+            parse_fit(&format!("{text}, \"channels\": [{channels}]}}"), "fit.json")
+                .unwrap()
+                .feedforward
         };
-        let channel = |role: &str, form: &str, tau_f: f64, preview: f64| {
-            format!(
-                "{{"role": "{role}", "preview": {preview}, "form": {form}, "parameters": [
-                 {{"name": "K_e", "value": 0.5}}, {{"name": "K_d", "value": 0.2}},
-                 {{"name": "T_L", "value": 0.4}}, {{"name": "omega_nm", "value": 10.0}},
-                 {{"name": "zeta_nm", "value": 0.3}}, {{"name": "tau_f", "value": {tau_f}}}]}}"
-            )
+        let channel = |role: &str, form: Option<&str>, tau_f: f64, preview: f64| {
+            let named = [
+                ("K_e", 0.5),
+                ("K_d", 0.2),
+                ("T_L", 0.4),
+                ("omega_nm", 10.0),
+                ("zeta_nm", 0.3),
+                ("tau_f", tau_f),
+            ];
+            let parameters = named.map(|(name, value)| serde_json::json!({ "name": name, "value": value }));
+            serde_json::json!({ "role": role, "preview": preview, "form": form, "parameters": parameters }).to_string()
         };
         for (form, tau_f, preview, delay, ahead) in [
-            (""derivative"", 0.2, 0.0, 0.2, 0.0),
-            (""lead"", -0.5, 0.25, 0.0, 0.5),
-            (""derivative-lead"", -0.1, 0.25, 0.15, 0.25),
+            ("derivative", 0.2, 0.0, 0.2, 0.0),
+            ("lead", -0.5, 0.25, 0.0, 0.5),
+            ("derivative-lead", -0.1, 0.25, 0.15, 0.25),
         ] {
-            let seen = of(&channel("feedforward", form, tau_f, preview)).unwrap();
+            let seen = of(&channel("feedforward", Some(form), tau_f, preview)).unwrap();
             assert!((seen.operator.tau_e_s() - delay).abs() < 1e-12, "{form}");
             assert_eq!(seen.preview_s, ahead, "{form}");
-            assert_eq!(seen.operator.neuromuscular().map(|(omega, _)| omega.round()), Some(10.0));
+            assert_eq!(
+                seen.operator.neuromuscular().map(|(omega, _)| omega.round()),
+                Some(10.0)
+            );
         }
-        let one = channel("feedforward", ""derivative"", 0.2, 0.0);
+        let one = channel("feedforward", Some("derivative"), 0.2, 0.0);
         assert_eq!(of(""), None);
-        assert_eq!(of(&channel("feedback", ""derivative"", 0.2, 0.0)), None);
-        assert_eq!(of(&channel("feedforward", "null", 0.2, 0.0)), None);
+        assert_eq!(of(&channel("feedback", Some("derivative"), 0.2, 0.0)), None);
+        assert_eq!(of(&channel("feedforward", None, 0.2, 0.0)), None);
         assert_eq!(of(&format!("{one}, {one}")), None);
     }
 
