@@ -87,9 +87,8 @@ class Comparison(Written):
         --------
         >>> found.mixed_model("crossover").summary()
         >>> rows = found.to_dataframe("estimates")
-        >>> rows["axis"] = rows["condition"].str[-1]
-        >>> rows["trained"] = rows["subject"].isin(["S3", "S4"])
-        >>> found.mixed_model("crossover", "axis * trained", rows).params
+        >>> rows["trained"] = rows["subject"].isin(["P09", "P11"])
+        >>> found.mixed_model("crossover", "condition + trained", rows).params
         """
         from statsmodels.formula.api import mixedlm  # type: ignore[import-untyped]
 
