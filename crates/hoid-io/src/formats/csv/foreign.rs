@@ -3,7 +3,7 @@
 //!
 //! The conversion works line by line on the bytes, so that messages still refer to the lines of the file.
 
-use super::text::{is_aside, separator};
+use super::text::{is_aside, is_unit, separator};
 use crate::table::{Cell, with_decimal_point};
 
 /// Number of lines in which the header is searched for.
@@ -107,9 +107,9 @@ fn unit(cell: &str) -> Option<&str> {
         .into_iter()
         .find_map(|(open, close)| cell.strip_prefix(open)?.strip_suffix(close));
     let unit = inside.unwrap_or(cell).trim();
-    let is_unit =
-        unit.chars().count() <= 12 && !unit.contains([' ', ',']) && !unit.starts_with(|c: char| c.is_ascii_digit());
-    (is_unit && !is_number(unit)).then_some(unit)
+    // Commas divide the units of a comment.
+    let names_one = unit.is_empty() || is_unit(unit) && !unit.contains(',') && !is_number(unit);
+    names_one.then_some(unit)
 }
 
 fn unquoted(cell: &str) -> &str {
@@ -125,22 +125,11 @@ fn units_above(text: &str) -> Option<String> {
         let [(at, header), (below, line), (_, row)] = lines else {
             return None;
         };
-        let mark = char::from(separator(header));
-        let cells = |line: &'_ str| -> Vec<String> {
-            match header.contains(mark) {
-                true => line.split(mark).map(str::to_owned).collect(),
-                false => line.split_whitespace().map(str::to_owned).collect(),
-            }
-        };
-        let (names, below_them, numbers) = (cells(header), cells(line), cells(row));
-        let count = names.len();
-        let is_row = numbers.len() == count && numbers.iter().filter(|cell| is_number(cell)).count() > count / 2;
-        if count < 2 || below_them.len() != count || !is_row || names.iter().any(|name| is_number(name)) {
-            return None;
-        }
-        let units: Vec<&str> = below_them.iter().map(|cell| unit(cell)).collect::<Option<_>>()?;
-        let is_known = |unit: &&str| UNITS.iter().any(|known| unit.to_lowercase() == *known);
-        if !units.iter().any(is_known) {
+        let mark = Some(char::from(separator(header))).filter(|mark| header.contains(*mark));
+        let [names, units, numbers] = [header, line, row].map(|line| cells(line, mark));
+        let units: Vec<&str> = units.into_iter().map(unit).collect::<Option<_>>()?;
+        let is_known = |unit: &&str| UNITS.contains(&unit.to_lowercase().as_str());
+        if units.len() != names.len() || !is_header(&names, &numbers) || !units.iter().any(is_known) {
             return None;
         }
         let named = names.iter().zip(units).filter(|(_, unit)| !matches!(*unit, "" | "-"));
@@ -159,27 +148,41 @@ fn units_above(text: &str) -> Option<String> {
     Some(lines.iter().enumerate().map(placed).collect())
 }
 
+/// The cells of a line, divided by a mark or else by blanks.
+fn cells(line: &str, mark: Option<char>) -> Vec<&str> {
+    match mark {
+        Some(mark) => line.split(mark).collect(),
+        None => line.split_whitespace().collect(),
+    }
+}
+
+/// True for words over a row of as many cells, most of them numbers.
+fn is_header(names: &[&str], row: &[&str]) -> bool {
+    let numbers = row.iter().filter(|cell| is_number(cell)).count();
+    names.len() > 1
+        && names.len() == row.len()
+        && numbers > names.len() / 2
+        && !names.iter().any(|name| is_number(name))
+}
+
 /// Marks the lines above the header as comments, and returns their number. The header is the first
 /// line of words over a line of as many cells, most of them numbers.
 fn without_preamble(text: &str) -> Option<(usize, String)> {
     let lines = text.lines().take(LINES).enumerate();
     let filled: Vec<(usize, &str)> = lines.filter(|(_, line)| !is_aside(line)).collect();
-    let is_header = |pair: &[(usize, &str)]| {
+    let over_a_row = |pair: &[(usize, &str)]| {
         let [(_, header), (_, row)] = pair else { return false };
-        let mark = char::from(separator(header));
-        let names = header.split(mark).count();
-        let cells: Vec<&str> = row.split(mark).collect();
-        let numbers = cells.iter().filter(|cell| is_number(cell)).count();
-        names > 1 && names == cells.len() && numbers > names / 2 && !header.split(mark).any(is_number)
+        let mark = Some(char::from(separator(header)));
+        is_header(&cells(header, mark), &cells(row, mark))
     };
-    let header = filled.windows(2).position(is_header)?;
+    let header = filled.windows(2).position(over_a_row)?;
     let (above, [(_, header), ..]) = filled.split_at_checked(header)? else {
         return None;
     };
-    let mark = char::from(separator(header));
-    let cells = |line: &str| line.split(mark).count();
+    let mark = Some(char::from(separator(header)));
+    let count = |line: &str| cells(line, mark).len();
     // A line of as many cells is the header; the units are below it.
-    if above.is_empty() || above.iter().any(|(_, line)| cells(line) == cells(header)) {
+    if above.is_empty() || above.iter().any(|(_, line)| count(line) == count(header)) {
         return None;
     }
     // Line breaks are kept.

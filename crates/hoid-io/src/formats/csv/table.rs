@@ -19,8 +19,8 @@ use std::ops::Range;
 
 use super::plain::{Layout, RowStarts, plain_rows};
 use super::text::{
-    as_meant, comments, has_decimal_commas, is_aside, open_line, place, reader, refuse_blanks, row_start, separator,
-    text,
+    as_meant, comments, has_decimal_commas, is_aside, is_unit, open_line, place, reader, refuse_blanks, row_start,
+    separator, text,
 };
 use crate::IoError;
 use crate::table::{Cell, Column, Source, Table, asides, check_names, check_number, with_decimal_point};
@@ -389,8 +389,7 @@ fn unit_in(name: &str) -> Option<&str> {
         None => name.strip_suffix(')')?.rsplit_once('(')?,
     };
     let unit = unit.trim();
-    let is_unit = !before.trim().is_empty() && (1..=12).contains(&unit.chars().count()) && !unit.contains(' ');
-    (is_unit && !unit.starts_with(|c: char| c.is_ascii_digit() || c == ':')).then_some(unit)
+    (!before.trim().is_empty() && is_unit(unit)).then_some(unit)
 }
 
 #[cfg(test)]

@@ -66,6 +66,13 @@ pub(crate) fn is_aside(line: &str) -> bool {
     line.trim().is_empty() || line.starts_with('#')
 }
 
+/// True for what names a unit: a short word, and no index or number.
+pub(super) fn is_unit(text: &str) -> bool {
+    (1..=12).contains(&text.chars().count())
+        && !text.contains(' ')
+        && !text.starts_with(|c: char| c.is_ascii_digit() || c == ':')
+}
+
 /// The most frequent separator in the header; the comma if there is none.
 pub(crate) fn separator(header: &str) -> u8 {
     let mut quoted = false;
