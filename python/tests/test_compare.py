@@ -72,3 +72,19 @@ def test_mistakes_are_told(group_results: Path, tmp_path: Path) -> None:
         pyhoid.compare(tmp_path / "nothing.json")
     with pytest.raises(pyhoid.DataError):
         pyhoid.Comparison.from_json("{}")
+
+
+def test_recordings_are_analysed_first(tmp_path: Path) -> None:
+    runs, kept = tmp_path / "runs", tmp_path / "kept"
+    plants = ["integrator", "double-integrator"]
+    pyhoid.simulate_people(runs, subjects=3, runs=1, plants=plants, remnants=["lag"], remnant_share=(0.05, 0.1))
+    seen: list[tuple[int, int]] = []
+    found = pyhoid.compare(
+        runs, of=["crossover", "T_L"], directory=kept, progress=lambda done, total: seen.append((done, total))
+    )
+    assert [d["quantity"] for d in found.differences] == ["crossover", "T_L"]
+    assert any("for all" in note for note in found.verdict.notes) and seen[-1][0] == seen[-1][1]
+    # What was analysed is compared again without the recordings.
+    again = pyhoid.compare(kept / "group", of="crossover")
+    assert again.differences[0]["value"] == found.differences[0]["value"]
+    assert sorted(place.name for place in kept.iterdir()) == ["group", "group-lead-lag"]

@@ -107,3 +107,40 @@ fn mistakes_have_remedies() {
     assert_eq!(output.status.code(), Some(1));
     assert!(String::from_utf8(output.stdout).unwrap().contains("without P03 in fo"));
 }
+
+/// The forms of the people on the two elements differ: their parameters are compared in a common form.
+#[test]
+fn recordings_are_analysed_and_compared_in_one_form() {
+    let directory = TempDir::new().unwrap();
+    let at = directory.path();
+    let people = "simulate-group --people --subjects 3 --runs 1 --plants integrator,double-integrator --remnants lag \
+                  --remnant-share 0.05..0.1 --out runs";
+    good(at, &people.split_whitespace().collect::<Vec<_>>());
+    let compared = ["compare", "runs", "--of", "crossover,T_L", "--out", "found", "--json"];
+    let printed = good(at, &compared);
+    let object: serde_json::Value = serde_json::from_str(&printed).unwrap();
+    let form = object["verdict"]["notes"].to_string();
+    assert!(
+        form.contains("parameters are those of the form lead-lag for all"),
+        "{form}"
+    );
+    let compared_of = |quantity: &str| {
+        let differences = object["differences"].as_array().unwrap();
+        differences.iter().any(|d| d["quantity"] == quantity)
+    };
+    assert!(compared_of("T_L") && compared_of("crossover"), "{printed}");
+    // The crossover is that of the forms which are best for each.
+    let of_results: serde_json::Value =
+        serde_json::from_str(&good(at, &["compare", "found/group", "--of", "crossover", "--json"])).unwrap();
+    assert_eq!(of_results["differences"][0]["value"], object["differences"][0]["value"]);
+    // The results stay, and are used again.
+    let same = good(at, &compared);
+    assert_eq!(same, printed);
+    let of_group = hoid(at, &["compare", "found/group", "--of", "T_L"]);
+    let message = String::from_utf8(of_group.stderr).unwrap();
+    assert!(message.contains("form = \"lead-lag\""), "{message}");
+    // Without --out nothing stays behind.
+    let before = fs::read_dir(at).unwrap().count();
+    good(at, &["compare", "runs/group.toml", "--of", "crossover"]);
+    assert_eq!(fs::read_dir(at).unwrap().count(), before);
+}

@@ -1,16 +1,22 @@
 //! `pyhoid.compare`: differences between conditions and people; the package reads the JSON of the result.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use hoid_design::compare::{Adjustment, Comparing, Comparison, Covariate, GroupEstimates, Variation, Weights};
+use hoid_design::compare::{
+    Adjustment, CompareError, Comparing, Comparison, Covariate, GroupEstimates, Variation, Weights,
+};
 use hoid_report::comparison_figure;
+use hoid_study::{
+    Progress, RunOptions,
+    group::{Manifest, run_group},
+};
 use pyo3::prelude::*;
 
-use crate::{errors::Outcome, names};
+use crate::{errors::Outcome, interrupt, names};
 
-/// Compares, and returns the result as JSON.
+/// Compares results, or recordings that are analysed into `directory` first, and returns the result as JSON.
 #[pyfunction]
-#[pyo3(signature = (results, *, factors, variation, of, covariate, adjust, weights))]
+#[pyo3(signature = (results, *, factors, variation, of, covariate, adjust, weights, directory, jobs, progress))]
 #[allow(clippy::too_many_arguments)]
 pub fn compare(
     py: Python<'_>,
@@ -21,6 +27,9 @@ pub fn compare(
     covariate: Option<&str>,
     adjust: &str,
     weights: &str,
+    directory: PathBuf,
+    jobs: Option<usize>,
+    progress: Option<Bound<'_, PyAny>>,
 ) -> Outcome<String> {
     let comparing = Comparing {
         factors: factors.iter().map(|text| text.parse()).collect::<Result<_, _>>()?,
@@ -34,8 +43,27 @@ pub fn compare(
         adjustment: names::choice::<Adjustment>("adjust", adjust)?,
         weights: names::choice::<Weights>("weights", weights)?,
     };
-    let found = py.detach(|| comparing.run(&GroupEstimates::read(&results)?))?;
-    Ok(found.to_json())
+    let Some(path) = GroupEstimates::recordings(&results) else {
+        return Ok(py.detach(|| comparing.run(&GroupEstimates::read(&results)?))?.to_json());
+    };
+    let manifest = Manifest::read(&path)?;
+    let runs = manifest.runs.iter().filter(|run| run.counts).count() as u64;
+    let base = path.parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf);
+    // In the directory the runs that were analysed for another comparison stay.
+    let options = RunOptions {
+        jobs,
+        resume: true,
+        ..RunOptions::default()
+    };
+    interrupt::run(py, runs, progress.as_ref(), true, move |status| {
+        let estimates = comparing.estimates_of(&manifest, &directory, |manifest, place| {
+            let told = |p: Progress| status.set(p.done, p.total);
+            run_group(manifest, &base, place, &options, &told, &|| status.goes_on())
+                .map(|_| ())
+                .map_err(CompareError::from)
+        })?;
+        Ok::<_, CompareError>(comparing.run(&estimates)?.to_json())
+    })
 }
 
 /// The JSON of a comparison, checked, and its figure as SVG.

@@ -488,6 +488,9 @@ def compare(
     covariate: str | None,
     adjust: str,
     weights: str,
+    directory: _Path,
+    jobs: int | None,
+    progress: _Progress,
 ) -> str: ...
 def comparison_figure_of(text: str) -> str: ...
 def design(

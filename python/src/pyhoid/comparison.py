@@ -1,13 +1,15 @@
-"""Whether conditions differ, and people: from the results of a group."""
+"""Whether conditions differ, and people: from recordings with their manifest, or the results of a group."""
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from . import _pyhoid
+from . import _options, _pyhoid
+from ._options import Progress
 from ._written import Written
 from .errors import OptionError
 
@@ -155,13 +157,17 @@ def compare(
     covariate: Literal["run"] | None = None,
     adjust: Literal["holm", "none"] = "holm",
     weights: Literal["penalised", "reml"] = "penalised",
+    directory: str | PathLike[str] | None = None,
+    jobs: int | None = None,
+    progress: Progress = False,
 ) -> Comparison:
     """Whether conditions differ, and people.
 
     Parameters
     ----------
     results : path
-        The directory that `group` wrote, or a file with what ``hoid group --json`` printed.
+        Recordings with their manifest (the file ``group.toml`` or its directory), which are analysed
+        first; or the directory that `group` wrote, or a file with what ``hoid group --json`` printed.
     factor : str, mapping, or sequence of str
         What conditions or people differ in: ``"axis:roll=C1r,C2r;pitch=C1p,C2p"``, or
         ``{"axis": {"roll": ["C1r", "C2r"], "pitch": ["C1p", "C2p"]}}``; several for their interactions.
@@ -170,7 +176,8 @@ def compare(
         Whether each person is in all levels or in one; found from the results.
     of : str or sequence of str
         ``"crossover"``, ``"phase_margin"``, ``"tau_e"`` (these three by default), ``"gain_db@2.5"``,
-        ``"phase_deg@2.5"``, ``"rms_e"``, ``"rms_u"``, or parameters of one form.
+        ``"phase_deg@2.5"``, ``"rms_e"``, ``"rms_u"``, or parameters such as ``"K"``, ``"T_L"``: for
+        them recordings are analysed in one form, chosen by the evidence of all people.
     covariate : {"run"}
         Takes learning over the runs out, and reports it.
     adjust : {"holm", "none"}
@@ -178,6 +185,10 @@ def compare(
     weights : {"penalised", "reml"}
         The variance between people in their weights: kept away from zero, or that of the restricted
         likelihood, whose intervals are too short for few people.
+    directory : path, optional
+        Where the results of recordings are kept for the next comparison; they are removed without it.
+    jobs, progress
+        For recordings, as in `study`.
 
     Returns
     -------
@@ -200,15 +211,19 @@ def compare(
         factors = [_typed(name, levels) for name, levels in factor.items()]
     else:
         factors = list(factor)
-    text = _pyhoid.compare(
-        Path(results),
-        factors=factors,
-        variation=variation,
-        of=of.split(",") if isinstance(of, str) else list(of),
-        covariate=covariate,
-        adjust=adjust,
-        weights=weights,
-    )
+    with tempfile.TemporaryDirectory(prefix="hoid-") as removed:
+        text = _pyhoid.compare(
+            Path(results),
+            factors=factors,
+            variation=variation,
+            of=of.split(",") if isinstance(of, str) else list(of),
+            covariate=covariate,
+            adjust=adjust,
+            weights=weights,
+            directory=Path(directory or removed),
+            jobs=jobs,
+            progress=_options.reporter(progress, "runs"),
+        )
     return Comparison(text)
 
 

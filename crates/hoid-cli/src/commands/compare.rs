@@ -1,12 +1,15 @@
-//! `hoid compare`: differences between conditions and people, from the results of a group.
+//! `hoid compare`: differences between conditions and people, from recordings with their manifest or from the results of
+//! a group.
 
 use std::path::Path;
 
 use hoid::design::compare::{Comparing, Comparison, Difference, GroupEstimates, Variation};
 use hoid::model::numbers::{self, with_uncertainty};
 use hoid::report::{PaperTable, comparison_figure};
+use hoid::study::{RunOptions, group::Manifest};
+use tempfile::TempDir;
 
-use super::{figure, output_paths, paper_table};
+use super::{figure, group::analysed, output_paths, paper_table};
 use crate::{args::CompareArgs, error::CliError, json, output, table::Rows, text};
 
 /// The files of `--out`: tables, the figure, the sentences.
@@ -38,7 +41,11 @@ pub fn run(args: &CompareArgs) -> Result<(), CliError> {
         adjustment: args.adjust,
         weights: args.weights,
     };
-    let found = comparing.run(&GroupEstimates::read(&args.results)?)?;
+    let estimates = match GroupEstimates::recordings(&args.results) {
+        Some(manifest) => of_recordings(&comparing, &manifest, args)?,
+        None => GroupEstimates::read(&args.results)?,
+    };
+    let found = comparing.run(&estimates)?;
     if let Some(path) = &args.picture.figure {
         figure::write(path, &comparison_figure(&found), args.picture.width)?;
     }
@@ -52,6 +59,32 @@ pub fn run(args: &CompareArgs) -> Result<(), CliError> {
         output::show(&page(&found, args.show.verbose))?;
     }
     CliError::of_verdict(&found.verdict)
+}
+
+/// Analyses recordings below the directory of the results, or in one that is removed again.
+fn of_recordings(comparing: &Comparing, path: &Path, args: &CompareArgs) -> Result<GroupEstimates, CliError> {
+    let manifest = Manifest::read(path)?;
+    let removed = match args.out {
+        Some(_) => None,
+        None => Some(tempfile::tempdir().map_err(no_room)?),
+    };
+    let directory = removed.as_ref().map(TempDir::path).or(args.out.as_deref());
+    let directory = directory.unwrap_or(Path::new("."));
+    // With --out the runs that were analysed for another comparison stay.
+    let options = RunOptions {
+        jobs: args.jobs.map(usize::from),
+        resume: true,
+        ..RunOptions::default()
+    };
+    comparing.estimates_of(&manifest, directory, |manifest, place| {
+        analysed(manifest, path, place, &options).map(|_| ())
+    })
+}
+
+fn no_room(error: std::io::Error) -> CliError {
+    CliError::Stream(format!(
+        "the recordings cannot be analysed, since no temporary directory can be made ({error}): name a directory with --out"
+    ))
 }
 
 fn write_all(found: &Comparison, out: &Path) -> Result<(), CliError> {

@@ -11,7 +11,7 @@ use super::{
     contrast::{Contrast, Resolved, conditions_of, contrasts},
     d_z,
     factor::Factor,
-    group_estimates::EstimatedValue,
+    group_estimates::{EstimatedValue, forms, in_words},
     hedges_g,
     learning::Practice,
     meta_mean, meta_regression,
@@ -139,6 +139,8 @@ impl Comparing {
                 "there is no difference: too few people have the request in all of its levels",
             ));
         }
+        let parameters = quantities.iter().any(|quantity| !quantity.is_of_any_form());
+        findings.extend(group.common.clone().filter(|_| parameters));
         findings.extend(missing(&result));
         findings.extend(doubtful(group, &result));
         result.verdict = Verdict::of(findings);
@@ -224,27 +226,12 @@ impl Work<'_> {
 
     /// Returns true if the quantity can be compared: parameters only within one form.
     fn is_comparable(&mut self, quantity: &Quantity, cells: &[OfCell]) -> bool {
-        let mut forms: Vec<(&str, Vec<String>)> = Vec::new();
-        for (subject, condition, _) in cells {
-            let form = self
-                .group
-                .cell(subject, condition)
-                .map_or("", |cell| cell.form.as_str());
-            let name = format!("{subject} in {condition}");
-            match forms.iter_mut().find(|(known, _)| *known == form) {
-                _ if form.is_empty() => {}
-                Some((_, names)) => names.push(name),
-                None => forms.push((form, vec![name])),
-            }
-        }
+        let compared = cells.iter();
+        let forms = forms(compared.filter_map(|(subject, condition, _)| self.group.cell(subject, condition)));
         if forms.len() < 2 || !matches!(quantity, Quantity::Parameter(_)) {
             return true;
         }
-        let all: Vec<String> = forms
-            .iter()
-            .map(|(form, names)| format!("{form}: {}", names.join(", ")))
-            .collect();
-        let all = all.join("; ");
+        let all = in_words(&forms);
         if quantity.is_of_any_form() {
             self.findings.push(Finding::note(
                 "forms-differ",
@@ -252,9 +239,10 @@ impl Work<'_> {
             ));
             return true;
         }
-        let most = forms.iter().max_by_key(|(_, names)| names.len()).map_or("", |f| f.0);
+        let most = || forms.iter().max_by_key(|(_, names)| names.len()).map_or("", |f| f.0);
+        let form = self.group.common_form().map_or_else(most, |common| common.form.name());
         let why = format!(
-            "a parameter means the same in one form alone ({all}); write form = \"{most}\" under [analysis] in group.toml and run the group again"
+            "a parameter means the same in one form alone ({all}); compare the manifest of the recordings in place of the results, or write form = \"{form}\" under [analysis] in group.toml and run the group again"
         );
         match self.apart.iter_mut().find(|(known, _)| *known == why) {
             Some((_, names)) => names.push(quantity.to_string()),

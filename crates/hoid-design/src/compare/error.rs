@@ -44,7 +44,7 @@ pub enum CompareError {
     },
     /// A path without the result of a group.
     #[error(
-        "{place} holds no result of a group ({reason}); expected a directory that `hoid group DIR --out` wrote, or what `hoid group --json` printed"
+        "{place} holds no result of a group ({reason}); expected recordings with their manifest group.toml, a directory that `hoid group DIR --out` wrote, or what `hoid group --json` printed"
     )]
     NoGroup {
         /// The path.

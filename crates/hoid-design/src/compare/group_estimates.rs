@@ -6,17 +6,20 @@
 //! standard errors of both are the standard deviation between runs divided by the root of their number. If some
 //! parameters were estimated for each run, a cell is the mean of its runs.
 
-use std::{collections::BTreeMap, path::Path};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
-use hoid_model::{VerdictLevel, uncertainty::Estimate};
+use hoid_model::{Finding, VerdictLevel, operator_family::PARAMETERS, uncertainty::Estimate};
 use hoid_numerics::statistics::{mean, sample_variance};
 use hoid_study::{
     StudyError,
-    group::{GroupSummary, MANIFEST, Manifest, Person, PersonStatus, RunEstimates},
+    group::{FormEvidence, GroupSummary, MANIFEST, Manifest, Person, PersonStatus, RunEstimates, has_results},
 };
 use serde_json::Value;
 
-use super::{CompareError, Observation, Quantity};
+use super::{CommonForm, CompareError, Observation, Quantity, common_form::common_form};
 
 /// A value with its standard error, its share of prior, and the number of its runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,6 +40,8 @@ pub(super) struct Cell {
     /// The reason why the person has no operator.
     pub missing: Option<String>,
     pub doubtful: bool,
+    /// Evidence of the forms; empty if it is not known.
+    forms: Vec<FormEvidence>,
     runs: usize,
     known: BTreeMap<String, EstimatedValue>,
 }
@@ -47,9 +52,25 @@ pub struct GroupEstimates {
     pub(super) name: String,
     pub(super) cells: Vec<Cell>,
     runs: Option<RunEstimates>,
+    /// The runs that parameters of one form are read from, if these are not `runs`.
+    runs_in_form: Option<RunEstimates>,
+    /// The note on the common form of the parameters.
+    pub(super) common: Option<Finding>,
 }
 
 impl GroupEstimates {
+    /// The manifest, if the place is one, or a directory with recordings and their manifest but without results.
+    pub fn recordings(place: &Path) -> Option<PathBuf> {
+        if place.is_file() {
+            return place
+                .extension()
+                .is_some_and(|ending| ending == "toml")
+                .then(|| place.to_owned());
+        }
+        let manifest = place.join(MANIFEST);
+        (manifest.is_file() && !has_results(place)).then_some(manifest)
+    }
+
     /// Reads the result directory of a group, or the JSON of one.
     ///
     /// # Errors
@@ -66,12 +87,15 @@ impl GroupEstimates {
         }
         let path = place.join(MANIFEST);
         if !path.exists() {
-            return Err(none(format!("there is no {MANIFEST} in it")));
+            return Err(none(format!(
+                "there is no {MANIFEST} in it; for recordings `hoid group init {}` writes it",
+                place.display()
+            )));
         }
         let manifest = Manifest::read(&path)?;
         if !place.join("people.parquet").exists() {
             return Err(none(
-                "there is no table people: it is not finished, or holds recordings".to_owned(),
+                "there is no table people: it is not finished; continue with `hoid group --resume`".to_owned(),
             ));
         }
         let summary = GroupSummary::read(&manifest, place)?;
@@ -79,6 +103,8 @@ impl GroupEstimates {
             name: manifest.name.clone(),
             cells: merged(summary.people.iter().map(Cell::of_person).collect()),
             runs: Some(RunEstimates::read(place)?),
+            runs_in_form: None,
+            common: None,
         })
     }
 
@@ -93,6 +119,8 @@ impl GroupEstimates {
             name: object["group"].as_str().unwrap_or("group").to_owned(),
             cells: merged(cells),
             runs: None,
+            runs_in_form: None,
+            common: None,
         })
     }
 
@@ -104,6 +132,33 @@ impl GroupEstimates {
     /// Returns the people, in the order of the manifest.
     pub fn subjects(&self) -> Vec<String> {
         distinct(self.cells.iter().map(|cell| &cell.subject))
+    }
+
+    /// Returns the form in which the parameters of all people can be compared; `None` if there is none, or if the
+    /// evidence of the forms is not known.
+    pub fn common_form(&self) -> Option<CommonForm> {
+        let fitted = self.cells.iter().filter(|cell| !cell.form.is_empty());
+        let forms: Vec<&[FormEvidence]> = fitted.map(|cell| cell.forms.as_slice()).collect();
+        common_form(&forms)
+    }
+
+    /// Replaces the parameters of one form by those of fits in the common form.
+    pub(super) fn with_parameters_of(mut self, other: Self, common: CommonForm) -> Self {
+        let best = in_words(&forms(self.cells.iter()));
+        for cell in &mut self.cells {
+            let of = other.cell(&cell.subject, &cell.condition);
+            let of_form = |name: &String| !Quantity::Parameter(name.clone()).is_of_any_form();
+            let is_parameter = |name: &String| of_form(name) && PARAMETERS.iter().any(|(known, _)| known == name);
+            cell.known.retain(|name, _| !is_parameter(name));
+            let Some(of) = of else { continue };
+            cell.form.clone_from(&of.form);
+            let parameters = of.known.iter().filter(|(name, _)| is_parameter(name));
+            cell.known
+                .extend(parameters.map(|(name, value)| (name.clone(), *value)));
+        }
+        self.runs_in_form = other.runs;
+        self.common = Some(common.finding(&best));
+        self
     }
 
     pub(super) fn cell(&self, subject: &str, condition: &str) -> Option<&Cell> {
@@ -155,7 +210,10 @@ impl GroupEstimates {
 
     /// Returns a quantity in each run of a cell, with the names of the runs; empty if the runs are not known.
     pub(super) fn of_runs(&self, cell: &Cell, quantity: &Quantity) -> Vec<(&str, Observation)> {
-        let Some(runs) = &self.runs else { return Vec::new() };
+        let in_form = self.runs_in_form.as_ref().filter(|_| !quantity.is_of_any_form());
+        let Some(runs) = in_form.or(self.runs.as_ref()) else {
+            return Vec::new();
+        };
         let one = |run: &str| match quantity.column() {
             Some(name) => runs.parameter([&cell.subject, &cell.condition, run], name),
             None => self.response(cell, Some(run), quantity).map(Estimate::fixed),
@@ -197,6 +255,7 @@ impl Cell {
             form: String::new(),
             missing: None,
             doubtful: false,
+            forms: Vec::new(),
             runs,
             known: BTreeMap::new(),
         }
@@ -220,6 +279,7 @@ impl Cell {
             if fitted { &reasons } else { &person.reason },
         );
         cell.form.clone_from(&person.form);
+        cell.forms.clone_from(&person.forms);
         let runs = if person.is_of_all_runs() { person.runs } else { 1 };
         for p in &person.parameters {
             let known = EstimatedValue {
@@ -277,6 +337,27 @@ impl Cell {
         }
         cell
     }
+}
+
+/// Returns the forms of cells, with the names of the cells of each.
+pub(super) fn forms<'a>(cells: impl Iterator<Item = &'a Cell>) -> Vec<(&'a str, Vec<String>)> {
+    let mut forms: Vec<(&str, Vec<String>)> = Vec::new();
+    for cell in cells.filter(|cell| !cell.form.is_empty()) {
+        let name = format!("{} in {}", cell.subject, cell.condition);
+        match forms.iter_mut().find(|(known, _)| *known == cell.form) {
+            Some((_, names)) => names.push(name),
+            None => forms.push((&cell.form, vec![name])),
+        }
+    }
+    forms
+}
+
+/// `lead: P03 in fo, P05 in fo; lead-lag: P09 in fo`.
+pub(super) fn in_words(forms: &[(&str, Vec<String>)]) -> String {
+    let all = forms
+        .iter()
+        .map(|(form, names)| format!("{form}: {}", names.join(", ")));
+    all.collect::<Vec<_>>().join("; ")
 }
 
 fn known(value: f64, standard_error: Option<f64>, runs: usize) -> EstimatedValue {

@@ -13,11 +13,13 @@
 //! | [`GroupEstimates`] | estimates of a group for each person, from its directory or its JSON |
 //! | [`Quantity`] | quantities to compare |
 //! | [`Factor`] | differences between conditions, or between people; `contrast`: the weights of conditions |
+//! | [`CommonForm`] | the form in which parameters of all people are compared |
 //! | [`Comparing`] | comparison of a group; `learning`: runs as a covariate |
 //! | [`Comparison`] | the result, its JSON and back; `sentence`: each difference for a paper |
 
 mod adjust;
 mod bayes_factor;
+mod common_form;
 mod comparing;
 mod comparison;
 mod contrast;
@@ -32,6 +34,7 @@ mod sentence;
 
 pub use adjust::holm;
 pub use bayes_factor::bayes_factor;
+pub use common_form::CommonForm;
 pub use comparing::{Adjustment, Comparing, Covariate};
 pub use comparison::{Comparison, Difference, Learning, LeftOut, Mean, PersonEstimate};
 pub use effect_size::{EffectSize, d_z, hedges_g};

@@ -150,5 +150,5 @@ pub(super) fn line_fit(
 
 /// Sorts the forms by preference for equal fits: fewer coordinates first, the family before its rivals.
 pub(super) fn by_simplicity(forms: &mut [Form]) {
-    forms.sort_by_key(|form| (form.coordinates(false).len(), *form));
+    forms.sort_by_key(|form| (form.simplicity(), *form));
 }

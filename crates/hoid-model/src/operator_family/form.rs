@@ -182,6 +182,11 @@ impl Form {
         self.degree() <= usize::from(self.has_pole()) + if neuromuscular { 2 } else { 0 }
     }
 
+    /// Returns the number of its coordinates without the neuromuscular part: forms with fewer are simpler.
+    pub fn simplicity(self) -> usize {
+        self.coordinates(false).len()
+    }
+
     /// Returns the coordinates, in the order in which they are fitted.
     pub fn coordinates(self, neuromuscular: bool) -> Vec<Coordinate> {
         let mut all = vec![Coordinate::Gain];

@@ -4,12 +4,13 @@
 //! A row has the form, for each parameter its value, standard error of these runs (`_se`) and of the person
 //! (`_se_person`), 95 % interval (`_low`, `_high`), whether the data determine it (`_determined`) and the share of the
 //! prior (`_prior_share`), crossover and phase margin with the controlled element and their errors and intervals, the
-//! statistics of the fit and its verdict. Parameters that no person has, have no columns. If some parameters are
-//! individual, a person has one row for each run.
+//! evidence of each form that was tried (`criterion_FORM`, above the least, and `weight_FORM`), the statistics of the fit
+//! and its verdict. Parameters that no person has, and forms that were not tried, have no columns. If some parameters
+//! are individual, a person has one row for each run.
 
 use hoid_ident::family::{FamilyFit, OperatorOfRecord, Parameter};
 use hoid_io::{ColumnValues, OutputTable, TableSchema};
-use hoid_model::{ContinuousTransferFunction, VerdictLevel, operator_family::PARAMETERS, uncertainty::Estimate};
+use hoid_model::{ContinuousTransferFunction, Form, VerdictLevel, operator_family::PARAMETERS, uncertainty::Estimate};
 
 use super::tables::{joined, numbers, parted, real, schema, text, texts};
 use crate::columns::Rows;
@@ -34,6 +35,17 @@ hoid_model::named_choice!(PersonStatus, "status of a person", 3, {
     Changes => "changes",
 });
 
+/// Evidence of a form in a fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FormEvidence {
+    /// The form.
+    pub form: Form,
+    /// Its criterion above the least of all forms.
+    pub criterion: f64,
+    /// Its weight in averages over forms.
+    pub weight: f64,
+}
+
 /// A row of the table `people`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Person {
@@ -51,6 +63,8 @@ pub struct Person {
     pub reason: String,
     /// The form of the operator.
     pub form: String,
+    /// Evidence of each form that has a criterion, in the order of the forms.
+    pub forms: Vec<FormEvidence>,
     /// Its parameters.
     pub parameters: Vec<Parameter>,
     /// Crossover frequency with the controlled element, rad/s.
@@ -86,6 +100,7 @@ impl Person {
             status,
             reason: reason.to_owned(),
             form: String::new(),
+            forms: Vec::new(),
             parameters: Vec::new(),
             crossover_rad_s: None,
             crossover_interval: None,
@@ -116,6 +131,7 @@ impl Person {
             run: run.to_owned(),
             runs,
             form: fit.form.name().to_owned(),
+            forms: evidence(fit),
             parameters: parameters.clone(),
             crossover_rad_s: measures.map(|m| m.crossover_rad_s),
             crossover_interval: measures.and_then(|m| m.crossover_interval),
@@ -149,6 +165,11 @@ impl Person {
             format!(", run {}", self.run)
         };
         format!("{}{of_run}", cell_name(&self.subject, &self.condition))
+    }
+
+    /// Returns the evidence of a form, if it has any.
+    pub fn evidence(&self, form: Form) -> Option<&FormEvidence> {
+        self.forms.iter().find(|of| of.form == form)
     }
 
     fn write(&self, rows: &mut Rows) {
@@ -194,6 +215,10 @@ impl Person {
                 rows.real(&format!("{name}_high"), high);
             }
         }
+        for of in &self.forms {
+            rows.real(&format!("criterion_{}", of.form.name()), of.criterion);
+            rows.real(&format!("weight_{}", of.form.name()), of.weight);
+        }
         let (chi2, dof) = self.chi2.map_or((f64::NAN, f64::NAN), |(c, dof)| (c, dof as f64));
         rows.real("chi2", chi2);
         rows.real("dof", dof);
@@ -224,6 +249,13 @@ impl Person {
                 averaged_over: Vec::new(),
             })
         };
+        let evidence = |form: &Form| {
+            Some(FormEvidence {
+                form: *form,
+                criterion: any(&format!("criterion_{}", form.name()))?,
+                weight: any(&format!("weight_{}", form.name()))?,
+            })
+        };
         Some(Self {
             subject: cell("subject"),
             condition: cell("condition"),
@@ -232,6 +264,7 @@ impl Person {
             status: cell("status").parse().ok()?,
             reason: cell("reason"),
             form: cell("form"),
+            forms: Form::ALL.iter().filter_map(evidence).collect(),
             parameters: PARAMETERS.iter().filter_map(parameter).collect(),
             crossover_rad_s: estimate("crossover_rad_s"),
             crossover_interval: interval("crossover_rad_s"),
@@ -245,6 +278,20 @@ impl Person {
             notes: parted(&cell("notes")),
         })
     }
+}
+
+/// The criteria of the forms of a fit, above the least, and their weights.
+fn evidence(fit: &FamilyFit) -> Vec<FormEvidence> {
+    let least = (fit.forms.iter().filter_map(|of| of.criterion)).fold(f64::INFINITY, f64::min);
+    let evidence = |form: &Form| {
+        let of = fit.forms.iter().find(|of| of.form == *form)?;
+        Some(FormEvidence {
+            form: *form,
+            criterion: of.criterion? - least,
+            weight: of.weight,
+        })
+    };
+    Form::ALL.iter().filter_map(evidence).collect()
 }
 
 /// Person and condition, as text.
@@ -261,12 +308,14 @@ pub(super) fn people_table(people: &[Person]) -> OutputTable {
     let used = |name: &&str| people.iter().any(|p| p.parameter(name).is_some());
     let names = PARAMETERS.map(|(name, _)| name);
     let names: Vec<&str> = names.iter().copied().filter(|name| used(name)).collect();
-    let mut rows = Rows::new(&people_schema(&names));
+    let tried = |form: &&Form| people.iter().any(|p| p.evidence(**form).is_some());
+    let forms: Vec<&str> = Form::ALL.iter().filter(tried).map(|form| form.name()).collect();
+    let mut rows = Rows::new(&people_schema(&names, &forms));
     people.iter().for_each(|person| person.write(&mut rows));
     rows.into_table(Vec::new())
 }
 
-fn people_schema(parameters: &[&str]) -> TableSchema {
+fn people_schema(parameters: &[&str], forms: &[&str]) -> TableSchema {
     let ends = ["crossover_rad_s", "phase_margin_deg"];
     let of_ends: Vec<String> = ends
         .iter()
@@ -277,6 +326,10 @@ fn people_schema(parameters: &[&str]) -> TableSchema {
         .flat_map(|name| ["", "_se", "_se_person", "_low", "_high", "_prior_share"].map(|end| format!("{name}{end}")))
         .collect();
     let determined: Vec<String> = parameters.iter().map(|name| format!("{name}_determined")).collect();
+    let of_forms: Vec<String> = forms
+        .iter()
+        .flat_map(|form| ["criterion", "weight"].map(|of| format!("{of}_{form}")))
+        .collect();
     schema(
         text(&["subject", "condition", "run"])
             .chain(real(&["runs"]))
@@ -284,6 +337,7 @@ fn people_schema(parameters: &[&str]) -> TableSchema {
             .chain(real(&of_parameters))
             .chain(text(&determined))
             .chain(real(&of_ends))
+            .chain(real(&of_forms))
             .chain(real(&["chi2", "dof", "kappa", "noise_order"]))
             .chain(text(&["verdict", "reasons", "notes"])),
     )
@@ -319,6 +373,18 @@ mod tests {
             run: "3".to_owned(),
             runs: 10,
             form: "lead-lag".to_owned(),
+            forms: vec![
+                FormEvidence {
+                    form: Form::Lead,
+                    criterion: 12.5,
+                    weight: 0.0,
+                },
+                FormEvidence {
+                    form: Form::LeadLag,
+                    criterion: 0.0,
+                    weight: 1.0,
+                },
+            ],
             parameters: vec![
                 parameter("T_I", "s", Some((4.0, f64::INFINITY)), false),
                 parameter("tau_e", "s", Some((0.18, 0.22)), true),
@@ -341,6 +407,7 @@ mod tests {
         assert_eq!((person.name().as_str(), failed.name().as_str()), ("P in c, run 3", "Q"));
         // No person has a lead: no columns for it.
         assert!(table.column("T_L").is_none() && table.column("T_I_low").is_some());
+        assert!(table.column("weight_gain").is_none() && table.column("weight_lead").is_some());
         person.parameters.clear();
         assert!(people_table(&[person]).column("tau_e").is_none());
     }

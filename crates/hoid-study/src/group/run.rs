@@ -127,6 +127,11 @@ pub fn run_group(
     })
 }
 
+/// True if a group was analysed into the directory, even if not to the end.
+pub fn has_results(directory: &Path) -> bool {
+    !matches!(RunRecord::read(directory), Ok(None))
+}
+
 /// Checks that no recording lies where the tables and parts are written.
 fn check_directory(manifest: &Manifest, base: &Path, directory: &Path) -> Result<(), StudyError> {
     let files = manifest

@@ -11,7 +11,7 @@ use hoid::model::{SampleTime, VerdictLevel};
 use hoid::report::{group_figures, write_group_pages};
 use hoid::sim::people::{Population, Range};
 use hoid::study::{
-    RunOptions,
+    Outcome, RunOptions,
     group::{
         ConditionElement, GroupSummary, MANIFEST, Manifest, Pattern, PeopleExperiment, VirtualExperiment, commented,
         inspect, run_group, simulate_group, simulate_people,
@@ -167,17 +167,13 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
     if !args.resume {
         hoid::io::check_output_directory(out, &[path])?;
     }
-    let base = path.parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf);
-    let runs = manifest.runs.iter().filter(|run| run.counts).count();
     let options = RunOptions {
         jobs: args.jobs.map(usize::from),
         resume: args.resume,
         csv: args.csv,
         ..RunOptions::default()
     };
-    let outcome = with_progress(&manifest.name, out, (runs, "runs"), |progress, go_on| {
-        run_group(&manifest, &base, out, &options, progress, go_on)
-    })?;
+    let outcome = analysed(&manifest, path, out, &options)?;
     let summary = GroupSummary::read(&manifest, out)?;
     let pages = shown(&write_group_pages(&manifest, path, out)?);
     if let Some(place) = &args.picture.figure {
@@ -216,6 +212,15 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
         return Err(CliError::NotDetermined(reasons.join("; ")));
     }
     Ok(())
+}
+
+/// Analyses the runs of a manifest into a directory, with a progress bar.
+pub fn analysed(manifest: &Manifest, path: &Path, out: &Path, options: &RunOptions) -> Result<Outcome, CliError> {
+    let base = path.parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf);
+    let runs = manifest.runs.iter().filter(|run| run.counts).count();
+    with_progress(&manifest.name, out, (runs, "runs"), |progress, go_on| {
+        run_group(manifest, &base, out, options, progress, go_on)
+    })
 }
 
 /// One file for each condition: the given name for one condition, with the condition appended for

@@ -1,0 +1,147 @@
+//! One form for all people and conditions that are compared: parameters have one meaning within one form only.
+//!
+//! People are independent, so that the evidence of a form is the sum of its criteria over people and conditions, each
+//! above the least of that person (K. P. Burnham and D. R. Anderson, *Model Selection and Multimodel Inference*, 2002,
+//! section 2.6). The common form is the simplest within 2 of the least sum. A form that the data of most people leave
+//! open is not considered: its parameters would not be determined.
+
+use std::path::Path;
+
+use hoid_model::{Finding, Form};
+use hoid_study::group::{FormEvidence, Manifest};
+
+use super::{CompareError, Comparing, GroupEstimates, Quantity, group_estimates::forms};
+
+/// Difference of sums of criteria that counts as no evidence.
+const NO_EVIDENCE: f64 = 2.0;
+/// Akaike weight of a form below which it has none in averages, and the difference of criteria that belongs to it.
+const NO_WEIGHT: f64 = 0.02;
+
+/// A form for all, with its evidence.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CommonForm {
+    /// The form.
+    pub form: Form,
+    /// Sum over people and conditions of its criterion above that of the best form of each.
+    pub criterion: f64,
+    /// Number of people and conditions.
+    pub cells: usize,
+}
+
+/// True if the data leave the form open: it has no weight, although its criterion is near the least.
+fn is_open(of: &FormEvidence) -> bool {
+    of.weight == 0.0 && of.criterion < -2.0 * NO_WEIGHT.ln()
+}
+
+/// The simplest form within 2 of the least sum of criteria; `None` if no form has a criterion for all.
+pub(super) fn common_form(people: &[&[FormEvidence]]) -> Option<CommonForm> {
+    let sum = |form: Form| -> Option<CommonForm> {
+        let of = |forms: &&[FormEvidence]| forms.iter().find(|of| of.form == form).cloned();
+        let all: Vec<FormEvidence> = people.iter().map(of).collect::<Option<_>>()?;
+        let open = all.iter().filter(|of| is_open(of)).count();
+        (2 * open <= all.len()).then(|| CommonForm {
+            form,
+            criterion: all.iter().map(|of| of.criterion).sum(),
+            cells: all.len(),
+        })
+    };
+    if people.is_empty() {
+        return None;
+    }
+    let sums: Vec<CommonForm> = Form::ALL.iter().filter_map(|form| sum(*form)).collect();
+    let least = sums.iter().map(|of| of.criterion).fold(f64::INFINITY, f64::min);
+    let near = sums.into_iter().filter(|of| of.criterion - least <= NO_EVIDENCE);
+    near.min_by_key(|of| (of.form.simplicity(), of.form))
+}
+
+impl Comparing {
+    /// Estimates of recordings: the runs are analysed by `analyse` into directories below `directory`, and if parameters
+    /// are compared and people differ in their form, once more in the common form.
+    ///
+    /// `analyse` runs [`hoid_study::group::run_group`] on the manifest, into the directory; a completed directory is
+    /// not analysed again.
+    ///
+    /// # Errors
+    /// Those of `analyse`, and of [`GroupEstimates::read`].
+    pub fn estimates_of<E: From<CompareError>>(
+        &self,
+        manifest: &Manifest,
+        directory: &Path,
+        mut analyse: impl FnMut(&Manifest, &Path) -> Result<(), E>,
+    ) -> Result<GroupEstimates, E> {
+        let mut estimates_in = |manifest: &Manifest, name: &str| -> Result<GroupEstimates, E> {
+            let place = directory.join(name);
+            analyse(manifest, &place)?;
+            Ok(GroupEstimates::read(&place)?)
+        };
+        let estimates = estimates_in(manifest, "group")?;
+        let of_one_form = |quantity: &Quantity| !quantity.is_of_any_form();
+        if !self.of.iter().any(of_one_form) || forms(estimates.cells.iter()).len() < 2 {
+            return Ok(estimates);
+        }
+        let Some(common) = estimates.common_form() else {
+            return Ok(estimates);
+        };
+        let mut in_form = manifest.clone();
+        common.form.name().clone_into(&mut in_form.analysis.form);
+        let parameters = estimates_in(&in_form, &format!("group-{}", common.form.name()))?;
+        Ok(estimates.with_parameters_of(parameters, common))
+    }
+}
+
+impl CommonForm {
+    /// The note on a comparison in this form.
+    pub(super) fn finding(&self, best: &str) -> Finding {
+        Finding::note(
+            "common-form",
+            format!(
+                "parameters are those of the form {} for all, the form of most evidence over {} fits (sum of criteria {:.1} above the best of each: {})",
+                self.form.name(),
+                self.cells,
+                self.criterion,
+                best
+            ),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn person(all: &[(Form, f64, f64)]) -> Vec<FormEvidence> {
+        let of = |&(form, criterion, weight): &(Form, f64, f64)| FormEvidence {
+            form,
+            criterion,
+            weight,
+        };
+        all.iter().map(of).collect()
+    }
+
+    #[test]
+    fn the_form_is_that_of_the_least_sum_and_the_simplest_near_it() {
+        use Form::{Gain, Lead, LeadLag};
+        let one = person(&[(Gain, 0.0, 0.8), (Lead, 2.0, 0.2), (LeadLag, 2.5, 0.1)]);
+        let two = person(&[(Gain, 30.0, 0.0), (Lead, 0.0, 0.6), (LeadLag, 1.0, 0.4)]);
+        let found = common_form(&[&one, &two]).unwrap();
+        assert_eq!((found.form, found.criterion, found.cells), (Lead, 2.0, 2));
+        // A simpler form within 2 is preferred.
+        let three = person(&[(Lead, 2.4, 0.2), (LeadLag, 0.0, 0.8)]);
+        assert_eq!(common_form(&[&two, &three, &one]).unwrap().form, Lead);
+        // A form that one has not is none for all.
+        let without = person(&[(Gain, 0.0, 1.0)]);
+        assert_eq!(common_form(&[&two, &without]).unwrap().form, Gain);
+        assert_eq!(common_form(&[]), None);
+        assert_eq!(common_form(&[&[]]), None);
+    }
+
+    #[test]
+    fn a_form_that_most_leave_open_is_not_common() {
+        use Form::{Lead, LeadLag};
+        let open = person(&[(Lead, 5.0, 1.0), (LeadLag, 0.0, 0.0)]);
+        let closed = person(&[(Lead, 5.0, 0.1), (LeadLag, 0.0, 0.9)]);
+        assert_eq!(common_form(&[&open, &open, &closed]).unwrap().form, Lead);
+        assert_eq!(common_form(&[&open, &closed, &closed]).unwrap().form, LeadLag);
+    }
+}
