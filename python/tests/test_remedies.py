@@ -73,7 +73,7 @@ def test_a_remedy_that_is_named_helps(
 @pytest.mark.parametrize(
     ("typed", "said"),
     [
-        ("give --fs HZ to count samples", "give sampling_frequency=HZ to count samples"),
+        ("give --fs HZ in place of t", "give sampling_frequency=HZ in place of t"),
         ("with --fs if t is wrong", "with sampling_frequency if t is wrong"),
         ("leave out with --from and --to", "leave out with start and stop"),
         ("--trial t, or --fill", 'trial="t", or fill=True'),

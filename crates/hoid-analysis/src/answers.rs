@@ -1,10 +1,10 @@
 //! Reliability of each answer of a result: the response, crossover and phase margin, each parameter.
 //!
 //! A finding against the data or the fit counts against all answers. In addition, an answer can be undetermined by
-//! itself: a parameter that the data do not determine, a crossover whose interval contains zero. The level of the
-//! whole is that of the requested answers: a result whose delay is undetermined is trustworthy for a request for the
-//! crossover, and not determined for a request for the delay. By default it is that of the response, and an
-//! undetermined loop is a doubt.
+//! itself: a parameter that the data do not determine, a crossover whose interval contains zero. The level of the whole
+//! result is that of the requested answers: a result whose delay is undetermined is trustworthy for a request for the
+//! crossover, and not determined for a request for the delay. By default the response is requested, and an undetermined
+//! loop is a doubt.
 
 use hoid_ident::{Fit, GreyBoxFit, SigmoidFit, diagnostics::is_open, family::FamilyFit};
 use hoid_model::{ContinuousTransferFunction, Finding, Verdict, operator_family::PARAMETERS, uncertainty::Estimate};
@@ -17,7 +17,7 @@ pub const RESPONSE: &str = "response";
 pub const LOOP: [&str; 2] = ["crossover", "phase_margin"];
 /// Kind of the finding that makes a single answer undetermined.
 const OPEN: &str = "open-answer";
-/// Largest standard errors of a determined crossover, as a share of it, and of a determined margin, deg.
+/// Largest standard errors of a determined crossover, as a fraction of its value, and of a determined margin, deg.
 const LARGEST_ERRORS: [f64; 2] = [0.5, 30.0];
 
 /// An answer, and the reason why it is undetermined.
@@ -106,7 +106,7 @@ fn of_loop(measures: [Option<Measured>; 2]) -> impl Iterator<Item = Answered> {
     (0..2).map(move |k| {
         let why = match measures[k] {
             None => Some(format!(
-                "{} is open: the gain of the loop does not fall through one",
+                "{} is not determined: the gain of the loop does not cross one from above",
                 words[k]
             )),
             Some((value, interval)) => {
@@ -162,7 +162,8 @@ pub(crate) fn of_operator(fit: &Fit) -> Vec<Answered> {
     let mut all = vec![answered(RESPONSE, None)];
     if let Ok(operator) = fit.operator() {
         all.extend(operator.rows().iter().map(|(name, _, estimate)| {
-            let why = is_open(estimate).then(|| format!("{name} ({estimate}) is not distinguished from zero"));
+            let why =
+                is_open(estimate).then(|| format!("{name} ({estimate}) is not significantly different from zero"));
             answered(name, why)
         }));
     }

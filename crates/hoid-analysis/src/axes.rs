@@ -6,8 +6,8 @@
 //! Dynamics* 13 (1990) 348-355).
 //!
 //! **Lines.** Targets that excite both axes at the same frequencies move e_x and e_y together, so that an operator
-//! whose form lacks something looks like a coupling. The excitations of the axes must therefore be recorded, and have
-//! lines of their own; otherwise the coupling is reported as not tested.
+//! whose form lacks something looks like a coupling. The excitations of the axes must therefore be recorded, and each
+//! must have its own lines; otherwise the coupling is reported as not tested.
 //!
 //! **Level.** Both directions of all pairs of axes are tests: a coupling is reported if its probability by chance is
 //! below .01 divided by their number (Bonferroni).
@@ -54,7 +54,8 @@ impl FromStr for AxisPair {
                 excitation: rest.first().map(|&name| name.to_owned()),
             }),
             _ => Err(format!(
-                "found {text:?}, expected error and control of an axis, as ex,ux, or with its excitation, as ex,ux,rx"
+                "found {text:?}, expected error and control of an axis, such as ex,ux, or with its excitation, such as \
+                 ex,ux,rx"
             )),
         }
     }
@@ -92,7 +93,7 @@ pub fn axes(identification: &Identification, mut all: Vec<(AxisPair, Recordings)
     for x in 0..all.len() {
         for y in (0..all.len()).filter(|y| *y != x) {
             let name = &pairs[y].input;
-            // An expression as r-y is not a column of the records.
+            // An expression such as r-y is not a column of the records.
             if all[x].1.records.iter().any(|record| record.channel(name).is_none()) {
                 let other = all[y].1.records.clone();
                 with_error(&mut all[x].1.records, name, &other)?;
@@ -172,7 +173,7 @@ fn coupling(
             .map(|(found, _)| found.p_value)
             .ok_or_else(|| {
                 format!(
-                    "{} is not an input that can be fitted next to {}",
+                    "{} cannot be fitted as an input together with {}",
                     other.input, pair.input
                 )
             })
@@ -184,10 +185,10 @@ fn coupling(
     }
 }
 
-/// Returns the reason why the excitations of two axes do not tell their errors apart.
+/// Returns the reason why the excitations of two axes do not separate their errors.
 fn separate(records: &[Record], pair: &AxisPair, other: &AxisPair, period_s: Option<f64>) -> Result<(), String> {
     let (Some(own), Some(of_other)) = (&pair.excitation, &other.excitation) else {
-        return Err("the excitations of both axes are not given, as ex,ux,rx".to_owned());
+        return Err("the excitation is not given for both axes, as in ex,ux,rx".to_owned());
     };
     let search = LineSearch {
         period_s,
@@ -204,7 +205,7 @@ fn separate(records: &[Record], pair: &AxisPair, other: &AxisPair, period_s: Opt
             .find(|a| there.iter().any(|b| (*a / b - 1.0).abs() < SAME_LINE));
         if let Some(omega) = shared {
             return Err(format!(
-                "{own} and {of_other} share the line at {omega:.3} rad/s: give each axis lines of its own"
+                "{own} and {of_other} share the line at {omega:.3} rad/s: give each axis its own lines"
             ));
         }
     }

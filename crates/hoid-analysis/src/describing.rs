@@ -89,7 +89,7 @@ impl Describing {
         list.extend([
             Setting::new("lines", lines).given(given),
             Setting::new("average", average),
-            Setting::new("delay taken out between lines", format!("{:.3} s", found.delay_s)),
+            Setting::new("delay removed between lines", format!("{:.3} s", found.delay_s)),
         ]);
         let element = self.options.controlled_element.as_ref();
         list.extend(element.map(|element| Setting::new("controlled element", element.to_string()).given(true)));

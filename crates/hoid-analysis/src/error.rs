@@ -17,9 +17,9 @@ pub enum AnalysisError {
         "{first} and {second} hold the same samples of e and u; runs of one person must be different recordings: give each once"
     )]
     SameSamples {
-        /// Name of the one.
+        /// Name of the first.
         first: String,
-        /// Name of the other.
+        /// Name of the second.
         second: String,
     },
     /// A file without the requested columns, which contains them under other names.
@@ -27,9 +27,10 @@ pub enum AnalysisError {
     OtherColumns(Box<OtherColumns>),
     /// A column that is in another of the files.
     #[error(
-        "{file} has no column {missing}, but {other} has: each file is a recording of its own. Where both are one recording, join them \
-         by their times, in Python by pandas.merge(pandas.read_csv(\"{file}\"), pandas.read_csv(\"{other}\"), on=\"t\", how=\"outer\")\
-         .sort_values(\"t\").to_csv(\"joined.csv\", index=False), and read joined.csv with --sparse e=linear,u=linear --resample"
+        "{file} has no column {missing}, but {other} has: each file is taken as a separate recording. If they are \
+         parts of one recording, join them by time, in Python with pandas.merge(pandas.read_csv(\"{file}\"), \
+         pandas.read_csv(\"{other}\"), on=\"t\", how=\"outer\").sort_values(\"t\").to_csv(\"joined.csv\", \
+         index=False), and read joined.csv with --sparse e=linear,u=linear --resample"
     )]
     InAnotherFile {
         /// The file without the column.
@@ -55,7 +56,7 @@ pub enum AnalysisError {
     },
     /// A text that is not a result.
     #[error(
-        "this is not a result of a fit: {found}; expected what to_json of this version wrote, or identify --json printed"
+        "this is not a result of a fit: {found}; expected the output of to_json of this version, or of identify --json"
     )]
     NotAResult {
         /// The value found.
@@ -103,7 +104,7 @@ impl From<IdentError> for AnalysisError {
 }
 
 impl AnalysisError {
-    /// Error for a file that cannot be read, with the columns to ask for if it has others than requested.
+    /// Error for a file that cannot be read, with the columns to request if it does not have the requested ones.
     pub fn of_reading(error: IoError, path: &Path, options: &ReadOptions) -> Self {
         match other_columns(&error, path, options) {
             Some(others) => Self::OtherColumns(Box::new(others)),

@@ -79,7 +79,8 @@ impl Reading {
     }
 }
 
-/// Error for a column that is in another of the files: eye and stick, each with a rate of its own, are no two recordings.
+/// Error for a column that is in another of the files: the signals of an eye tracker and a stick, each with its own
+/// rate, are not two recordings.
 fn in_another_file(error: AnalysisError, path: &Path, paths: &[PathBuf]) -> AnalysisError {
     let AnalysisError::Io(IoError::NoSuchColumn { missing, .. }) = &error else {
         return error;

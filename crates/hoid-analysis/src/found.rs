@@ -14,7 +14,7 @@ pub struct FoundFault {
     pub kind: &'static str,
     /// The channel; empty for all channels and for the time.
     pub channel: String,
-    /// Time of its first sample, s; none without a time.
+    /// Time of its first sample, s; `None` without a time.
     #[serde(rename = "from")]
     pub from_s: Option<f64>,
     /// Time of the sample after its last, s.
@@ -49,7 +49,7 @@ impl From<&Fault> for FoundFault {
 }
 
 impl From<&QualityIssue> for FoundFault {
-    /// The fault spans the issue from its first place to its last.
+    /// The fault spans the issue from its first occurrence to its last.
     fn from(issue: &QualityIssue) -> Self {
         Self {
             kind: issue.kind.name(),

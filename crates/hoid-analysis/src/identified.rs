@@ -71,7 +71,7 @@ impl<E: BatchEstimator> Identification<E> {
         let mut data = recordings
             .repaired(self.faults, E::OF)?
             .at_rate(self.rate, counts_samples)?;
-        // Before the fit, which takes the response to further inputs out of u.
+        // Before the fit, which removes the response to further inputs from u.
         let element = data.element_finding(self.controlled_element.as_ref(), self.excitation.named());
         let Fitted {
             mut fit,

@@ -107,6 +107,6 @@ impl Recordings {
 impl Setting {
     /// The setting of an estimated level.
     pub(crate) fn level() -> Self {
-        Self::new("level", "one constant of u a record, estimated")
+        Self::new("level", "one constant of u per record, estimated")
     }
 }

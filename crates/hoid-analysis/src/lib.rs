@@ -1,9 +1,9 @@
 //! From recordings to a result and its verdict, in one place for all callers.
 //!
 //! An estimator takes each sample as correct, and its error bars are those of its model. The reliability of a result
-//! depends on more: on faults of the recording and their treatment, on a second fit without suspicious samples, on
-//! whether a person could have controlled the loop. These rules are only here; command line, groups and Python parse
-//! options and show results.
+//! also depends on faults of the recording and their treatment, on a second fit without suspicious samples, and on
+//! whether a person could have controlled the loop. These rules are implemented only here; command line, groups and
+//! Python parse options and show results.
 //!
 //! ```text
 //! files -- Reading --> Recordings -- Identification { options }.run --> Identified { fit, verdict, data, settings }

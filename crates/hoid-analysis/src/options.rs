@@ -41,8 +41,8 @@ pub(crate) fn with_prior_of_fits<E: 'static>(
 
 /// The channel of the excitation, and its period.
 pub(crate) fn excitation<E: 'static>() -> [AnalysisOption<E>; 2] {
-    let help = "Column of the recorded disturbance or target, for the fit at its lines; none for no such fit";
-    let channel = Setting::new("excitation", Kind::Channel, help).default("f_t, d, r ... where one has lines");
+    let help = "Column of the recorded disturbance or target, for the fit at its lines; none: no such fit";
+    let channel = Setting::new("excitation", Kind::Channel, help).default("the first of f_t, d, r ... with lines");
     let period = Setting::new("period", Kind::Number, "Period of the excitation")
         .default("found in it")
         .unit("s")
@@ -61,8 +61,8 @@ pub(crate) fn excitation<E: 'static>() -> [AnalysisOption<E>; 2] {
 
 /// The controlled element.
 pub(crate) fn controlled_element<E: 'static>() -> AnalysisOption<E> {
-    let help = "Controlled element in s, as 90/(s(s+6)), or NUM/DEN by descending powers of s, as 90/1,6,0: adds \
-                crossover frequency and margins";
+    let help = "Controlled element in s, as 90/(s(s+6)), or NUM/DEN in descending powers of s, as 90/1,6,0: adds \
+     crossover frequency and margins";
     let setting = Setting::new("controlled_element", Kind::Element, help);
     BatchOption::new(setting, |how: &mut Identification<E>, option, text| {
         let element = text.parse();
@@ -75,7 +75,7 @@ pub(crate) fn controlled_element<E: 'static>() -> AnalysisOption<E> {
 /// The answers that the verdict is about.
 pub(crate) fn answers<E: 'static>() -> AnalysisOption<E> {
     let help =
-        "What the verdict is about: response, crossover, phase_margin, parameters by their names, as crossover,tau_e";
+        "Quantities that the verdict covers: response, crossover, phase_margin or parameters, as crossover,tau_e";
     let setting = Setting::new("answers", Kind::Names, help).default("response and loop");
     BatchOption::new(setting, |how: &mut Identification<E>, option, text| {
         how.answers = asked_for(&option.read::<Vec<String>>(text)?)?;

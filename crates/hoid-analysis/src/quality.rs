@@ -17,8 +17,8 @@ use hoid_numerics::statistics::standard_deviation;
 
 use crate::recordings::{Account, RESTING};
 
-/// Shares of the rows at the limits of the stick, and steps of e and u over their deviations, beyond which a result is
-/// doubtful: clipped or rounded information is lost.
+/// Shares of the rows at the limits of the stick, and quantisation steps of e and u divided by their deviations, beyond
+/// which a result is doubtful: clipped or rounded information is lost.
 const AT_ENDS: f64 = 0.05;
 const COARSE: [f64; 2] = [0.05, 0.15];
 /// Longest gap that may be bridged by a straight line, s.
@@ -95,8 +95,8 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
         all.push(Finding::doubt(
             "bridged",
             format!(
-                "gaps of up to {longest:.2} s are bridged by straight lines, which count as tracking here; leave them out by \
-                 --mask gap in a fit, by hoid stream in a tracker"
+                "gaps of up to {longest:.2} s are bridged by straight lines, which are analysed as if recorded; \
+                 exclude them with --mask gap in a fit, or track with hoid stream"
             ),
         ));
     }
@@ -114,8 +114,8 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
             all.push(Finding::doubt(
                 "held",
                 format!(
-                    "{channel} is held for up to {longest_s:.2} s: what happened in between is not in the recording; shorten the \
-                     span by --from and --to"
+                    "{channel} is held for up to {longest_s:.2} s: changes in between are not in the recording; \
+                     shorten the span with --from and --to"
                 ),
             ));
         }

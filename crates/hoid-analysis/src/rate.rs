@@ -7,8 +7,8 @@ use hoid_model::{Decimation, SampleTime};
 use crate::{AnalysisError, recordings::Recordings};
 
 impl Recordings {
-    /// Decimates the recordings and records it in their accounts; for an estimator that counts samples only if a
-    /// factor was named, and not if the rate was named in reading.
+    /// Decimates the recordings and records it in their accounts; for an estimator that counts samples, only if a
+    /// factor was named; never if the rate was named in reading.
     ///
     /// # Errors
     /// The errors of the decimation.
@@ -60,7 +60,7 @@ pub fn kept_rate(sample_time: SampleTime, decimation: Decimation, counts_samples
     let hz = (1e4 / sample_time.s()).round() / 1e4;
     kept.then(|| {
         format!(
-            "{hz} Hz is kept, since orders and delays count samples here; --decimate {factor} brings it near 100 Hz"
+            "{hz} Hz is kept, since orders and delays are in samples here; --decimate {factor} brings it near 100 Hz"
         )
     })
 }

@@ -3,7 +3,7 @@
 //! Flags and help of the command line, keys of plans, keywords of Python, the page of options and the names of printed
 //! settings are made from this list. An option is in the file of its estimator
 //! ([`BatchOptions`](hoid_ident::settings::BatchOptions)), an estimator in a file of `estimators/`, and a new
-//! instrumental-variable method is here by being in [`IvMethod::ALL`](hoid_ident::IvMethod::ALL).
+//! instrumental-variable method is listed here once it is in [`IvMethod::ALL`](hoid_ident::IvMethod::ALL).
 
 use hoid_ident::{
     GreyBox, SigmoidChange,

@@ -97,7 +97,7 @@ pub(crate) fn steps_from_level_to_level(record: &Record) -> bool {
     levels.len() > 1
 }
 
-/// Repairs the same records, read in another way, alike.
+/// Repairs the same records, read in another way, in the same manner.
 pub(crate) fn repaired_alike(records: Vec<Record>, handling: FaultHandling) -> Result<Vec<Record>, ModelError> {
     let mut all = Vec::with_capacity(records.len());
     for record in records {

@@ -145,7 +145,7 @@ impl Request {
         {
             return Err(AnalysisError::Option {
                 name: setting.name,
-                reason: "it belongs to a structure with an input".to_owned(),
+                reason: "it applies only to a structure with an input".to_owned(),
             });
         }
         each!(&mut asked, how => {
@@ -186,7 +186,7 @@ impl Request {
             let own = method.structure();
             if typed.is_some() && polynomial != Some(own) {
                 return Err(options(format!(
-                    "method {method} fits the structure {}; drop the structure, or take the method pem",
+                    "method {method} fits the structure {}; drop the structure, or use the method pem",
                     own.name()
                 )));
             }
@@ -231,7 +231,7 @@ impl Request {
             _ => None,
         };
         if let Some((name, with)) = was {
-            notes.push(format!("structure {name} is called operator{with} now"));
+            notes.push(format!("structure {name} is now called operator{with}"));
         }
         let changes = typed == Some("time-varying") || said("change") == Some("sigmoid");
         let individual = self.options.get("individual").map(String::as_str).unwrap_or_default();
@@ -245,14 +245,14 @@ impl Request {
             (true, Some("arma" | "remnant")) => Err(AnalysisError::Option {
                 name: "noise",
                 reason: format!(
-                    "found {}; an operator that changes has the noise ar alone",
+                    "found {}; an operator that changes has only the noise ar",
                     noise.unwrap_or_default()
                 ),
             }),
             (true, _) => Ok(CHANGE),
             (false, Some("remnant")) => Ok(REMNANT),
             (false, None) if of_remnant => {
-                notes.push("the options ask for the operator with noise remnant, which is taken".to_owned());
+                notes.push("the options require the operator with noise remnant, which is used".to_owned());
                 Ok(REMNANT)
             }
             _ => Ok(OPERATOR),

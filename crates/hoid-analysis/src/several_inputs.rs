@@ -49,7 +49,7 @@ pub fn several_inputs(
     let number = |name: &str, text: &str| {
         text.trim().parse::<usize>().map_err(|_| {
             options(format!(
-                "orders: {name} is {text:?}, expected a number for each input, as nb=2,3"
+                "orders: {name} is {text:?}, expected a number for each input, such as nb=2,3"
             ))
         })
     };
@@ -60,7 +60,7 @@ pub fn several_inputs(
             (None, Some((name, values))) => values.push(number(name, part)?),
             (None, None) => {
                 return Err(options(format!(
-                    "orders: found {part:?}, expected NAME=NUMBER, as na=2,nb=2,3"
+                    "orders: found {part:?}, expected NAME=NUMBER, such as na=2,nb=2,3"
                 )));
             }
         }
@@ -187,7 +187,7 @@ impl SeveralInputsResult {
             ));
         }
         if fit.covariance().is_none() {
-            let message = "the data leave a combination of coefficients open: there are no error bars";
+            let message = "the data do not determine a combination of coefficients: there are no error bars";
             findings.push(Finding::undetermined("singular", message));
         }
         for (name, _) in &model.inputs {

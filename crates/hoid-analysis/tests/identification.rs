@@ -144,7 +144,7 @@ fn settings_are_the_values_that_were_used() {
     assert_eq!(value("search"), Some("auto, relative tolerance 1e-7"));
     assert_eq!(value("initial state"), Some("estimate"));
     assert_eq!(value("form"), Some("lead"));
-    assert_eq!(value("taken out of e and u"), Some("mean"));
+    assert_eq!(value("removed from e and u"), Some("mean"));
     assert!(found.data.accounts[0].level.is_some());
 }
 
@@ -314,7 +314,7 @@ fn every_estimator_hears_of_the_recordings() {
         refused
             .unwrap_err()
             .to_string()
-            .contains("--start belongs to one model")
+            .contains("--start applies to a single model")
     );
 }
 

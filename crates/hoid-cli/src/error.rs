@@ -29,7 +29,7 @@ pub enum CliError {
     #[error("{0}")]
     Stream(String),
     /// A result that could not be printed.
-    #[error("standard output cannot be written: {0}; what was asked is missing, or is cut: make room for it")]
+    #[error("standard output cannot be written: {0}; the requested output is missing or truncated: free space for it")]
     Output(std::io::Error),
     /// A printed result for which the data do not determine the requested quantity.
     #[error("the data do not determine the requested quantity: {0}")]

@@ -29,7 +29,7 @@ pub fn to_text(found: &Converted, gain: &GainUnit) -> String {
         "The polynomials are the exact model of this operator.\n".to_owned()
     } else {
         format!(
-            "The exact model of this operator is off the polynomials by at most {:.1} % of the response.\n",
+            "The exact model of this operator differs from the polynomials by at most {:.1} % of the response.\n",
             100.0 * found.mismatch
         )
     });

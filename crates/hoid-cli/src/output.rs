@@ -63,7 +63,7 @@ fn coloured(page: &str) -> String {
 /// Minimum and maximum width of a page: below, words are cut; above, lines are hard to follow.
 const WIDTHS: (usize, usize) = (60, 110);
 
-/// Width of the screen in columns: `COLUMNS`, otherwise that of the terminal; none for a page in a
+/// Width of the screen in columns: `COLUMNS`, otherwise that of the terminal; `None` for a page in a
 /// file, whose lines are not wrapped.
 pub fn width() -> Option<usize> {
     let told = std::env::var("COLUMNS").ok().and_then(|text| text.parse().ok());
@@ -183,8 +183,8 @@ pub fn progress(total: usize, what: &str) -> ProgressBar {
     bar
 }
 
-/// Runs a long computation with the elapsed time on standard error, and a bar with the remaining
-/// time once it reports progress; nothing if standard error is not a terminal.
+/// Runs a long computation and shows the elapsed time on standard error, with a bar and the remaining time once the
+/// computation reports progress. Shows nothing if standard error is not a terminal.
 pub fn watched<T>(what: &'static str, work: impl FnOnce() -> T) -> T {
     let bar = ProgressBar::new_spinner().with_message(what);
     if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}, {elapsed}") {

@@ -22,7 +22,7 @@ fn kind_as_text(kind: Kind) -> String {
         Kind::Memory => "`256` samples, `2.56s` or `inf`".to_owned(),
         Kind::NumberOrOff => "number or `off`".to_owned(),
         Kind::Span => "`LO..HI`".to_owned(),
-        Kind::OpenSpan => "`LO..HI`, either end may be left out".to_owned(),
+        Kind::OpenSpan => "`LO..HI`; either end may be omitted".to_owned(),
         Kind::Choice(words) => words
             .iter()
             .map(|word| format!("`{word}`"))

@@ -41,7 +41,7 @@ impl Rows {
         }
     }
 
-    /// Marks the rows as a time series, of which some but not the last may be omitted for lack of space.
+    /// Marks the rows as a time series; for lack of space some rows, but not the last, may be omitted.
     pub fn into_time_series(self) -> Self {
         Self { course: true, ..self }
     }
@@ -65,7 +65,7 @@ impl Rows {
         }
     }
 
-    /// A time series transposed, with its times as headings, for a narrow screen; none if not even the last fits.
+    /// A time series transposed, with its times as headings, for a narrow screen; `None` if not even the last fits.
     fn on_its_side(&self, width: usize) -> Option<String> {
         let last = self.rows.len().checked_sub(1).filter(|_| self.course)?;
         (1..=self.rows.len()).rev().find_map(|count| {

@@ -97,7 +97,9 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbo
 pub fn levels(files: &[String], accounts: &[Account]) -> String {
     let line = |(file, account): (&String, &Account)| {
         let level = account.level.as_ref()?;
-        Some(format!("{file}: level of u next to its response to e: {level}\n"))
+        Some(format!(
+            "{file}: level of u in addition to its response to e: {level}\n"
+        ))
     };
     files.iter().zip(accounts).filter_map(line).collect()
 }
@@ -457,7 +459,7 @@ pub fn residual_tests(files: &[String], validations: &[Validation]) -> String {
     for (seen, sentence) in [
         (
             coloured,
-            "Not white: a richer noise model (nd, nc) would serve, and in a closed loop bias less.\n",
+            "Not white: use a richer noise model (larger nd or nc), which in a closed loop also reduces the bias.\n",
         ),
         (
             missed,

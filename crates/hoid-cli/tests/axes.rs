@@ -160,11 +160,11 @@ fn pairs_that_make_no_sense_are_refused() {
         ),
         (
             &["--pair", "ex,ux", "--pair", "ey,uy", "--figure", "x.svg"],
-            "belongs to one axis",
+            "applies to one axis",
         ),
         (
             &["--pair", "ex,ux", "--pair", "ey,uy", "--structure", "bj"],
-            "belongs to the structure operator",
+            "is for the structure operator",
         ),
     ] {
         let (code, said) = bad(at.path(), &[&["identify", "two.csv"], pairs].concat());

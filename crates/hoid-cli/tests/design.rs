@@ -29,7 +29,7 @@ fn a_design_is_judged_and_runs() {
     ];
     let said = good(at, &arguments);
     assert!(
-        said.starts_with("Errors to be expected of") && said.contains("With reference it takes"),
+        said.starts_with("Expected errors of") && said.contains("With reference it takes"),
         "{said}"
     );
     let object = json(

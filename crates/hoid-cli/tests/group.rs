@@ -74,7 +74,7 @@ fn a_virtual_experiment_is_analysed_and_reported() {
     // Failures and doubtful results come before the numbers.
     let at_operators = said.find("Operators").unwrap();
     assert!(
-        said.find("C3 has no operator of the whole run").unwrap() < at_operators,
+        said.find("C3 has no operator for the whole run").unwrap() < at_operators,
         "{said}"
     );
     for name in [
@@ -247,7 +247,7 @@ fn init_looks_at_the_files_and_says_what_it_saw() {
     for (evidence, line) in [
         ("# the tracking error, by its name", "input = "),
         ("# d has", "excitation = "),
-        ("# e returns from u by the controlled element", "offset_samples = "),
+        ("# e follows from u through the controlled element", "offset_samples = "),
         ("# of the first run BIC chooses nd", "nd = "),
         ("# of the first run alone the form is", "form = "),
     ] {

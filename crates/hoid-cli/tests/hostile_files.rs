@@ -44,7 +44,7 @@ fn cut_files_are_named_as_cut() {
     fs::write(d.join("cut.csv"), &text[..text.len() - 60]).unwrap();
     let (_, message) = bad(d, &["identify", "cut.csv"]);
     assert!(
-        message.contains("cut.csv is cut in line") && message.contains("remove that line"),
+        message.contains("cut.csv is truncated in line") && message.contains("remove that line"),
         "{message}"
     );
     for extension in ["parquet", "mat"] {
@@ -53,13 +53,13 @@ fn cut_files_are_named_as_cut() {
         let bytes = fs::read(d.join(&whole)).unwrap();
         fs::write(d.join(&cut), &bytes[..bytes.len() / 2]).unwrap();
         let (_, message) = bad(d, &["info", &cut]);
-        assert!(message.contains("is cut"), "{message}");
+        assert!(message.contains("is truncated"), "{message}");
     }
     let xdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/xdf/tracking.xdf");
     let bytes = fs::read(xdf).unwrap();
     fs::write(d.join("cut.xdf"), &bytes[..bytes.len() / 2]).unwrap();
     let told = good(d, &["info", "cut.xdf"]);
-    assert!(told.contains("the file is cut at byte"), "{told}");
+    assert!(told.contains("the file is truncated at byte"), "{told}");
 }
 
 #[test]
@@ -166,5 +166,5 @@ fn a_stream_at_another_rate_is_told_once() {
     drop(input);
     let said = String::from_utf8(stream.wait_with_output().unwrap().stderr).unwrap();
     assert_eq!(said.matches("warning").count(), 1, "{said}");
-    assert!(said.contains("the times go at 50.0000 Hz"), "{said}");
+    assert!(said.contains("the times run at 50.0000 Hz"), "{said}");
 }

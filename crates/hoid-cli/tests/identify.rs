@@ -559,10 +559,7 @@ fn the_course_between_samples_moves_the_delay_by_half_a_sample() {
             "foh",
         ],
     );
-    assert!(
-        text.contains("an error that runs straight between its samples"),
-        "{text}"
-    );
+    assert!(text.contains("an error that is linear between its samples"), "{text}");
     let (code, words) = bad(d, &[&arguments[..], &["--intersample", "cubic"]].concat());
     assert!(code == 2 && words.contains("zoh"), "{words}");
 }

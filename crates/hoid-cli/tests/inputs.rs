@@ -222,7 +222,7 @@ fn polynomials_with_two_inputs() {
         (&["--orders", "nb=1,2,3"][..], "3 numbers for 2 inputs"),
         (&["--orders", "nq=1"], "no order nq"),
         (&["--orders", "nb=two"], "expected a number for each input"),
-        (&["--stable"], "--stable does not belong"),
+        (&["--stable"], "--stable does not apply"),
         (&["--role", "y=output"], "y is not one of the further inputs f_t"),
         (&["--role", "f_t=feedforward:0.25"], "neither a preview nor a form"),
         (&["--role", "f_t=feedback"], "the feedback is the first --input"),

@@ -200,7 +200,7 @@ fn a_full_output_is_an_error_of_every_command() {
         &["simulate", "--condition", "C1", "--out", "full.csv"],
     );
     assert_eq!(to_file.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&to_file.stderr).contains("make room"));
+    assert!(String::from_utf8_lossy(&to_file.stderr).contains("free space"));
 }
 
 #[cfg(unix)]

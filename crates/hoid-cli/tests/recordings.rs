@@ -246,7 +246,7 @@ fn wrong_preparations_are_told_in_the_users_words() {
             "there is no channel \"q\", expected one of e, u",
         ),
         (&["--scale", "e=2", "--scale", "e=3"], 2, "names e twice"),
-        (&["--scale", "e=rad:N"], 2, "two units of one kind"),
+        (&["--scale", "e=rad:N"], 2, "two units of the same kind"),
         (&["--offset", "u=4000"], 1, "u=4000 samples in a record of 3998 samples"),
         (&["--offset", "u=x"], 2, "expected a number of samples"),
         (&["--decimate", "0"], 2, "expected auto, off"),

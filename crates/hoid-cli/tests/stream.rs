@@ -337,7 +337,7 @@ fn a_wild_value_and_a_hostile_span_are_told_in_their_lines() {
         (&1.into(), &"trustworthy".into()),
         "{last}"
     );
-    assert!(said.contains("started again 1 time."), "{said}");
+    assert!(said.contains("restarted 1 time."), "{said}");
 }
 
 #[test]
@@ -465,7 +465,7 @@ fn a_warm_up_that_fails_goes_on_until_there_is_something_to_fit() {
     let (lines, _) = answers(&arguments, &(input + &",\n".repeat(101) + "0.1,0.2\n"));
     let last = &lines.last().unwrap()["warm_up"];
     assert!(
-        last["collected"] == 1 && last["reason"].as_str().unwrap().contains("started again"),
+        last["collected"] == 1 && last["reason"].as_str().unwrap().contains("restarted"),
         "{last}"
     );
 }
@@ -578,7 +578,7 @@ fn wrong_usage_and_wrong_headers() {
         assert_eq!(code, 2, "{arguments:?}: {message}");
     }
     for (more, expected) in [
-        (&["--warm-up", "5"][..], "speaks at once"),
+        (&["--warm-up", "5"][..], "estimates from the start"),
         (&["--start", "nothing", "--nk", "29"], "a prior in its place"),
         (&["--prior", "omega_nm=1"], "CENTRE:SPREAD"),
     ] {

@@ -168,7 +168,7 @@ fn places_that_cannot_be_are_refused() {
     for (places, reason) in [
         ("5005", "5005:5006"),
         ("5005:5005", "another port"),
-        (&format!("{port}:9"), "cannot be listened on"),
+        (&format!("{port}:9"), "cannot listen on"),
     ] {
         let (code, message) = bad(directory.path(), &["stream", "--fs", "100", "--udp", places]);
         assert!(code > 0 && message.contains(reason), "{message}");

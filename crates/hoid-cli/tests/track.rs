@@ -511,9 +511,9 @@ fn what_does_not_fit_together_ends_with_two() {
         (&["--structure", "arx"], "bj with nb = 2"),
         (&["--structure", "grey-box"], "bj"),
         (&["--forgetting", "random-walk"], "drift K_e=.01"),
-        (&["--drift", "K_e=.1"], "forgetting = random-walk, to which it belongs"),
+        (&["--drift", "K_e=.1"], "forgetting = random-walk, whose option it is"),
         (&["--forgetting", "random-walk", "--drift", "b0=.1"], "K_e"),
-        (&["--rate", ".1"], "forgetting = gradient, to which it belongs"),
+        (&["--rate", ".1"], "forgetting = gradient, whose option it is"),
         (&["--forgetting", "gradient", "--rate", "3"], "between 0 and 2"),
         (&["--covariance", "-1"], "positive"),
         (&["--largest", "0"], "positive"),
@@ -524,7 +524,7 @@ fn what_does_not_fit_together_ends_with_two() {
         (&["--method", "rpem", "--bound", "omega_nm=5..30"], "--method physical"),
         (&["--bound", "K_x=5..30"], "K_e_dot"),
         (&["--method", "rls", "--track-delay", ".1...3"], "--method rpem"),
-        (&["--start", "b0=1"], "--start: it belongs to one model"),
+        (&["--start", "b0=1"], "--start: it applies to a single model"),
         (&["--start", "b0=1", "--nk", "29"], "--start: it lacks b1"),
         (
             &[
@@ -751,8 +751,8 @@ fn the_methods_are_listed_without_a_record() {
 fn a_method_that_is_no_recursion_says_so() {
     let directory = TempDir::new().unwrap();
     for (typed, name) in [
-        ("wavelet", "wavelet is no recursion"),
-        ("lpv", "lpv-subspace is no recursion"),
+        ("wavelet", "wavelet is not a recursion"),
+        ("lpv", "lpv-subspace is not a recursion"),
         ("rls-fir", "rls-fir does not track recordings"),
     ] {
         let (code, message) = bad(directory.path(), &["track", "c.csv", "--method", typed]);

@@ -240,7 +240,7 @@ fn a_controlled_element_that_the_recording_refutes_is_a_doubt_in_every_command()
         assert_eq!(found(command, "90/(s(s+6))"), [""; 0], "{command:?}");
         let [message] = found(command, "45/(s(s+6))").try_into().unwrap();
         assert!(
-            message.starts_with("e returns from u by 90/(s^2 + 6s), not by 45/(s^2 + 6s)"),
+            message.starts_with("e follows from u through 90/(s^2 + 6s), not through 45/(s^2 + 6s)"),
             "{command:?}: {message}"
         );
     }

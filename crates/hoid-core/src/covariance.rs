@@ -69,7 +69,7 @@ impl<const N: usize> Covariance<N> {
     }
 
     /// Builds the gain. `factors` is P at the start. `bound` is the largest variance of each parameter, in the units
-    /// of P; infinite for none.
+    /// of P; infinite if there is none.
     pub fn new(factors: UdCovariance<N>, forgetting: Forgetting<N>, bound: [f64; N]) -> Self {
         let mut scales = [[1.0; N]; 2];
         let mut uniform_growth = 0.0;
@@ -126,7 +126,8 @@ impl<const N: usize> Covariance<N> {
         self
     }
 
-    /// Multiplies P by a factor: below one the estimate moves less until it has forgotten, above one more.
+    /// Multiplies P by a factor: below one, the estimate moves less until the earlier data are forgotten; above one, it
+    /// moves more.
     pub fn scale(&mut self, factor: f64) {
         self.factors.scale_all(factor);
     }

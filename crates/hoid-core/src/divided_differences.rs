@@ -6,11 +6,11 @@
 //! `Phi_j = sum over k of h_k/(k+j)!`: `Phi_1 = exp[z1, z2]`, `Phi_2 = exp[0, z1, z2]`, and
 //! `Phi_j = 1/j! + s Phi_{j+1} - q Phi_{j+2}`.
 //!
-//! All are entire in (s, q): complex, real and double poles and poles at the origin of s are cases of the same
-//! functions, evaluated in different ways to avoid cancellation:
+//! All are entire in (s, q): complex, real and double poles, and poles at the origin, are cases of the same functions,
+//! evaluated in different ways to avoid cancellation:
 //!
 //! - small poles: the relation between the Phi_j downwards from `Phi_j = 1/j!` (Clenshaw's
-//!   summation), next to it the same for the slopes `D_j = dPhi_j/ds`,
+//!   summation), and together with it the same for the slopes `D_j = dPhi_j/ds`,
 //!   `D_j = Phi_{j+1} + s D_{j+1} - q D_{j+2}`. No division, and no elementary function;
 //! - other poles: with `h = s/2`, `x = h^2 - q`, `E = e^h`, `C = cosh sqrt x`,
 //!   `S = sinh sqrt x/sqrt x`, `G = dS/dx = (C - S)/(2x)`, `Phi_1 = E S`,

@@ -14,15 +14,15 @@
 //!
 //! `theta~ <- theta~ - g (eps + h' X)`,  `Sigma <- (I - g h') Sigma (I - g h')' + g g'`
 //!
-//! (the Joseph form, in units of sigma^2), after which the new dw, dv and de take their places in X. With
-//! `z = Sigma h` and `k = z - (1 + h' z)/2 g` the update is `Sigma - g k' - k g'`, and for the row a of a new error,
-//! which differs from h in few places, `Sigma a = z - Sigma (h - a)`: two thirds of the products are shared. No
-//! assumption is made about g: the error bars are valid for a scalar factor, where they tend to `P/(1 + lambda)` for
-//! ARX (L. Ljung and T. Söderström, *Theory and Practice of Recursive Identification*, 1983, eq. 4.136), for a
-//! forgetting matrix, a shortened step, or a gradient. Without forgetting `Sigma` becomes P. The default `h = psi`
-//! gives the same result for an estimate that does not move within the memory of the filters. If the memory of the
-//! estimate is not much longer than that of 1/F, its variances are up to a third too small, but a step costs half. It
-//! is selected by K = 0 (no errors of filters).
+//! (the Joseph form, in units of sigma^2), after which the new dw, dv and de are stored in X. With `z = Sigma h` and
+//! `k = z - (1 + h' z)/2 g` the update is `Sigma - g k' - k g'`, and for the row a of a new error, which differs from h
+//! in few elements, `Sigma a = z - Sigma (h - a)`: two thirds of the products are shared. No assumption is made about
+//! g: the error bars are valid for a scalar factor, where they tend to `P/(1 + lambda)` for ARX (L. Ljung and T.
+//! Söderström, *Theory and Practice of Recursive Identification*, 1983, eq. 4.136), for a forgetting matrix, a
+//! shortened step, or a gradient. Without forgetting `Sigma` becomes P. The default `h = psi` gives the same result if
+//! the estimate hardly changes within the memory of the filters. If the memory of the estimate is not much longer than
+//! that of 1/F, the variances of this default are up to a third too small, but a step costs half as much. It is
+//! selected by K = 0 (no errors of filters).
 //!
 //! **Outliers.** An innovation beyond a few sigma moves the estimate as if it were at that limit (P. J. Huber, *Robust
 //! Statistics*, 1981, section 7.3; the gain in the equations above is then the smaller one that was used). The
@@ -65,8 +65,8 @@ crate::state!([const N: usize, const K: usize] ErrorBars<N, K> {
     theta, cross, filters, initial_variances, innovation_variance, limit, until_check,
 }, bounded);
 
-/// Propagates the error of an estimate through its recursion: [`ErrorBars`], or [`NoErrorBars`] if they are not
-/// wanted.
+/// Propagates the error of an estimate through its recursion: [`ErrorBars`], or [`NoErrorBars`] if error bars are not
+/// needed.
 pub trait ErrorPropagation<const N: usize, const K: usize>: State {
     /// Returns the innovation, clipped at the limit for outliers.
     fn clip(&self, eps: f64) -> f64;

@@ -23,8 +23,8 @@ pub fn divide_in_place(d: &[f64], x: &mut [f64]) {
     divide_from(d, x, 0);
 }
 
-/// As [`divide_in_place`] from index `from` on; the values before it are the past output of the filter, with zeros
-/// before the first.
+/// As [`divide_in_place`], from index `from` on; the values before that index are the past output of the filter,
+/// preceded by zeros.
 pub fn divide_from(d: &[f64], x: &mut [f64], from: usize) {
     let before = |lag: usize, x: &[f64]| from.checked_sub(lag).map_or(0.0, |t| x[t]);
     match *d {
@@ -58,9 +58,9 @@ pub fn divide_from(d: &[f64], x: &mut [f64], from: usize) {
 
 /// `y = x / (1 + d_1 q^-1 + d_2 q^-2)` from rest, four samples at a time.
 ///
-/// Computed sample by sample each value waits for the one before it. Written out for four samples with the
-/// impulse response h, `y(t+k) = sum_{i<=k} h_i x(t+k-i) + h_{k+1} y(t-1) - d_2 h_k y(t-2)`, all four wait only for
-/// y(t-1) and y(t-2), and only for a product and two sums.
+/// If the filter is computed sample by sample, each value waits for the one before it. Written out for four samples
+/// with the impulse response h, `y(t+k) = sum_{i<=k} h_i x(t+k-i) + h_{k+1} y(t-1) - d_2 h_k y(t-2)`, all four wait
+/// only for y(t-1) and y(t-2), and only for a product and two sums.
 #[derive(Debug, Clone, Copy)]
 pub struct SecondOrder {
     /// h_1 to h_4; h_0 is one.

@@ -20,15 +20,16 @@
 //!
 //! - `A = q Phi_2`, `R = omega^2 t Phi_1`; at Ts, `f1 = -2 E C`, `f2 = e^s`, `1 + f1 + f2 = q chi`;
 //! - A and `R/omega` are functions of (omega t, zeta), so that `dA/dt = R` and
-//!   `dR/dt = omega^2 Phi_0` give the derivatives by omega: `omega t^2 Phi_1` and
-//!   `omega t (Phi_0 + Phi_1)`; those by zeta go through s: `dA/ds = q D_2`,
+//!   `dR/dt = omega^2 Phi_0` give the derivatives with respect to omega: `omega t^2 Phi_1` and
+//!   `omega t (Phi_0 + Phi_1)`; those with respect to zeta follow by the chain rule through s: `dA/ds = q D_2`,
 //!   `dR/ds = omega^2 t D_1`;
 //! - `df1/domega = 2 Ts (omega Ts Phi_1 + zeta Phi_0)`, `df1/dzeta = 2 omega Ts Phi_0`, and for the
 //!   sum `Phi_0 - f2 = -q dchi/ds`.
 //!
 //! Nothing cancels if omega Ts is small. delta = 0 gives b2 = 0 and the hold of eq. 11. The response is continuous in
 //! tau and has a kink where tau is a whole number of samples, because the step response starts with the slope
-//! `omega^2 K_e_dot`: derivatives with respect to tau at delta = 0 and delta = Ts are those from inside the sample.
+//! `omega^2 K_e_dot`: derivatives with respect to tau at delta = 0 and delta = Ts are one-sided, from inside the
+//! sample.
 //!
 //! Nothing is checked here: parameters that are not finite, or poles so fast that an exponential overflows, give
 //! coefficients that are not finite.

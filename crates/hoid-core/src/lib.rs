@@ -1,5 +1,5 @@
-//! Recursive identification of a human operator in real time: the part that runs once per sample, in or next to a
-//! control loop.
+//! Recursive identification of a human operator in real time: the part that runs once per sample, inside a control loop
+//! or in parallel with it.
 //!
 //! A person controls a machine, with the tracking error e and the control output u. Their dynamics change as they
 //! learn, tire or adapt to the machine. The recursions of this crate estimate a model of them from each new sample,
@@ -16,13 +16,13 @@
 //! - update: `theta <- theta + g eps`, `P <- P - g psi' P`.
 //!
 //! P is kept in factors `U D U'`, which rounding cannot make indefinite. A step that would make the predictor unstable
-//! is halved until it does not. The error bars follow the error of the estimate through the recursion, for any gain,
-//! in units of the innovation variance sigma^2.
+//! is halved until the predictor stays stable. The error bars follow the error of the estimate through the recursion,
+//! for any gain, in units of the innovation variance sigma^2.
 //!
 //! **Real time.** `no_std`, no allocation, no dependencies except small systems of equations (`hoid-numerics`) and
 //! elementary functions (`libm`). Every routine works in memory that the caller owns and has a bounded number of
-//! operations. The numbers of a recursion can be saved and restored ([`mod@state`]). Batch estimators and simulator of
-//! hoid use the same filters, so that a recursion and its batch counterpart cannot differ in them.
+//! operations. The numbers of a recursion can be saved and restored ([`mod@state`]). The batch estimators and the
+//! simulator of hoid use the same filters, so that a recursion and its batch counterpart cannot differ in them.
 //!
 //! ```
 //! use hoid_core::{

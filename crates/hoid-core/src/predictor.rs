@@ -61,13 +61,13 @@ pub struct Predictor<S, const N: usize, const L: usize> {
     x: [f64; L],
     /// `(D/(C F)) x`.
     filtered_x: [f64; L],
-    /// `x/F`, of the cascade alone.
+    /// `x/F`, used by the cascade only.
     x_over_f: [f64; N],
     u: [f64; N],
     w: [f64; N],
     v: [f64; N],
     eps: [f64; N],
-    /// `(D/C) u`, `eps/C`, `v/C`, `w/F` (of the cascade alone) and `(D/(C F)) w`.
+    /// `(D/C) u`, `eps/C`, `v/C`, `w/F` (used by the cascade only) and `(D/(C F)) w`.
     filtered_u: [f64; N],
     filtered_eps: [f64; N],
     filtered_v: [f64; N],
@@ -239,7 +239,7 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
     /// Replaces the missing output of the pending sample by the one-step prediction.
     pub fn bridge(&mut self, theta: &[f64; N]) {
         self.pending[0] = 0.0;
-        // eps is the output less its prediction.
+        // eps is the output minus its prediction.
         self.pending[0] = -self.residual(theta)[2];
     }
 

@@ -30,9 +30,9 @@ pub struct Rls<S, const N: usize, A, B = ErrorBars<N, 0>> {
 crate::state!([S, const N: usize, A: crate::state::State, B: crate::state::State] Rls<S, N, A, B> { theta, psi, adaptation, bars, restarts });
 
 impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<S, N, A, B> {
-    /// Starts from theta `[a.., b..]` with zeros before the first sample. `None` if there is no parameter, more than
-    /// N, or one of C, D or F; or if the rule of forgetting needs the innovation variance and `bars` do not estimate
-    /// it.
+    /// Starts from theta `[a.., b..]` with zeros before the first sample. `None` if there is no parameter, more than N
+    /// parameters, or a parameter of C, D or F; or if the rule of forgetting needs the innovation variance and `bars`
+    /// do not estimate it.
     pub fn new(shape: S, theta: [f64; N], adaptation: A, bars: B) -> Option<Self> {
         let linear = (shape.nc(), shape.nd(), shape.nf()) == (0, 0, 0);
         let known = bars.variance().is_some() || !adaptation.needs_innovation_variance();
@@ -83,7 +83,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         }
     }
 
-    /// As [`Rls::step`], but the estimate stays constant: only the regressor moves on.
+    /// As [`Rls::step`], but the estimate stays constant: only the regressor is advanced.
     pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
         let (psi, innovation) = self.innovation(&self.theta, x, u);
         self.shift(psi, u);
@@ -140,7 +140,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         &self.adaptation
     }
 
-    /// Returns the adaptation for changes from outside.
+    /// Returns the adaptation for modification by the caller.
     pub fn adaptation_mut(&mut self) -> &mut A {
         &mut self.adaptation
     }

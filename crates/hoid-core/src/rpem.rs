@@ -91,7 +91,7 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         }
     }
 
-    /// As [`Rpem::step`], but the estimate stays constant: only the filters move on.
+    /// As [`Rpem::step`], but the estimate stays constant: only the filters are advanced.
     pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
         let theta = self.theta;
         let (psi, innovation) = self.predictor.predict(&theta, x, u);
@@ -152,7 +152,7 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         &self.adaptation
     }
 
-    /// Returns the adaptation for changes from outside.
+    /// Returns the adaptation for modification by the caller.
     pub fn adaptation_mut(&mut self) -> &mut A {
         &mut self.adaptation
     }

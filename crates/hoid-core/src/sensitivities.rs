@@ -83,8 +83,8 @@ pub struct Sensitivities<const N: usize, const K: usize> {
 }
 
 impl<const N: usize, const K: usize> Sensitivities<N, K> {
-    /// Returns the sensitivities of an estimate that does not move within the memory of its filters: `h = psi`, and no
-    /// errors in the filters.
+    /// Returns the sensitivities of an estimate that does not change within the memory of its filters: `h = psi`, and
+    /// no errors in the filters.
     #[inline(always)]
     pub fn from_gradient(psi: &[f64; N]) -> Self {
         let form = LinearForm {

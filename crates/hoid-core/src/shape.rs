@@ -6,8 +6,8 @@
 
 /// Numbers of coefficients of A, B, C, D and F.
 ///
-/// [`AnyShape`] has them as numbers. [`FixedShape`] has them in its type, so that the compiler unrolls every loop over
-/// coefficients: the same operations in the same order, in half the time.
+/// [`AnyShape`] stores them as numbers. [`FixedShape`] has them in its type, so that the compiler unrolls every loop
+/// over coefficients: the same operations in the same order, in half the time.
 pub trait Shape: Copy {
     /// Number of coefficients `a_1 ...`.
     fn na(&self) -> usize;

@@ -1,10 +1,10 @@
 //! Test whether all roots of a monic polynomial lie inside a circle.
 //!
 //! Schur-Cohn test by the step-down (Levinson) recursion: with `k = d_n`, the polynomial of degree
-//! n has its roots inside the unit circle if and only if `|k| < 1` and the polynomial of degree n -
-//! 1 with coefficients `(d_i - k d_{n-i}) / (1 - k^2)` has. A circle of radius r is tested on
-//! `d_i / r^i`. Source: E. I. Jury, *Theory and Application of the z-Transform Method*, 1964; S.
-//! Kay, *Modern Spectral Estimation*, 1988, eq. 6.51.
+//! n has its roots inside the unit circle if and only if `|k| < 1` and the polynomial of degree n - 1 with coefficients
+//! `(d_i - k d_{n-i}) / (1 - k^2)` has its roots there. A circle of radius r is tested on `d_i / r^i`. Source: E. I.
+//! Jury, *Theory and Application of the z-Transform Method*, 1964; S. Kay, *Modern Spectral Estimation*, 1988, eq.
+//! 6.51.
 
 /// Highest order that [`roots_inside`] tests; its work space is on the stack.
 pub const MAX_ORDER: usize = 64;

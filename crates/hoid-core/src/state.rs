@@ -3,7 +3,7 @@
 //! One function visits them in both directions: reading them saves the recursion, writing them restores it, and the
 //! two cannot differ in order. A restored recursion continues with the same digits. Counters are numbers as well;
 //! those of a recursion stay below `2^53`, up to which f64 represents them exactly. Shape and options are not part of
-//! the state: restore it into a recursion that was made with the same ones.
+//! the state: restore it into a recursion that was built with the same shape and options.
 
 /// A part of a recursion with numbers to be saved.
 pub trait State {

@@ -20,7 +20,7 @@
 #[repr(align(64))]
 pub struct UdCovariance<const N: usize> {
     /// Column j holds `U_ij`, i < j, and `d_j` in place of the 1; the rest is not used. The entries d are not
-    /// contiguous, so that no compiler makes a vector of them, whose first element would wait for the last.
+    /// contiguous, so that no compiler loads them as a vector, whose first element would wait for the last.
     u: [[f64; N]; N],
 }
 

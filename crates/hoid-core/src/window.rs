@@ -3,12 +3,13 @@
 //! Each sample gives a linear equation for theta, `y = psi' theta + eps` with
 //! `y = eps(t) + psi(t)' theta(t-1)`; for ARX and FIR y is the output and psi the regressor,
 //! whatever theta was. The estimate is that of least squares over the window,
-//! `theta = R^{-1} sum psi y`, `R = sum psi psi'`, which for ARX and FIR is exact and for the
-//! others the recursive prediction-error method with that memory.
+//! `theta = R^{-1} sum psi y`, `R = sum psi psi'`, which is exact for ARX and FIR, and for the other structures is the
+//! recursive prediction-error method with that memory.
 //!
-//! If the oldest term were subtracted from the sums, rounding errors would accumulate for ever. Here the window is
-//! kept as two sums: one grows from a boundary on; the other, a sum that grew until that boundary, loses its terms.
-//! When it has lost all of them the first replaces it. No rounding error lasts longer than two windows.
+//! If the oldest term were subtracted from the sums at each sample, rounding errors would accumulate without limit.
+//! Here the window is kept as two sums: one grows from a boundary on; the other, a sum that grew until that boundary,
+//! loses its terms. When it has lost all of them the first replaces it. No rounding error lasts longer than two
+//! windows.
 //!
 //! The covariance of theta over sigma^2 is `R^{-1}`. If the window does not determine theta (fewer samples than
 //! parameters, no excitation), theta stays constant and there is no covariance. The caller owns the memory of

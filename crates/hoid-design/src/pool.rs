@@ -1,18 +1,19 @@
 //! Hierarchical estimates: each person estimated from all people, and the population from which they are drawn.
 //!
-//! In a condition `y_i = ln theta_i` is known of person i with variance `v_i = (s_i/theta_i)^2`, and people are drawn from a
-//! population, `y_i ~ N(mu, tau^2)` plus their error. mu is the mean of [`crate::compare::meta_mean`], tau^2 is at the greatest of `l + log tau`
-//! (Y. Chung, S. Rabe-Hesketh and I.-H. Choi, *Stat. Med.* 32 (2013) 4071-4089), which is never zero. The estimate of a person from all
-//! (B. Efron and C. Morris, *J. Am. Stat. Assoc.* 70 (1975) 311-319) is
+//! In a condition, `y_i = ln theta_i` is known about person i with variance `v_i = (s_i/theta_i)^2`, and people are
+//! drawn from a population, `y_i ~ N(mu, tau^2)` plus their error. mu is the mean of [`crate::compare::meta_mean`], and
+//! tau^2 maximises `l + log tau` (Y. Chung, S. Rabe-Hesketh and I.-H. Choi, *Stat. Med.* 32 (2013) 4071-4089), which is
+//! never zero. The estimate of a person from all (B. Efron and C. Morris, *J. Am. Stat. Assoc.* 70 (1975) 311-319) is
 //!
 //! `B_i mu + (1 - B_i) y_i`, `B_i = v_i/(v_i + tau^2)`, with the variance `(1 - B_i) v_i + B_i^2 var(mu)`:
 //!
 //! **B is the shrinkage**, 1 for a person without information. The variance ignores that tau^2 is estimated. A future
 //! person has `mu` with the variance `tau^2 + var(mu)`, which is the prior.
 //!
-//! A prior that is already part of the estimates is removed first, or it would count once for each person: with its
-//! share w, its centre m and an estimate y, the data show `y - w (m - y)/(1 - w)` with the variance `v/(1 - w)`
-//! ([`OperatorPrior::pull`]). If the share of the prior is above nine tenths, the person is without information.
+//! A prior that is already part of the estimates is removed first, since it would otherwise count once for each person:
+//! with its share w, its centre m and an estimate y, the data show `y - w (m - y)/(1 - w)` with the variance
+//! `v/(1 - w)` ([`OperatorPrior::pull`]). If the share of the prior is above nine tenths, the person is without
+//! information.
 
 use hoid_ident::family::{OperatorPrior, Parameter};
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
@@ -128,7 +129,7 @@ fn population(condition: &str, people: &[&Person], prior: &OperatorPrior) -> Pop
     found
 }
 
-/// Logarithm of a parameter as the data of a person alone determine it.
+/// Logarithm of a parameter as determined by the data of the person alone.
 fn data(parameter: &Parameter, prior: &OperatorPrior) -> Option<Observation> {
     let error = parameter.standard_error_person.or(parameter.standard_error)?;
     let counts = parameter.determined && parameter.value > 0.0 && parameter.value.is_finite() && error > 0.0;

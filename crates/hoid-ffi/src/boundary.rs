@@ -1,4 +1,4 @@
-//! Pointers of the caller: all that this crate believes.
+//! Pointers of the caller: all that this crate relies on.
 //!
 //! A pointer that is null or not aligned is refused. Two conditions cannot be checked and are the
 //! contract of every function here: the pointer refers to an object as the header describes it, and
@@ -31,13 +31,13 @@ fn check<T>(pointer: *const T, what: &str) -> Result<(), Failure> {
     if !pointer.is_aligned() {
         return Err(Failure::new(
             HOID_BAD_POINTER,
-            format!("{what} is not aligned: it has to be of its own type"),
+            format!("{what} is not aligned: it must be aligned for its type"),
         ));
     }
     Ok(())
 }
 
-/// A text of the caller; none for a null pointer.
+/// A text of the caller; `None` for a null pointer.
 ///
 /// # Safety
 /// `pointer` is null or points to a text that ends with a zero and stays as it is during the call.
@@ -74,7 +74,7 @@ pub(crate) unsafe fn bytes<'a>(pointer: *const u8, length: usize, what: &str) ->
 /// `pointer` is null or points to room for one value.
 pub(crate) unsafe fn put<T>(pointer: *mut T, value: T, what: &str) -> Result<(), Failure> {
     check(pointer, what)?;
-    // SAFETY: not null, aligned; that there is room is the contract. What was there needs no drop.
+    // SAFETY: not null, aligned; that there is room is the contract. The previous content needs no drop.
     unsafe { pointer.write(value) };
     Ok(())
 }
@@ -100,7 +100,7 @@ pub(crate) unsafe fn put_all<T: Copy>(
     if room < values.len() {
         return Err(Failure::new(
             HOID_TOO_SMALL,
-            format!("{what} has room for {room}, there are {}", values.len()),
+            format!("{what} has room for {room} values, but there are {}", values.len()),
         ));
     }
     // SAFETY: not null, aligned, and by the contract with room for `room` values, which is enough;
@@ -114,13 +114,13 @@ pub(crate) unsafe fn put_all<T: Copy>(
 /// # Safety
 /// `place` is null or points to room for a pointer.
 pub(crate) unsafe fn hand_over(session: Session, place: *mut *mut HoidTracker) -> Result<(), Failure> {
-    check(place, "the place for the tracker")?;
+    check(place, "the pointer for the tracker")?;
     let tracker = Box::into_raw(Box::new(HoidTracker {
         session,
         is_broken: false,
     }));
     // SAFETY: by the contract of this function.
-    unsafe { put(place, tracker, "the place for the tracker") }
+    unsafe { put(place, tracker, "the pointer for the tracker") }
 }
 
 /// Takes a tracker back and lets it go.
@@ -179,7 +179,7 @@ impl HoidTracker {
         if self.is_broken {
             return Err(Failure::new(
                 HOID_BROKEN,
-                "a fault was caught in this tracker before; free it and make another",
+                "an earlier call of this tracker failed internally; free the tracker and create another",
             ));
         }
         Ok(())
@@ -234,11 +234,11 @@ mod tests {
         // SAFETY: null is allowed.
         assert_eq!(unsafe { text(ptr::null(), "a") }, Ok(None));
         // SAFETY: null is allowed.
-        let refused = unsafe { put(ptr::null_mut(), 1.0, "the place") }.unwrap_err();
+        let refused = unsafe { put(ptr::null_mut(), 1.0, "the pointer") }.unwrap_err();
         assert_eq!(refused.status, HOID_BAD_POINTER);
         let mut room = [0.0_f64; 2];
         // SAFETY: one byte further is not written to.
-        let refused = unsafe { put(room.as_mut_ptr().wrapping_byte_add(1), 1.0, "the place") }.unwrap_err();
+        let refused = unsafe { put(room.as_mut_ptr().wrapping_byte_add(1), 1.0, "the pointer") }.unwrap_err();
         assert!(refused.text.contains("aligned"));
         let mut count = 0;
         // SAFETY: room for two.

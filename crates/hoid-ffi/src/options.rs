@@ -24,7 +24,7 @@ use crate::status::Failure;
 /// The request, as it is saved.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TrackerRequest {
-    /// Name of the method; none for the default one.
+    /// Name of the method; `None` for the default one.
     pub method: Option<String>,
     pub sample_time_s: f64,
     /// Options in JSON.
@@ -125,7 +125,7 @@ fn object(text: &str) -> Result<Map<String, Value>, Failure> {
     })
 }
 
-/// Takes an option out; none if it is missing or null.
+/// Takes an option out; `None` if it is missing or null.
 fn taken<T>(
     options: &mut Map<String, Value>,
     name: &str,
@@ -200,7 +200,7 @@ fn range(value: &Value, name: &str) -> Result<RangeInclusive<usize>, String> {
     }
 }
 
-/// A value as the command line writes it; none if it carries no information.
+/// A value as the command line writes it; `None` if it carries no information.
 fn text(value: &Value) -> Option<String> {
     Some(match value {
         Value::Null | Value::Bool(false) => return None,

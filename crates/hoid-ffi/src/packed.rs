@@ -1,4 +1,4 @@
-//! A description in JSON and bytes after it, of which damage shows.
+//! A description in JSON followed by bytes, in which damage is detected.
 //!
 //! | bytes | |
 //! |---|---|
@@ -15,7 +15,7 @@ use serde_json::Value;
 const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
 const PRIME: u64 = 0x0000_0100_0000_01b3;
 
-/// Why bytes are not opened.
+/// Reason why bytes cannot be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Closed {
     /// They are something else, or of another version.
@@ -62,7 +62,7 @@ pub(crate) fn as_bytes(numbers: &[f64]) -> Vec<u8> {
     numbers.iter().flat_map(|number| number.to_le_bytes()).collect()
 }
 
-/// The numbers of bytes; none if there are some left.
+/// The numbers of bytes; `None` if there are some left.
 pub(crate) fn as_numbers(bytes: &[u8]) -> Option<Vec<f64>> {
     let (numbers, []) = bytes.as_chunks::<8>() else {
         return None;

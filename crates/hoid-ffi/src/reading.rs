@@ -151,7 +151,7 @@ pub unsafe extern "C" fn hoid_tracker_change(tracker: *const HoidTracker, change
 pub unsafe extern "C" fn hoid_tracker_change_log_odds(tracker: *const HoidTracker, log_odds: *mut f64) -> HoidStatus {
     let tell = |session: &Session| {
         // SAFETY: by the contract of this function.
-        unsafe { put(log_odds, session.change_log_odds()?, "the place for the odds") }
+        unsafe { put(log_odds, session.change_log_odds()?, "the pointer for the odds") }
     };
     // SAFETY: by the contract of this function.
     unsafe { with_tracker(tracker, tell) }
@@ -166,7 +166,7 @@ pub unsafe extern "C" fn hoid_tracker_level(tracker: *const HoidTracker, level: 
     let tell = |session: &Session| {
         let told = number_of(session.level());
         // SAFETY: by the contract of this function.
-        unsafe { put(level, told, "the place for the level") }
+        unsafe { put(level, told, "the pointer for the level") }
     };
     // SAFETY: by the contract of this function.
     unsafe { with_tracker(tracker, tell) }
@@ -214,7 +214,7 @@ pub unsafe extern "C" fn hoid_tracker_counts(tracker: *const HoidTracker, counts
 pub unsafe extern "C" fn hoid_tracker_sample_time(tracker: *const HoidTracker, sample_time: *mut f64) -> HoidStatus {
     let tell = |session: &Session| {
         // SAFETY: by the contract of this function.
-        unsafe { put(sample_time, session.sample_time_s(), "the place for the sample time") }
+        unsafe { put(sample_time, session.sample_time_s(), "the pointer for the sample time") }
     };
     // SAFETY: by the contract of this function.
     unsafe { with_tracker(tracker, tell) }

@@ -34,7 +34,7 @@ impl Session {
     /// The tracker that [`Session::saved`] was asked of.
     pub fn restored(bytes: &[u8]) -> Result<Self, Failure> {
         let wrong = |text: &str| Failure::new(HOID_BAD_STATE, format!("{text}; save the tracker again"));
-        let damaged = || wrong("the bytes were changed or cut since they were saved");
+        let damaged = || wrong("the bytes were changed or truncated since they were saved");
         let (description, numbers) = opened(MAGIC, bytes).map_err(|closed| match closed {
             Closed::Other => wrong("the bytes are not a tracker that this version of hoid has saved"),
             Closed::Damaged => damaged(),

@@ -60,7 +60,7 @@ impl Session {
         Ok(session)
     }
 
-    /// Restores the recursion from what was saved of it.
+    /// Restores the recursion from its saved state.
     pub fn restore(&mut self, orders: Option<Orders>, numbers: &[f64]) -> Result<(), Failure> {
         self.live.restore(orders, numbers)?;
         self.name();
@@ -141,7 +141,7 @@ impl Session {
     /// Crossover and phase margin.
     pub fn open_loop(&self) -> Result<Vec<HoidEstimate>, Failure> {
         let found = self.tracker()?.open_loop().ok_or_else(|| {
-            Failure::nothing("there is no controlled element; name it in the options, as \"controlled_element\"")
+            Failure::nothing("there is no controlled element; give it in the options as \"controlled_element\"")
         })?;
         let found = found.map_err(|reason| Failure::nothing(reason.words()))?;
         Ok(vec![

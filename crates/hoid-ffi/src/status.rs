@@ -98,12 +98,12 @@ pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> String {
     let words = (panic.downcast_ref::<&str>().copied())
         .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
         .unwrap_or("a fault without text");
-    format!("a fault of hoid itself, please report it: {words}")
+    format!("an internal error of hoid, please report it: {words}")
 }
 
 fn remember(text: &str) {
     let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
-    // At the end of a thread there may be no place for it any more.
+    // When a thread ends, its storage may no longer exist.
     let _ = LAST.try_with(|last| *last.borrow_mut() = text);
 }
 

@@ -28,7 +28,7 @@ pub struct HoidOutcome {
 pub struct HoidEstimate {
     /// Its name; it stays as long as the tracker.
     pub name: *const c_char,
-    /// Its unit, empty for none; it stays.
+    /// Its unit, empty if there is none; it stays.
     pub unit: *const c_char,
     /// The value.
     pub value: f64,

@@ -12,7 +12,7 @@
 //! `d phi_m = d arg L/d theta + (d arg L/d omega) d omega_c`,
 //!
 //! and for the gain margin, where `arg L = -180 deg` still holds, with phase and gain exchanged. A searched delay also
-//! turns the phase by `-omega d tau` (`searched_delay.rs`).
+//! changes the phase by `-omega d tau` (`searched_delay.rs`).
 
 use hoid_model::{
     Complex64, margins::Margins, margins::margins, polynomial, polynomial_model::monic, uncertainty::Estimate,

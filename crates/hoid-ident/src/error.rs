@@ -15,7 +15,7 @@ pub enum IdentError {
     NoRecords,
     /// A structure with an input, and a record without one.
     #[error(
-        "{structure} describes how an output follows an input, but record {label} has no input; give one, or take ar, ma or arma"
+        "{structure} describes how an output follows an input, but record {label} has no input; give one, or use ar, ma or arma"
     )]
     NoInput {
         /// The structure.
@@ -25,7 +25,7 @@ pub enum IdentError {
     },
     /// Records that were sampled differently cannot share a discrete model.
     #[error(
-        "record {label} has the sample time {found} s, the first record {expected} s; bring them to one rate, as with --new-fs {rate}, or fit them separately",
+        "record {label} has the sample time {found} s, the first record {expected} s; resample them to one rate, such as with --new-fs {rate}, or fit them separately",
         rate = lower_rate(*found, *expected)
     )]
     MixedSampling {
@@ -38,7 +38,7 @@ pub enum IdentError {
     },
     /// Fewer residuals than unknowns.
     #[error(
-        "record {label} has {samples} samples; {orders} with its delay and initial states needs more than {needed}; take a longer record or lower orders"
+        "record {label} has {samples} samples; {orders} with its delay and initial states needs more than {needed}; use a longer record or lower orders"
     )]
     TooFewSamples {
         /// The record.
@@ -82,15 +82,15 @@ pub enum IdentError {
     },
     /// Linearly dependent instruments, or instruments that do not follow the regressors.
     #[error(
-        "the instruments are singular: {dependence}; the signal that they are made of does not excite so many parameters: lower the \
-         orders or use one with more frequencies"
+        "the instruments are singular: {dependence}; the signal that they are made from does not excite so many \
+         parameters: lower the orders or use one with more frequencies"
     )]
     SingularInstruments {
         /// The dependence between instruments.
         dependence: String,
     },
     /// A channel that a record does not have.
-    #[error("record {label} has no channel {channel} to make instruments of; it has {available}")]
+    #[error("record {label} has no channel {channel} to make instruments from; it has {available}")]
     NoChannel {
         /// The channel that was requested.
         channel: String,
@@ -143,7 +143,7 @@ pub enum IdentError {
     #[error("no start of the search gave a finite loss; check the scale of the data and the orders")]
     NoFiniteLoss,
     /// A search that found no minimum where a minimum is necessary.
-    #[error("the search did not come to rest ({reason}); lower the orders, or take a longer window")]
+    #[error("the search did not converge ({reason}); lower the orders, or use a longer window")]
     NotSettled {
         /// How it ended.
         reason: String,
@@ -184,7 +184,7 @@ pub enum IdentError {
     },
     /// A line above the Nyquist frequency.
     #[error(
-        "the line {omega_rad_s} rad/s does not lie below half the sampling frequency of record {label}, {nyquist_rad_s} rad/s; leave it out"
+        "the line {omega_rad_s} rad/s is not below half the sampling frequency of record {label}, {nyquist_rad_s} rad/s; leave it out"
     )]
     LineBeyondNyquist {
         /// The line, rad/s.

@@ -19,7 +19,7 @@ pub enum Focus {
     /// One-step-ahead prediction: the prediction error method, efficient if the structure is right.
     #[default]
     Prediction,
-    /// Simulation from the input alone: the system from e to u minimises the simulation error, and the noise model is
+    /// Simulation from the input only: the system from e to u minimises the simulation error, and the noise model is
     /// fitted to the remainder. In a closed loop the system is then biased by the feedback.
     Simulation,
 }
@@ -38,7 +38,7 @@ pub struct Estimator {
     pub initial_state: Option<InitialState>,
     /// Method and limits of the search.
     pub search: SearchOptions,
-    /// Number of own starts from which the search runs to its end; the best minimum is used. Default 2.
+    /// Number of own starts from which the search runs to completion; the best minimum is used. Default 2.
     pub starts: usize,
     /// Start of the search instead of the estimator's own; theta in the order of
     /// [`Orders::parameter_names`].
@@ -186,9 +186,9 @@ impl Estimator {
 
     /// Fits a model to each record separately.
     ///
-    /// Box-Jenkins models of records of one length are searched in parallel lanes, in about half of the time of one
-    /// after the other. The result of a fit does not depend on the records that it is searched with; it differs from
-    /// that of [`Estimator::fit`] by rounding, less than 1e-7 of a standard error.
+    /// Box-Jenkins models of records of one length are searched in parallel lanes, in about half the time that they
+    /// would take one after the other. The result of a fit does not depend on the records that it is searched with; it
+    /// differs from that of [`Estimator::fit`] by rounding, less than 1e-7 of a standard error.
     ///
     /// # Errors
     /// The errors of [`Estimator::fit`], for each record separately.

@@ -1,8 +1,8 @@
 //! Identification of the human operator from records: batch estimators.
 //!
 //! **The problem.** A person tracks a target: they see the error e and move the control, u. Both are sampled with the
-//! period Ts. Which dynamics lead from e to u, how well are they determined, and which part of u, the remnant, do they
-//! leave unexplained?
+//! period Ts. The dynamics from e to u, their uncertainty, and the part of u that they leave unexplained, the remnant,
+//! are to be estimated.
 //!
 //! **The model.** Everything here is a case of
 //!

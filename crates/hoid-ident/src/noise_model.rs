@@ -1,4 +1,4 @@
-//! A noise model from the disturbance alone.
+//! A noise model estimated from the disturbance alone.
 
 use hoid_model::polynomial::reflected_inside;
 

@@ -1,7 +1,7 @@
 //! Choice of orders and delay.
 //!
 //! Every combination of the given ranges is fitted on the same samples (the residuals of all candidates start where the
-//! most demanding one can), and the criterion is decisive: the loss for the delay alone, BIC if the number of
+//! most demanding one can), and the criterion decides: the loss if only the delay differs, BIC if the number of
 //! parameters differs. The chosen model is then fitted once more on all samples available for its own orders, and its
 //! error bars include the search of the delay (`searched_delay.rs`).
 
@@ -297,8 +297,8 @@ pub struct Choice {
     pub criterion: Criterion,
 }
 
-/// Identifies a person by a Box-Jenkins model, as `hoid identify --structure bj`: the delay is searched over 0.05 to
-/// 0.6 s and the order of the noise model over 1 to 4, chosen by BIC.
+/// Identifies a person by a Box-Jenkins model, as does `hoid identify --structure bj`: the delay is searched over 0.05
+/// to 0.6 s and the order of the noise model over 1 to 4, chosen by BIC.
 ///
 /// # Errors
 /// As [`choose_orders`]; [`IdentError::NoRecords`] without a record.
@@ -445,7 +445,7 @@ pub fn fit_or_choose(
     }
     if template.start.is_some() {
         return Err(IdentError::BadStart {
-            reason: "it belongs to one model, but a range of orders or delays is searched; give nk and the orders as single numbers"
+            reason: "it applies to a single model, but a range of orders or delays is searched; give nk and the orders as single numbers"
                 .to_owned(),
         });
     }

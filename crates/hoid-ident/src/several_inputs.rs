@@ -535,7 +535,7 @@ impl SeveralInputsFit {
         self.residuals as f64 * self.loss.ln() + 2.0 * self.theta.len() as f64
     }
 
-    /// Returns the places of A, and of B and F of an input, in theta.
+    /// Returns the indices in theta of A, and of B and F of an input.
     fn places(&self, input: usize) -> [std::ops::Range<usize>; 3] {
         let o = self.model.orders();
         let a = 0..o.na;

@@ -33,21 +33,21 @@ pub type Field<E, T> = fn(&mut E) -> &mut T;
 /// Returns the option for the noise model of an operator, which determines the estimator.
 pub fn noise<E: 'static>(set: impl Fn(&mut E, &Setting, &str) -> Result<(), IdentError> + 'static) -> BatchOption<E> {
     let help =
-        "Noise of the operator: ar an autoregression, arma with a moving average (nc), remnant the remnant of order m";
+        "Noise model: autoregression (ar), with moving average nc (arma), or remnant of order m (remnant)";
     let setting = Setting::new("noise", Kind::Choice(&["ar", "arma", "remnant"]), help).default("ar");
     BatchOption::new(setting, set)
 }
 
 /// Returns the option for a change of the operator, which determines the estimator.
 pub fn change<E: 'static>() -> BatchOption<E> {
-    let help = "Whether the operator changes: not at all, or its gains once, by a sigmoid";
+    let help = "Change of the operator: none, or of its gains once, as a sigmoid";
     let setting = Setting::new("change", Kind::Choice(&["none", "sigmoid"]), help).default("none");
     BatchOption::new(setting, |_, _, _| Ok(()))
 }
 
 /// Returns the option for the form of an operator; the text `auto` means `None`.
 pub fn form<E: 'static>(set: fn(&mut E, Option<Form>)) -> BatchOption<E> {
-    let help = "Form of the operator; auto: estimates are averaged over the forms that the data leave, of one that changes lead";
+    let help = "Form of the operator; auto: average over the forms that the data allow, lead for --change sigmoid";
     let setting = Setting::new("form", Kind::Choice(&FORMS), help).default("auto");
     BatchOption::new(setting, move |how, option, text| {
         let form = match text {
@@ -61,7 +61,7 @@ pub fn form<E: 'static>(set: fn(&mut E, Option<Form>)) -> BatchOption<E> {
 
 /// Returns the option for the neuromuscular part of an operator.
 pub fn neuromuscular<E: 'static>(field: Field<E, bool>) -> BatchOption<E> {
-    let help = "With neuromuscular dynamics omega_nm, zeta_nm";
+    let help = "Include neuromuscular dynamics omega_nm, zeta_nm";
     let setting = Setting::new("neuromuscular", Kind::Choice(&["yes", "no"]), help).default("yes");
     BatchOption::new(setting, move |how, option, text| {
         *field(how) = match text {
@@ -80,8 +80,8 @@ pub fn yes_words(yes: bool) -> String {
 
 /// Returns the option for prior knowledge of the person.
 pub fn prior<E: 'static>(default: &str, field: Field<E, OperatorPrior>) -> BatchOption<E> {
-    let help = "What is known of the person before the data: population (published people), none, a JSON result of another fit, or \
-                NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_L, T_I, as omega_nm=10.5:0.3 (the spread is relative)";
+    let help = "Prior knowledge of the person: population (published people), none, a JSON result of another fit, or \
+     NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_L, T_I, such as omega_nm=10.5:0.3 (relative spread)";
     let setting = Setting::new("prior", Kind::Prior, help).default(default);
     BatchOption::new(setting, move |how, _, text| {
         *field(how) = text.parse()?;
@@ -91,13 +91,13 @@ pub fn prior<E: 'static>(default: &str, field: Field<E, OperatorPrior>) -> Batch
 
 /// Returns the setting for an order, given or searched.
 pub fn orders(default: &str) -> Setting {
-    let help = "Orders, each a number or a range to search, as nb=2,nc=0,nd=1..4,nf=2; nb counts b0, b1, ...";
+    let help = "Orders, or ranges to search, as nb=2,nc=0,nd=1..4,nf=2; nb counts b0, b1, ...";
     Setting::new("orders", Kind::Named(&Kind::Counts), help).default(default)
 }
 
 /// Returns the setting for the delay in s.
 pub fn delay(default: &str) -> Setting {
-    let help = "Delay tau_e, or the shortest and the longest; of polynomials in place of nk = tau_e/Ts + 1";
+    let help = "Delay tau_e, or its range; for polynomials, replaces nk = tau_e/Ts + 1";
     Setting::new("delay", Kind::NumberOrSpan, help)
         .default(default)
         .unit("s")
@@ -128,7 +128,7 @@ pub fn range_words(range: &RangeInclusive<usize>) -> String {
 pub fn individual<E: 'static>(
     set: impl Fn(&mut E, &Setting, Vec<String>) -> Result<(), IdentError> + 'static,
 ) -> BatchOption<E> {
-    let help = "Parameters that each record has for itself, as K,T_L";
+    let help = "Parameters that differ between records, as K,T_L";
     let setting = Setting::new("individual", Kind::Names, help);
     BatchOption::new(setting, move |how, option, text| set(how, option, option.read(text)?))
 }
@@ -137,7 +137,7 @@ pub fn individual<E: 'static>(
 pub fn initial_state<E: 'static>(
     set: impl Fn(&mut E, &Setting, Option<InitialState>) -> Result<(), IdentError> + 'static,
 ) -> BatchOption<E> {
-    let help = "Initial states of each record; auto: estimate, and backcast for an output alone (ar, ma, arma)";
+    let help = "Initial states of each record; auto: estimate, or backcast without an input (ar, ma, arma)";
     let setting = Setting::new("initial_state", Kind::Choice(&INITIAL_STATES), help).default("auto");
     BatchOption::new(setting, move |how, option, text| {
         let rule = match text {
@@ -153,9 +153,9 @@ pub fn constraints<E: 'static>(
     field: Field<E, BTreeMap<String, Constraint>>,
     of: Constraints<E>,
 ) -> [BatchOption<E>; 2] {
-    let fix = "Parameters held at a value, as d1=-0.85,f1=-1.9";
+    let fix = "Parameters fixed at a value, as d1=-0.85,f1=-1.9";
     let fix = Setting::new("fix", Kind::Named(&Kind::Number), fix).bounds(Bounds::Finite);
-    let bound = "Bounds of parameters, as b0=0..0.2,f2=..0.99; an end may be left open";
+    let bound = "Bounds of parameters, as b0=0..0.2,f2=..0.99; either end may be omitted";
     let bound = Setting::new("bound", Kind::Named(&Kind::OpenSpan), bound);
     let fixed = move |how: &mut E, option: &Setting, text: &str| {
         let all: BTreeMap<String, f64> = option.read(text)?;
@@ -226,7 +226,7 @@ pub fn search<E: 'static>(default: SearchOptions, field: Field<E, SearchOptions>
 
 /// Returns the option for the method of the search.
 pub fn search_method<E: 'static>(field: Field<E, SearchOptions>) -> BatchOption<E> {
-    let help = "How the search steps: gn Gauss-Newton, lm Levenberg-Marquardt, grad steepest descent";
+    let help = "Search: Gauss-Newton (gn), Levenberg-Marquardt (lm), steepest descent (grad)";
     let setting =
         Setting::new("search_method", Kind::Choice(&SearchMethod::NAMES), help).default(SearchMethod::default().name());
     BatchOption::new(setting, move |how, option, text| {
@@ -240,10 +240,10 @@ pub fn search_ends<E: 'static>(default: SearchOptions, field: Field<E, SearchOpt
     let steps = Setting::new(
         "max_iterations",
         Kind::Count,
-        "Largest number of search steps from each start",
+        "Maximum search steps from each start",
     )
     .default(&default.max_iterations.to_string());
-    let tolerance = "Relative decrease of the loss below which the search has converged";
+    let tolerance = "Relative decrease of the loss for convergence";
     let tolerance = Setting::new("tolerance", Kind::Number, tolerance)
         .default(&format!("{:e}", default.tolerance))
         .bounds(Bounds::PositiveFinite);

@@ -1,4 +1,4 @@
-//! All errors of files, in terms of the user who has to correct the file.
+//! All errors of files, in terms of the user, who has to correct the file.
 
 use hoid_model::ModelError;
 use thiserror::Error;
@@ -29,17 +29,18 @@ pub enum IoError {
     },
     /// A result that would overwrite its own input.
     #[error(
-        "{file} is {input}, which is read by the same command and would be lost; name another place for the result"
+        "{file} is {input}, which is read by the same command and would be lost; choose another file for the result"
     )]
     OutputIsInput {
-        /// The place of the result.
+        /// The path of the result.
         file: String,
         /// The data read.
         input: String,
     },
     /// Results must not overwrite their inputs.
     #[error(
-        "{directory} holds {input}, which is read by the same command and may be lost; take another directory for the results"
+        "{directory} holds {input}, which is read by the same command and may be lost; choose another directory for \
+         the results"
     )]
     OutputAmongInputs {
         /// The directory of the results.
@@ -57,15 +58,16 @@ pub enum IoError {
     },
     /// A file that is not a shared library of a platform that units are made for.
     #[error(
-        "{file} is not a shared library for Linux, Windows or macOS with 64 bits; give the one that `cargo xtask ffi` has built"
+        "{file} is not a 64-bit shared library for Linux, Windows or macOS; give the one that `cargo xtask ffi` built"
     )]
     NoLibrary {
         /// The file.
         file: String,
     },
-    /// A shared library of something else.
+    /// A shared library without the functions of a unit.
     #[error(
-        "{file} is a shared library, but not that of hoid: it has no {missing}; give the one that `cargo xtask ffi` has built"
+        "{file} is a shared library, but not that of hoid: it has no {missing}; give the one that `cargo xtask ffi` \
+         built"
     )]
     OtherLibrary {
         /// The file.
@@ -74,7 +76,7 @@ pub enum IoError {
         missing: &'static str,
     },
     /// A directory in use by another process.
-    #[error("another process works on {directory}: wait for its end, or take another directory")]
+    #[error("another process is working on {directory}: wait until it ends, or choose another directory")]
     InUse {
         /// The directory.
         directory: String,
@@ -86,7 +88,7 @@ pub enum IoError {
         file: String,
     },
     /// An extension that does not correspond to any format.
-    #[error("{file}: {found}, which names no format of a record; expected {expected}{remedy}")]
+    #[error("{file}: {found}; expected {expected}{remedy}")]
     UnknownFormat {
         /// The file.
         file: String,
@@ -108,13 +110,13 @@ pub enum IoError {
         found: String,
     },
     /// A file with only blank lines and comments.
-    #[error("{file} is empty, expected a header with the names of the columns and one line a sample")]
+    #[error("{file} is empty, expected a header with the names of the columns and one line per sample")]
     Empty {
         /// The file.
         file: String,
     },
     /// A header without rows.
-    #[error("{file} holds a header and no samples; check that the recording was saved to its end")]
+    #[error("{file} has a header but no samples; check that the recording was saved completely")]
     NoRows {
         /// The file.
         file: String,
@@ -133,7 +135,8 @@ pub enum IoError {
     },
     /// Cells separated by blanks.
     #[error(
-        "{file}: {found} numbers between blanks are in a line, expected commas, semicolons or tabs between them; save the table so, with a header such as t,e,u"
+        "{file}: a line has {found} numbers separated by blanks, expected commas, semicolons or tabs; save the table \
+         with these, and with a header such as t,e,u"
     )]
     Blanks {
         /// The file.
@@ -143,7 +146,8 @@ pub enum IoError {
     },
     /// A table with too many columns.
     #[error(
-        "{file} has {found} columns, expected at most {most}; save the columns that are needed alone, or look for lost line ends"
+        "{file} has {found} columns, expected at most {most}; save only the columns that are needed, or look for \
+         missing line ends"
     )]
     TooManyColumns {
         /// The file.
@@ -154,7 +158,7 @@ pub enum IoError {
         most: usize,
     },
     /// Two columns with the same name.
-    #[error("{file}: columns {first} and {second} are both named \"{name}\"; give each column a name of its own")]
+    #[error("{file}: columns {first} and {second} are both named \"{name}\"; give each column its own name")]
     DuplicateColumn {
         /// The file.
         file: String,
@@ -167,7 +171,8 @@ pub enum IoError {
     },
     /// A row that is shorter or longer than the header.
     #[error(
-        "{file}, {place}: {found} values, expected {expected} as in the header; look for a cut line, a stray separator or an open quotation mark"
+        "{file}, {place}: {found} values, expected {expected} as in the header; look for a truncated line, a stray \
+         separator or an open quotation mark"
     )]
     RowLength {
         /// The file.
@@ -181,7 +186,8 @@ pub enum IoError {
     },
     /// A truncated last line.
     #[error(
-        "{file} is cut in {place}, its last: {found} of {expected} values; copy or record it again, or remove that line and use what is above it"
+        "{file} is truncated in {place}, its last: {found} of {expected} values; copy or record it again, or remove \
+         that line and use the lines above it"
     )]
     CutRow {
         /// The file.
@@ -195,7 +201,8 @@ pub enum IoError {
     },
     /// A column that the file does not have.
     #[error(
-        "{file} has no column {missing} (asked for: {asked}{meant}); it has {available}; choose by --input and --output with NAME, -NAME or NAME-NAME"
+        "{file} has no column {missing} (asked for: {asked}{meant}); it has {available}; choose with --input and \
+         --output by NAME, -NAME or NAME-NAME"
     )]
     NoSuchColumn {
         /// The file.
@@ -271,9 +278,11 @@ pub enum IoError {
         /// Number of rows examined.
         rows: usize,
     },
-    /// Values missing at many places, as in a topic of another rate.
+    /// Values missing in many places, as for a topic with another rate.
     #[error(
-        "{file}, {place}, column {column}: the value is missing ({found}), as are {count} of {rows} in this column; where it was logged at instants of its own, read it with {} (or linear, drop); else bridge them linearly with --fill, or leave them out with --from and --to",
+        "{file}, {place}, column {column}: the value is missing ({found}), as are {count} of {rows} in this column; if \
+         it was logged at its own instants, read it with {} (or linear, drop); otherwise bridge them linearly with \
+         --fill, or leave them out with --from and --to",
         sparse_option(column)
     )]
     Sparse {
@@ -306,7 +315,8 @@ pub enum IoError {
     },
     /// Neither a time column nor a given sampling frequency.
     #[error(
-        "{file} has no column t (time in s), and no sampling frequency was given; name the column of the time by --time COLUMN, or give --fs HZ; it has {available}"
+        "{file} has no column t (time in s), and no sampling frequency was given; name the column of the time with \
+         --time COLUMN, or give --fs HZ; it has {available}"
     )]
     NoSampling {
         /// The file.
@@ -315,14 +325,15 @@ pub enum IoError {
         available: String,
     },
     /// An invalid sampling frequency.
-    #[error("the sampling frequency is {found} Hz, expected a positive finite number of samples in a second")]
+    #[error("the sampling frequency is {found} Hz, expected a positive finite number of samples per second")]
     SamplingFrequency {
         /// The value given.
         found: f64,
     },
     /// Too few samples to determine the sampling.
     #[error(
-        "{file}: {found} sample, expected at least 2 to find the sampling from t; check the file and the span, or give --fs HZ"
+        "{file}: {found} sample, expected at least 2 to determine the sampling from t; check the file and the span, or \
+         give --fs HZ"
     )]
     TooFewSamples {
         /// The file.
@@ -352,7 +363,9 @@ pub enum IoError {
     },
     /// Time that is constant or runs backwards.
     #[error(
-        "{file}, {place}: t = {found} s after {previous} s, expected increasing time; drop rows that were written twice with --drop-repeated, read trials whose time starts again with --trial t, write t with more decimals, or give --fs HZ to count samples instead"
+        "{file}, {place}: t = {found} s after {previous} s, expected increasing time; drop rows that were written \
+         twice with --drop-repeated, use --trial t if the time restarts with each trial, write t with more decimals, \
+         or give --fs HZ in place of t"
     )]
     NotIncreasing {
         /// The file.
@@ -515,7 +528,7 @@ pub enum IoError {
         found: String,
     },
     /// A table without columns.
-    #[error("{file}: the table has no columns, expected one at least")]
+    #[error("{file}: the table has no columns, expected at least one")]
     NoColumns {
         /// The file.
         file: String,
@@ -542,7 +555,8 @@ pub enum IoError {
     },
     /// Content in a format other than that of the extension.
     #[error(
-        "{file} is not in the format {format}: {found}, expected {expected}; copy or write it again if it was cut short, or give it the extension of what it is"
+        "{file} is not in the format {format}: {found}, expected {expected}; copy or write it again if it was cut \
+         short, or give it the extension of its format"
     )]
     WrongFormat {
         /// The file.
@@ -592,9 +606,9 @@ fn remedy_of_writing(source: &std::io::Error) -> &'static str {
         _ => source.kind(),
     };
     match kind {
-        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "make room there, or name a place on another disk",
-        ErrorKind::FileTooLarge => "raise the limit of the size of files (ulimit -f), or write less",
-        ErrorKind::ReadOnlyFilesystem => "name a place on a disk that can be written",
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "free space there, or choose a location on another disk",
+        ErrorKind::FileTooLarge => "raise the limit on file size (ulimit -f), or write less",
+        ErrorKind::ReadOnlyFilesystem => "choose a location on a writable disk",
         _ => "check that the directory exists and that you may write there",
     }
 }

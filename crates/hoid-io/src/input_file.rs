@@ -44,8 +44,8 @@ pub(crate) fn settings_text(path: &Path) -> io::Result<String> {
         return Ok(text);
     }
     Err(io::Error::other(format!(
-        "more than {} MB of settings; where it is meant to be so long, set HOID_MAX_UNPACKED_MB in the environment to {} times \
-         its MB",
+        "more than {} MB of settings; if it is meant to be so long, set HOID_MAX_UNPACKED_MB in the environment to {} \
+         times its MB",
         longest >> 20,
         kind.share()
     )))

@@ -2,7 +2,7 @@
 //!
 //! Recordings are in CSV, Parquet, NPZ, MATLAB or XDF, with columns of any name, clocks that jitter and missing rows.
 //! Reading selects the requested columns, determines the sampling, checks every value in use, and returns an evenly
-//! sampled [`Record`](hoid_model::Record) or an error that names the place in the file. Data are repaired only on
+//! sampled [`Record`](hoid_model::Record) or an error that names the position in the file. Data are repaired only on
 //! request; problems of the data are reported with the record.
 //!
 //! ```

@@ -218,7 +218,7 @@ fn tables_of_records_in_hdf5() {
     let counted = channel(&read(name, "run.e", "run.u"), "n").to_vec();
     assert!(counted.iter().enumerate().all(|(k, n)| *n == k as f64), "{counted:?}");
     let message = refused(name, "run.mark", "run.u");
-    assert!(message.contains("something else than numbers"), "{message}");
+    assert!(message.contains("something other than numbers"), "{message}");
 }
 
 #[test]

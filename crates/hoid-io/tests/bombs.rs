@@ -78,7 +78,7 @@ fn small_files_do_not_unpack_without_a_bound() {
         (
             "lying.parquet",
             zipped(100, 800, 1024),
-            "a page is longer than it reports",
+            "a page is longer than it states",
         ),
         ("stated.parquet", stated, unpacks),
         ("many.parquet", columns(10_001), "10001"),

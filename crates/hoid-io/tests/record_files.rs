@@ -122,7 +122,7 @@ fn other_extensions_and_places() {
         fs::write(desk.path(name), "t,e,u\n0,1,2\n").unwrap();
         let message = read_record(&desk.path(name), &defaults()).unwrap_err().to_string();
         assert!(
-            message.contains("names no format of a record; expected .csv"),
+            message.contains("extension") && message.contains("; expected .csv"),
             "{message}"
         );
         assert!(write_record(&desk.path(name), &record(3, 0.01, 0.0)).is_err());
@@ -221,7 +221,7 @@ fn errors_name_line_column_and_remedy() {
         "t,e,u\nframes,counts,counts\n0,1,2\n1,1,2\n",
         &[
             "line 2, column t: found \"frames\"",
-            "remove it and report them with --unit",
+            "remove it and give them with --unit",
         ],
     );
     says(
@@ -230,7 +230,7 @@ fn errors_name_line_column_and_remedy() {
     );
     says(
         "t e\n0.00 1.5 2\n0.01 1.6 2\n",
-        &["3 numbers between blanks", "expected commas, semicolons or tabs"],
+        &["3 numbers separated by blanks", "expected commas, semicolons or tabs"],
     );
     says(
         "t,e,u\n0,1,2\n#\n1,NaN,2\n2,,2\n",

@@ -143,7 +143,7 @@ fn a_given_frequency_wins_over_t() {
     assert_eq!(clock.notes[0], "t is in s from its first moment");
     let none = desk.read("t,e,u\nx,1,0\n12:00:02,2,0\n", &with(2.0)).unwrap();
     assert!(
-        none.notes[0].contains("t is not a number on line 2"),
+        none.notes[0].contains("t is not a number in line 2"),
         "{:?}",
         none.notes
     );
@@ -232,8 +232,8 @@ fn two_topics_in_one_table_are_read_where_both_have_values() {
     assert_eq!(
         read.notes,
         [
-            "1 rows at the start and 0 at the end are left out: e and u have not all a value there to bridge to",
-            "column e lacks values at many places, as if logged at instants of its own: --fill draws straight lines, \
+            "1 rows at the start and 0 at the end are left out: not all of e and u have a value there to bridge to",
+            "column e lacks values at many places, as if logged at its own instants: --fill draws straight lines, \
              --sparse e=hold holds the last value"
         ]
     );

@@ -207,8 +207,8 @@ const DEFAULT_METHOD: &str = "adaptive";
 /// Default consent text.
 const CONSENT: &str = "You will follow a moving target by hand for a few short runs. The program stores where your \
 hand was, what was on the screen and when, under a made-up name, on this computer only. It stores no name, no picture \
-and no sound. You may stop at any time by the key Escape or by closing the window; what was stored can be deleted with \
-its folder. Do not take part if moving patterns make you unwell.";
+and no sound. You may stop at any time with the Escape key or by closing the window; what was stored can be deleted \
+with its folder. Do not take part if moving patterns make you unwell.";
 
 impl Default for Config {
     /// A trial of two minutes: one run.

@@ -27,7 +27,7 @@ pub enum LabError {
     #[error("{0}")]
     Order(String),
     /// A file of a session that the system cannot read or write.
-    #[error("{file}: {source}; check the place and the permissions")]
+    #[error("{file}: {source}; check the location and the permissions")]
     File {
         /// The file.
         file: String,

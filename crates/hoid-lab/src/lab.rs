@@ -2,7 +2,7 @@
 //! observers.
 //!
 //! Messages from pages arrive on the threads of their sockets and are processed one at a time under one lock; messages
-//! to pages are queued for each. The estimate has a thread of its own, and so do the pages of results.
+//! to pages are queued for each. The estimate has its own thread, and so do the pages of results.
 //!
 //! | file | contents |
 //! |---|---|
@@ -114,7 +114,7 @@ impl Current {
     /// The current run, by its number.
     fn running(&self, number: usize) -> Result<&Running, LabError> {
         let run = self.run.as_ref().filter(|run| run.begun.number == number);
-        run.ok_or_else(|| LabError::Order(format!("run {number} is not going on")))
+        run.ok_or_else(|| LabError::Order(format!("run {number} is not in progress")))
     }
 
     /// Continues with a session; a run that was sent for another one cannot be started in it.
@@ -380,9 +380,7 @@ impl Shared {
     fn resume(&self, state: &mut Current, name: &str) -> Result<(), LabError> {
         let open = self.open_sessions();
         if state.run.is_some() || !open.iter().any(|known| known == name) {
-            return Err(LabError::Order(format!(
-                "there is no session {name:?} to continue with"
-            )));
+            return Err(LabError::Order(format!("there is no session {name:?} to continue")));
         }
         state.enter(Session::open(&self.out.join(name))?);
         Ok(())

@@ -1,7 +1,7 @@
 //! The lag of the operator during a run.
 //!
 //! The basis of the tracker has a fixed lag: it gives no information about T_I. Therefore the samples of the
-//! measurement since the last declared change are fitted as by `hoid identify`, every 10 s, on a thread of its own: all
+//! measurement since the last declared change are fitted as by `hoid identify`, every 10 s, on a separate thread: all
 //! forms of the operator, the one selected by held-out data, and its T_I if the data determine it
 //! ([`hoid_analysis::identify`]). For a form without a lag, or one whose interval includes a pure integration, T_I is
 //! not determined, and no number is reported.

@@ -1,9 +1,9 @@
 //! The estimate during a run.
 //!
-//! A recursion of `hoid track` takes e and u of every tenth tick on a thread of its own, fed by the
-//! batches of the page; it is not part of the loop. With the controlled element P known, the open
-//! loop is `L = Y P`, the crossover frequency the lowest with `|L| = 1` and the phase margin there
-//! `180 deg + arg L`. With `d ln Y = g + j p` of covariance matrix S, to first order
+//! A recursion of `hoid track` takes e and u of every tenth tick on a separate thread, fed by the batches of the page;
+//! it is not part of the loop. With the controlled element P known, the open loop is `L = Y P`, the crossover frequency
+//! the lowest with `|L| = 1` and the phase margin there `180 deg + arg L`. With `d ln Y = g + j p` of covariance matrix
+//! S, to first order
 //!
 //! `d omega_c = -g / s_g`,  `d phi_m = p - (s_p/s_g) g`,
 //!
@@ -37,7 +37,7 @@ const CROSSOVERS: (f64, f64, usize) = (0.3, 15.0, 40);
 /// Relative step of the slopes.
 const SLOPE: f64 = 1e-3;
 
-/// A number with its standard error; none if unknown.
+/// A number with its standard error; `None` if unknown.
 type ReportedValue = (Option<f64>, Option<f64>);
 
 /// The estimate at an instant.
@@ -159,7 +159,7 @@ fn reported(estimate: Estimate) -> ReportedValue {
     (finite(estimate.value), estimate.standard_error.and_then(finite))
 }
 
-/// Crossover frequency in rad/s and phase margin in degrees, to first order; none if `|L|` does not
+/// Crossover frequency in rad/s and phase margin in degrees, to first order; `None` if `|L|` does not
 /// cross one from above.
 fn crossover(
     response: &dyn Fn(f64) -> Option<Response>,
@@ -330,7 +330,7 @@ pub(crate) mod tests {
         let element: ContinuousTransferFunction = "3/s".parse().unwrap();
         let y = |omega: f64| {
             let (sin, cos) = (-0.2 * omega).sin_cos();
-            // Covariance along Y (gain) alone: 0.01^2.
+            // Covariance along Y (gain) only: 0.01^2.
             let v = 1e-4;
             Some(Response {
                 value: [cos, sin],

@@ -41,7 +41,7 @@ use http::{Reply, Request};
 const QUEUE: i32 = 4096;
 /// Maximum number of simultaneous connections with the token.
 const KNOWN: usize = 64;
-/// Timeout of an answer to one of them.
+/// Timeout of a response to one of them.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// The page, built from `page/` by `npm run build`.
@@ -85,7 +85,7 @@ impl Server {
     pub fn new(lab: Lab, port: Option<u16>) -> Result<Self, LabError> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port.unwrap_or(0))).map_err(|error| {
             let asked = port.map_or("no port is free".to_owned(), |port| {
-                format!("port {port} cannot be had")
+                format!("port {port} is not available")
             });
             LabError::Server(format!("{asked}: {error}; leave --port out for any free one"))
         })?;
@@ -142,7 +142,7 @@ impl Server {
             let other = stream.try_clone();
             let made = thread::Builder::new().spawn(move || known.0.answer(stream, &request));
             match (made, other) {
-                (Err(_), Ok(stream)) => Err((busy("the system has no thread for it"), stream)),
+                (Err(_), Ok(stream)) => Err((busy("the system cannot start a thread for it"), stream)),
                 _ => Ok(()),
             }
         });
@@ -160,11 +160,11 @@ impl Server {
             Ok(Route::Socket(key)) => return socket::run(stream, &key, &self.lab),
             Ok(Route::Reply(reply)) | Err(reply) => reply,
         };
-        // A closed page needs no answer.
+        // A closed page needs no response.
         let _ = reply.write(&mut stream);
     }
 
-    /// Checks that a request belongs to this page.
+    /// Checks that a request comes from this page.
     fn admits(&self, request: &Request) -> Result<(), Reply> {
         let own = |authority: &str| {
             let port = self.address.port();

@@ -141,11 +141,11 @@ fn task_of(begun: &RunStart, task: &Task) -> Option<Finding> {
     let wrong = |what: &str| {
         Some(Finding::doubt(
             "lab-task",
-            format!("{what} is not that of its condition and seed"),
+            format!("{what} does not match its condition and seed"),
         ))
     };
     let Ok(made) = Task::new(&begun.condition, begun.cell, begun.replication) else {
-        return wrong("the condition cannot be made again: it");
+        return wrong("the condition cannot be rebuilt: it");
     };
     let near = |a: &[f64], b: &[f64]| {
         let size = b.iter().fold(1e-300, |m: f64, v| m.max(v.abs()));
@@ -167,7 +167,7 @@ fn task_of(begun: &RunStart, task: &Task) -> Option<Finding> {
 
 fn ticks_of(logged: &Logged) -> Option<Finding> {
     let wrong = logged.numbers.iter().enumerate().find(|(k, tick)| **tick != *k as f64);
-    wrong.map(|(k, tick)| Finding::doubt("lab-ticks", format!("tick {tick} is in the place of tick {k}")))
+    wrong.map(|(k, tick)| Finding::doubt("lab-ticks", format!("found tick {tick} where tick {k} was expected")))
 }
 
 fn events_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
@@ -176,7 +176,7 @@ fn events_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
         let whole = event.tick >= 0.0 && event.tick.fract() == 0.0 && event.raw.is_finite();
         let late = event.tick - event.stamp_ms.max(0.0);
         let words = if !whole || event.tick < last {
-            "has no place among the ticks".to_owned()
+            "does not fit into the sequence of ticks".to_owned()
         } else if !((0.0..).contains(&late) && (event.stamp_ms..).contains(&event.handled_ms)) {
             format!(
                 "was taken at tick {} before its time stamp of {:.3} ms",
@@ -200,7 +200,7 @@ fn inputs_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
         .collect();
     let made = held_inputs(&events, logged.signals.u.len());
     differing(&made, &logged.signals.u).map(|(first, count)| {
-        let words = format!("u of {count} ticks is not that of the input events, first at tick {first}");
+        let words = format!("u of {count} ticks does not match the input events, first at tick {first}");
         Finding::doubt("lab-input", words)
     })
 }
@@ -208,7 +208,7 @@ fn inputs_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
 fn errors_of(task: &Task, logged: &Logged) -> Option<Finding> {
     let made = task.run(&logged.signals.u);
     differing(&made.e, &logged.signals.e).map(|(first, count)| {
-        let words = format!("e of {count} ticks is not that of the controlled element, first at tick {first}");
+        let words = format!("e of {count} ticks does not match the controlled element, first at tick {first}");
         Finding::doubt("lab-tick", words)
     })
 }

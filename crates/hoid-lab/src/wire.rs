@@ -108,7 +108,7 @@ pub struct State {
     pub consent: String,
     /// When the person sees the live estimate.
     pub live: LiveFor,
-    /// True if a simulated operator takes the place of the person.
+    /// True if a simulated operator replaces the person.
     pub calibrate: bool,
     /// The session, as `sub-P01/ses-01`.
     pub session: Option<String>,

@@ -227,7 +227,7 @@ fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
     assert_eq!(person.state()["running"], Value::Null);
     // No run starts while it is full.
     let said = person.next(2).unwrap_err();
-    assert!(said.contains("No space left") && said.contains("make room"), "{said}");
+    assert!(said.contains("No space left") && said.contains("free space"), "{said}");
     fs::remove_file(&ballast).unwrap();
     let folder = at.path().join("sub-P01/ses-01");
     let number = 1 + Stem::all(&folder).unwrap().last().unwrap().0;
@@ -236,7 +236,7 @@ fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
     // A run that cannot be closed is not verified.
     fill(&ballast);
     let said = person.finish(number).unwrap_err();
-    assert!(said.contains("make room on the disk and start it again"), "{said}");
+    assert!(said.contains("free space on the disk and start it again"), "{said}");
     assert_eq!(person.state()["next"], 0);
     fs::remove_file(&ballast).unwrap();
     person.next(number + 1).unwrap();

@@ -320,7 +320,7 @@ fn one_experiment_has_one_server() {
     let dir = tempfile::tempdir().unwrap();
     let _at = served(dir.path(), Mode::Sessions);
     let second = Lab::open(dir.path(), config(), Mode::Sessions, None);
-    assert!(second.is_err_and(|error| error.to_string().contains("another process works on")));
+    assert!(second.is_err_and(|error| error.to_string().contains("another process is working on")));
 }
 
 /// Connections that the server has not accepted yet wait for it. The system drops what its queue does not hold, and the

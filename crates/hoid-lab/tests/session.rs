@@ -319,7 +319,9 @@ fn numbers_of_files_are_no_places() {
     fs::write(&ticks, format!("{text}{last}\n{last}\n")).unwrap();
     let checked = check(&stem).unwrap();
     assert!(
-        checked.reasons().contains("tick 3999 is in the place of tick 4000"),
+        checked
+            .reasons()
+            .contains("found tick 3999 where tick 4000 was expected"),
         "{}",
         checked.reasons()
     );
@@ -335,7 +337,7 @@ fn numbers_of_files_are_no_places() {
     value["condition"]["preview_s"] = serde_json::json!(1e6);
     fs::write(&json, value.to_string()).unwrap();
     let said = check(&stem).unwrap().reasons();
-    assert!(said.contains("the condition cannot be made again"), "{said}");
+    assert!(said.contains("the condition cannot be rebuilt"), "{said}");
     let toml = session.folder.join("lab.toml");
     let facts = fs::read_to_string(&toml).unwrap();
     let other = facts.replacen("condition = 0", "condition = 9", 1);

@@ -7,8 +7,8 @@
 //! [`crate::operator`].
 //!
 //! The model is linear in K_e and K_e_dot. Its response is continuous in tau and has a kink where tau is an integer
-//! number of samples: the step response starts with the slope `omega^2 K_e_dot`. Derivatives there are those for
-//! increasing tau.
+//! number of samples: the step response starts with the slope `omega^2 K_e_dot`. At such a delay, the derivatives are
+//! those for increasing tau.
 
 use hoid_core::held_operator::held_operator_delayed;
 

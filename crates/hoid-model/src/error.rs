@@ -59,7 +59,7 @@ pub enum ModelError {
         label: String,
     },
     /// A channel name that is already taken.
-    #[error("channel {name} exists already; give each channel a name of its own")]
+    #[error("channel {name} exists already; give each channel its own name")]
     DuplicateChannel {
         /// The name.
         name: String,
@@ -148,19 +148,22 @@ pub enum ModelError {
 #[non_exhaustive]
 pub enum NotConvertible {
     /// The operator is of another form than a gain with a lead.
-    #[error("the operator has the form {form}, which has other parameters than K_e, T_L and K_e_dot")]
+    #[error("the operator has the form {form}, which has parameters other than K_e, T_L and K_e_dot")]
     OtherForm {
         /// Name of the form.
         form: String,
     },
     /// Polynomials that correspond to no operator of the family.
-    #[error("the polynomials are those of no operator of the family: {reason}")]
+    #[error("the polynomials do not correspond to any operator of the family: {reason}")]
     NotOfTheFamily {
         /// The problem.
         reason: String,
     },
     /// A pole on the closed negative real axis has no real logarithm.
-    #[error("the pole z = {pole:.6} lies on the closed negative real axis, so that no real continuous system has it")]
+    #[error(
+        "the pole z = {pole:.6} lies on the closed negative real axis, so that no real continuous-time system \
+         corresponds to the model"
+    )]
     NegativeRealPole {
         /// The pole.
         pole: f64,

@@ -10,7 +10,8 @@ use crate::{
     numbers::{DASH, with_uncertainty},
 };
 
-/// Writes a row for each name, estimate and unit (empty for none), each preceded by a line feed except for the first.
+/// Writes a row for each name, estimate and unit (empty if there is none), each preceded by a line feed except for the
+/// first.
 ///
 /// # Errors
 /// The errors of the formatter.

@@ -51,14 +51,14 @@ crate::named_choice!(FaultKind, "kind of fault", 10, {
 /// Handling of faults.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum FaultHandling {
-    /// They are reported, and the data remain unchanged.
+    /// Faults are reported, and the data remain unchanged.
     Report,
-    /// Short ones are bridged, and the record is cut at long ones.
+    /// Short faults are bridged, and the record is cut at long ones.
     #[default]
     Bridge,
-    /// The record is cut at all of them.
+    /// The record is cut at all faults.
     Cut,
-    /// They are not searched for.
+    /// Faults are not searched for.
     Keep,
 }
 
@@ -115,7 +115,7 @@ impl Fault {
         match self.kind {
             FaultKind::TimeUnit => "t must be in s: divide a t in ms by 1000, or give the sampling frequency with --fs",
             FaultKind::Exchanged => "exchange them: --input and --output",
-            FaultKind::Sign => "turn one of them: --output=-u, or --input=-e",
+            FaultKind::Sign => "reverse the sign of one: --output=-u, or --input=-e",
             FaultKind::Step => "cut there with --from and --to, or --faults cut",
             _ => "look at the recording there; cut it out with --from and --to or --faults cut",
         }
@@ -146,13 +146,13 @@ impl fmt::Display for Fault {
             FaultKind::Wrap => write!(f, "{channel} wraps around by {size}, {span}")?,
             FaultKind::Step => write!(f, "the level of {channel} steps by {size} at {} s", time(self.from_s))?,
             FaultKind::Scale => write!(f, "{channel} is {size} times larger than elsewhere, {span}")?,
-            FaultKind::TimeUnit => write!(f, "a sample time of {size} s: no person is recorded so")?,
+            FaultKind::TimeUnit => write!(f, "a sample time of {size} s: too long for the recording of a person")?,
             FaultKind::Exchanged => {
                 f.write_str(
                     "input and output seem exchanged: the output responds immediately, and the input responds late",
                 )?;
             }
-            FaultKind::Sign => f.write_str("the output answers the input with the wrong sign")?,
+            FaultKind::Sign => f.write_str("the output responds to the input with the wrong sign")?,
         }
         if let Some(deviations) = self.deviations {
             write!(f, " ({} robust standard deviations)", short(deviations, 3))?;
@@ -183,9 +183,9 @@ fn short(value: f64, digits: usize) -> String {
     }
 }
 
-/// Number of faults of one kind that are reported individually; more are only counted.
+/// Number of faults of one kind that are reported individually; further faults are only counted.
 const TOLD: usize = 3;
-/// Share of the samples that may be repaired without a doubt about the rest.
+/// Share of the samples that may be repaired without casting doubt on the rest.
 pub const MOST_MENDED: f64 = 0.2;
 
 /// Returns the findings about faults: a note if all faults of a kind were repaired, a doubt if they were not, and a

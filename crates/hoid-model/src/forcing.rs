@@ -79,7 +79,7 @@ impl ForcingFunction {
                 return refuse(
                     quantity,
                     s.omega_rad_s,
-                    "a frequency of its own for each sinusoid; merge those of equal frequency",
+                    "a different frequency for each sinusoid; merge those of equal frequency",
                 );
             }
         }

@@ -21,8 +21,8 @@ impl GainUnit {
         Self(declared.map(|(e, u)| (e.to_owned(), u.to_owned())))
     }
 
-    /// Returns the unit of a parameter from its name and the unit `own` that it has in addition to that of the gain
-    /// ("s" of K_e_dot, "1/s" of K/T_I, "deg/deg" or "" of K). The unit of a parameter that is not a gain is unchanged.
+    /// Returns the unit of a parameter from its name and the unit `own` by which that of the gain is multiplied ("s" of
+    /// K_e_dot, "1/s" of K/T_I, "deg/deg" or "" of K). The unit of a parameter that is not a gain is unchanged.
     ///
     /// ```
     /// # use hoid_model::{Channel, GainUnit, Record, SampleTime};
@@ -41,7 +41,7 @@ impl GainUnit {
         }
         match (&self.0, own) {
             (None, _) => String::new(),
-            // For equal units only that of time is left.
+            // If the units of e and u are equal, only the unit of time remains.
             (Some((e, u)), "s" | "1/s") if e == u => own.to_owned(),
             (Some((e, u)), "s") => format!("{u} s/{e}"),
             (Some((e, u)), "1/s") => format!("{u}/({e} s)"),

@@ -33,8 +33,8 @@ pub struct HeldSystem {
 }
 
 impl HeldSystem {
-    /// Creates the system `num(s)/den(s)` by descending powers of s, den monic, num of no higher degree; `late` is
-    /// delta/Ts.
+    /// Creates the system `num(s)/den(s)` from coefficients by descending powers of s, with den monic and num of no
+    /// higher degree; `late` is delta/Ts.
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] if `late` is not in `[0, 1)` or an exponential overflows;

@@ -13,7 +13,7 @@ pub const Z_95: f64 = 1.959_963_984_540_054;
 const DIGITS_OF_ERROR: i32 = 2;
 const DIGITS_ALONE: i32 = 5;
 
-/// Relative error below which it is rounding of the last digits, and no uncertainty.
+/// Relative error below which an error is rounding of the last digits and not an uncertainty.
 const LAST_DIGITS: f64 = 16.0 * f64::EPSILON;
 /// Number of digits of a value that is exact to rounding.
 const ALL_DIGITS: i32 = 15;

@@ -69,7 +69,7 @@ impl OperatorParameters {
             (None, Some(k_e_dot)) if k_e != 0.0 => k_e_dot / k_e,
             (None, Some(_)) => return Err(wrong("K_e = 0 has no T_L = K_e_dot/K_e".to_owned())),
             (Some(_), Some(_)) => return Err(wrong("give T_L or K_e_dot, not both".to_owned())),
-            (None, None) => return Err(wrong("T_L (or K_e_dot) is lacking".to_owned())),
+            (None, None) => return Err(wrong("T_L (or K_e_dot) is missing".to_owned())),
         };
         Ok(Self {
             k_e,

@@ -224,10 +224,10 @@ impl Record {
         })
     }
 
-    /// Returns this record followed, from its next sample on, by another; any event at the boundary of the two has its
-    /// known time.
+    /// Returns this record followed, from its next sample on, by another; any event at the boundary between the two
+    /// therefore has a known time.
     ///
-    /// Channels that only one of them has are left out; label, names and units are those of the first.
+    /// Channels that only one of them has are omitted; label, names and units are those of the first.
     ///
     /// # Errors
     /// [`ModelError::Joined`] if their sample times differ by more than one part in a million, or only one of them has

@@ -1,13 +1,12 @@
 //! The remnant gain K_n for a demanded noise level P_n (appendix A of the thesis).
 //!
-//! With `S = 1/(1 + H_HO H_CE)`, unit white noise drawn once a sample (its power spreads evenly
-//! over 0 to pi/Ts), and
+//! With `S = 1/(1 + H_HO H_CE)`, unit white noise drawn once per sample (its power is spread evenly over 0 to pi/Ts),
+//! and
 //!
 //! - `V_f = 1/2 sum A_k^2 |S H_HO (j omega_k)|^2`, the variance of u due to the forcing function,
-//! - `V_u = Ts/pi  integral_0^{pi/Ts} |S|^2 / (1 + T_n^2 omega^2)^m d omega`, that due to the
-//!   remnant with K_n = 1,
-//! - `V_n = Ts/pi  integral_0^{pi/Ts} 1 / (1 + T_n^2 omega^2)^m d omega`, that of the remnant
-//!   itself,
+//! - `V_u = Ts/pi  integral_0^{pi/Ts} |S|^2 / (1 + T_n^2 omega^2)^m d omega`, the variance of u due to the remnant with
+//!   K_n = 1,
+//! - `V_n = Ts/pi  integral_0^{pi/Ts} 1 / (1 + T_n^2 omega^2)^m d omega`, the variance of the remnant itself,
 //!
 //! the two definitions give
 //!

@@ -1,10 +1,9 @@
 //! The noise model of the exactly held remnant as a function of T_n, with its derivatives.
 //!
-//! `K_n/(T_n s + 1)^m`, driven by one normal deviate of unit variance a sample, has the innovation
-//! form `C/D eps` with `D = (1 - p q^-1)^m`, `p = e^{-Ts/T_n}`, C the monic spectral factor of the
-//! numerator of the zero-order hold ([`crate::remnant`]), and `sigma = K_n g(T_n)`. The
-//! derivatives: `dp/dT_n = p Ts/T_n^2`; a zero zeta of the numerator N moves by `-N_a/N_zeta` with
-//! `a = Ts/T_n`, its mirror image `1/conj zeta` accordingly.
+//! `K_n/(T_n s + 1)^m`, driven by one normal deviate of unit variance per sample, has the innovation form `C/D eps`
+//! with `D = (1 - p q^-1)^m`, `p = e^{-Ts/T_n}`, C the monic spectral factor of the numerator of the zero-order hold
+//! ([`crate::remnant`]), and `sigma = K_n g(T_n)`. The derivatives: `dp/dT_n = p Ts/T_n^2`; a zero zeta of the
+//! numerator N moves by `-N_a/N_zeta` with `a = Ts/T_n`, its mirror image `1/conj zeta` accordingly.
 
 use crate::{
     ModelError, SampleTime,

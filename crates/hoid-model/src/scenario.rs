@@ -24,7 +24,7 @@ use crate::{
     schedule::Schedule,
 };
 
-/// Longest run, in samples: 11 days at 100 Hz. It reports a wrong exponent of a time before all memory is allocated.
+/// Longest run, in samples: 11 days at 100 Hz. A wrong exponent of a time is reported before all memory is allocated.
 const MOST_SAMPLES: usize = 100_000_000;
 
 /// A state of adaptation: the operator and the controlled element.

@@ -2,7 +2,7 @@
 //!
 //! `p(t) = p_i + (p_f - p_i) / (1 + e^{-G (t - t_M)})`   (eq. 5)
 //!
-//! A person with repeated changes has a sigmoid of alternating sign every T seconds,
+//! Repeated changes of a person are sigmoids of alternating sign every T seconds,
 //! `p(t) = p_i + (p_f - p_i) sum over k of (-1)^k / (1 + e^{-G (t - t_M - k T)})`.
 
 use crate::ModelError;
@@ -17,7 +17,7 @@ pub enum Schedule {
     Sigmoid {
         /// Transition rate G, 1/s.
         rate_per_s: f64,
-        /// Time of the largest rate of change t_M, s from the start of the measurement.
+        /// Time t_M of the largest rate of change, s from the start of the measurement.
         midpoint_s: f64,
     },
     /// Repeated changes back and forth, for the whole run.

@@ -14,10 +14,10 @@
 //!   `chi = (1 + f1 + f2) / q = exp[0, z1] exp[0, z2]`.
 //!
 //! All of these are symmetric in the poles and entire in (s, q): complex, real and double poles and poles at the origin
-//! of s have the same formulas ([`hoid_core::divided_differences`]). This replaces the matrix exponential and logarithm
-//! of the extended matrix (eq. B.7); the results are the same. The inverse exists if no pole in z is on the closed
-//! negative real axis (then the logarithm is the principal one). Source: N. J. Higham, *Functions of Matrices*, 2008,
-//! sections 2.4 and B.16 (divided differences); eq. B.3-B.10 of the thesis.
+//! of s are described by the same formulas ([`hoid_core::divided_differences`]). This replaces the matrix exponential
+//! and logarithm of the extended matrix (eq. B.7); the results are the same. The inverse exists if no pole in z is on
+//! the closed negative real axis (then the logarithm is the principal one). Source: N. J. Higham, *Functions of
+//! Matrices*, 2008, sections 2.4 and B.16 (divided differences); eq. B.3-B.10 of the thesis.
 
 use hoid_core::divided_differences::DividedDifferences;
 

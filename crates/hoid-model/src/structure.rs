@@ -1,9 +1,9 @@
 //! Model structures and their orders (Table 5.1).
 //!
 //! The general family is `A(q^-1) u(t) = B(q^-1)/F(q^-1) e(t-nk) + C(q^-1)/D(q^-1) eps(t)` (eq. 5.1 times A). A
-//! structure defines which polynomials are present. Orders follow the convention of the field's software: nb is the
-//! number of coefficients `b0 ... b_{nb-1}` of B, the others are the numbers of coefficients after the leading one, nk
-//! is the delay of b0 in samples.
+//! structure defines which polynomials are present. Orders follow the convention of common identification software: nb
+//! is the number of coefficients `b0 ... b_{nb-1}` of B, the others are the numbers of coefficients after the leading
+//! one, nk is the delay of b0 in samples.
 //!
 //! This is the only list of structures: the command line, plans and Python take their names from it.
 //!
@@ -231,14 +231,14 @@ impl Orders {
         }
         if structure.has_input() && self.nb == 0 {
             return refuse(
-                "B needs at least one coefficient (nb counts b0 ... b_{nb-1}); set nb = 1 or more, or take ar, ma or arma, \
-                 which describe the output alone"
+                "B needs at least one coefficient (nb counts b0 ... b_{nb-1}); set nb = 1 or more, or use ar, ma or \
+                 arma, which describe the output alone"
                     .to_owned(),
             );
         }
         if !structure.has_input() && self.nk > 0 {
             return refuse(format!(
-                "the structure {structure} has no input, so that a delay means nothing; set nk = 0"
+                "the structure {structure} has no input, so that a delay has no meaning; set nk = 0"
             ));
         }
         if self.parameters() == 0 {

@@ -3,8 +3,8 @@
 //! For `y = g(theta)` and an estimate with covariance P, `var y ~ G P G'` with `G = dg/dtheta` at
 //! the estimate. For the operator, G is the inverse of the Jacobian of the exact zero-order hold
 //! ([`crate::operator::retrieval_jacobian`]); the lead time is the ratio `T_L = K_e_dot / K_e`,
-//! whose first-order error is good as long as K_e is several standard errors away from zero.
-//! Source: A. W. van der Vaart, *Asymptotic Statistics*, 1998, section 3.1.
+//! whose first-order error is accurate as long as K_e is several standard errors away from zero. Source: A. W. van der
+//! Vaart, *Asymptotic Statistics*, 1998, section 3.1.
 
 use std::fmt;
 

@@ -92,7 +92,7 @@ impl PyDescription {
         faults_of(py, &self.0.data)
     }
 
-    /// The describing function alone.
+    /// Only the describing function.
     fn function(&self) -> PyDescribingFunction {
         PyDescribingFunction {
             found: self.0.found.function.clone(),
@@ -105,7 +105,7 @@ impl PyDescription {
         array(py, self.0.found.phases_deg().iter().map(|p| p.value).collect())
     }
 
-    /// Crossover and margins; none without a controlled element.
+    /// Crossover and margins; `None` without a controlled element.
     #[getter]
     fn open_loop<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(margins) = &self.0.found.margins else {

@@ -178,7 +178,7 @@ impl PyOperatorFit {
         Ok(Some(all))
     }
 
-    /// Why there is no fit at the lines of an excitation that was named.
+    /// Reason why there is no fit at the lines of an excitation that was named.
     #[getter]
     fn no_lines(&self) -> Option<&str> {
         self.0.fit.no_lines.as_deref()
@@ -259,14 +259,14 @@ impl PyOperatorFit {
         Ok(loop_parts(py, self.0.fit.loop_measures(0, &element))?)
     }
 
-    /// Crossover and phase margin; none without a controlled element.
+    /// Crossover and phase margin; `None` without a controlled element.
     #[getter]
     fn open_loop<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let of = |element| loop_parts(py, self.0.fit.loop_measures(0, element));
         self.0.controlled_element.as_ref().map(of).transpose()
     }
 
-    /// Every crossing of the loop, and whether it is stable; none without a controlled element.
+    /// Every crossing of the loop, and whether it is stable; `None` without a controlled element.
     #[getter]
     fn loop_shape<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let of = |element| shape_parts(py, &self.0.fit.loop_shape(0, element));
@@ -344,7 +344,7 @@ impl PyOperatorFit {
         figures::termination(py, self.0.fit.termination)
     }
 
-    /// Channel of the excitation; none if there was none.
+    /// Channel of the excitation; `None` if there was none.
     #[getter]
     fn excitation(&self) -> Option<&str> {
         self.0.excitation.as_deref()

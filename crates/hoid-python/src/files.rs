@@ -186,7 +186,7 @@ pub fn decimated<'py>(
 pub fn decimation(text: &str) -> Outcome<Decimation> {
     text.parse().map_err(|_| {
         bad_option(format!(
-            "decimate is {text:?}, expected \"auto\", \"off\" or by how many samples, as 10"
+            "decimate is {text:?}, expected \"auto\", \"off\" or an integer factor, such as 10"
         ))
     })
 }

@@ -153,13 +153,14 @@ impl PyFit {
         match &self.whole {
             Some(whole) => Ok(each!(whole, found => found.to_json())?),
             None => Err(DataError::new_err(
-                "this model is a part of another result: write that one (fit.to_json() of the operator or the trace)",
+                "this model is part of another result: write that result instead (fit.to_json() of the operator or the \
+                 trace)",
             )
             .into()),
         }
     }
 
-    /// For a part of another result its model alone, from which it comes back; none of a result by itself.
+    /// For a part of another result, only its model, from which it is restored; `None` for a separate result.
     fn state(&self) -> Option<String> {
         if self.whole.is_some() {
             return None;
@@ -316,7 +317,7 @@ impl PyFit {
         Ok(figures::quality(py, &quality)?)
     }
 
-    /// The verdict on it; of a part of another result, by these records alone.
+    /// The verdict on it; for a part of another result, from these records only.
     fn verdict(&self, py: Python<'_>, records: Vec<Bound<'_, PyAny>>) -> Outcome<VerdictParts> {
         if let Some(whole) = &self.whole {
             return Ok(each!(whole, found => figures::verdict(&found.verdict)));

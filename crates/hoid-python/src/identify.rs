@@ -22,7 +22,7 @@ use crate::{
     time_varying::PyTimeVaryingFit,
 };
 
-/// Samples times models from which a fit is long enough to get a thread of its own, for interrupts.
+/// Samples times models from which on a fit is long enough for a separate thread, for interrupts.
 const LONG: usize = 50_000;
 
 /// Fits a model to records: the fit, and remarks on how it was requested. The package has brought all options into the
@@ -85,7 +85,7 @@ fn native(py: Python<'_>, answer: BatchResult) -> PyResult<Bound<'_, PyAny>> {
     })
 }
 
-/// The identification without the interpreter, in a thread of its own where it is long.
+/// The identification without the interpreter, in a separate thread if it is long.
 fn run<E>(
     py: Python<'_>,
     how: Identification<E>,
@@ -122,8 +122,7 @@ fn kind(setting: &Setting) -> &'static str {
     }
 }
 
-/// Name of each batch estimator, the structures that it serves, and the keywords that it takes with the type of
-/// each.
+/// Name of each batch estimator, the structures that it supports, and its keywords with the type of each.
 #[pyfunction]
 pub fn batch_estimators() -> Vec<(&'static str, Vec<&'static str>, BTreeMap<&'static str, &'static str>)> {
     let structures = |spec: &MethodSpec| spec.structures.iter().map(|structure| structure.name()).collect();

@@ -40,7 +40,7 @@ const VALUES: [&str; 17] = [
     "population",
 ];
 
-/// The message with keywords in place of options.
+/// The message with keywords instead of options.
 #[pyfunction]
 pub fn in_python(message: &str) -> String {
     let mut text = String::with_capacity(message.len());

@@ -35,7 +35,7 @@ pub fn choice<T: NamedChoice>(option: &str, found: &str) -> Outcome<T> {
     word(option, found, &words)
 }
 
-/// Kind of places that can be excluded from a record.
+/// Kind of fault that can be excluded from a record.
 pub fn quality_issue_kind(found: &str) -> Outcome<QualityIssueKind> {
     let kinds = [
         QualityIssueKind::Missing,

@@ -71,7 +71,7 @@ pub fn simulate<'py>(
             let has_remnant = remnant_order.is_some() || remnant_time_constant.is_some();
             if has_remnant || noise_level.is_some() || noise_definition.is_some() {
                 return Err(bad_option(
-                    "remnant_order, remnant_time_constant, noise_level and noise_definition are of the thesis's \
+                    "remnant_order, remnant_time_constant, noise_level and noise_definition are for the thesis's \
                      remnant: in a scenario with a form the tables [[remnant]] specify it",
                 ));
             }

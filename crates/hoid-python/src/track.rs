@@ -115,7 +115,7 @@ impl PyTrace {
         Ok(all)
     }
 
-    /// Events found by the guard, and what it did.
+    /// Events found by the guard, and its actions.
     #[getter]
     fn faults<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         self.0
@@ -188,8 +188,7 @@ impl PyTrace {
         figures::verdict(&self.0.verdict)
     }
 
-    /// Why most of the rows without a crossover have none, and how many there are; None without a
-    /// controlled element.
+    /// Number of rows without a crossover, and their most frequent reason; None without a controlled element.
     #[getter]
     fn no_crossover(&self) -> Option<(usize, Option<&'static str>)> {
         let (rows, reason) = self.0.without_crossover()?;

@@ -103,7 +103,7 @@ impl PyTracker {
             let found = other.map_or(Ok(n), slice).map_err(PyErr::from)?;
             if found != n {
                 return Err(bad_option(format!(
-                    "{name} has {found} samples, u has {n}; give as many of each"
+                    "{name} has {found} samples, u has {n}; give the same number of each"
                 )));
             }
         }
@@ -133,7 +133,7 @@ impl PyTracker {
         self.live.tracker().is_some()
     }
 
-    /// Why the last start fit failed, or why the warm-up started again.
+    /// Reason why the last start fit failed or the warm-up restarted.
     #[getter]
     fn trouble(&self) -> Option<String> {
         match self.live.stage() {
@@ -147,7 +147,7 @@ impl PyTracker {
         self.live.sample_time().s()
     }
 
-    /// How a high rate is lowered; None if it is not.
+    /// Treatment of a high rate; None if it is not.
     #[getter]
     fn decimation(&self) -> Option<String> {
         self.live.decimated().map(|done| done.to_string())

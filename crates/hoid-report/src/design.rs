@@ -47,7 +47,7 @@ pub fn design_figure(design: &ExperimentDesign) -> String {
         ..CurveGrid::default()
     };
     let title = format!(
-        "the forcing function, and the response of {} with the errors to be expected of {} of {} s",
+        "the forcing function, and the response of {} with the expected errors of {} of {} s",
         design.person,
         counted(design.runs),
         design.length_s
@@ -155,7 +155,7 @@ pub fn runs_figure(design: &ExperimentDesign) -> String {
         abscissa: "runs of a person".to_owned(),
         ..CurveGrid::default()
     };
-    curves("runs", "errors to be expected over the number of runs", &grid)
+    curves("runs", "expected errors by number of runs", &grid)
 }
 
 /// The quantities of the figure, each with the factor of its relative error.

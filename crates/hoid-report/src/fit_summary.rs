@@ -24,7 +24,7 @@ pub struct ParameterRow {
     pub name: String,
     /// Its unit, empty if it has none or none was declared.
     pub unit: String,
-    /// Value and standard error; none if it is not determined.
+    /// Value and standard error; `None` if it is not determined.
     pub estimate: Option<Estimate>,
     /// The 95 % interval; an open end is infinite.
     pub interval: Option<(f64, f64)>,

@@ -32,12 +32,13 @@ pub fn model_figure(fit: &Fit, records: &[Record], described: Option<&Descriptio
     }
 }
 
-/// The same for a page; none without a describing function, since the page contains the response anyway.
+/// The same for a page; `None` without a describing function, since the page contains the response anyway.
 pub fn model_picture(fit: &Fit, records: &[Record], described: Option<&Description>) -> Option<Picture> {
     let svg = model_figure(fit, records, Some(described?));
     Some(Picture {
         svg,
-        caption: "The describing function at the lines of the excitation, with 95 % by its scatter, and the model."
+        caption: "The describing function at the lines of the excitation, with 95 % intervals from its scatter, and \
+                  the model."
             .to_owned(),
     })
 }

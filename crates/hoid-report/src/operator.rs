@@ -168,9 +168,9 @@ fn through_describing_function(fit: &FamilyFit, described: &Description) -> Pict
     Picture {
         svg: picture(fit, described),
         caption:
-            "The describing function at the lines of the excitation, with 95 % by its scatter, and the operator: by \
-                  prediction error, the mean over its forms with their 95 % band; in the best form fitted at the lines, and by \
-                  instrumental variables (RIV-BJ) where these converge."
+            "The describing function at the lines of the excitation, with 95 % intervals from its scatter, and the \
+                  operator: by prediction error, the mean over its forms with their 95 % band; in the best form fitted \
+                  at the lines, and by instrumental variables (RIV-BJ) where these converge."
                 .to_owned(),
     }
 }

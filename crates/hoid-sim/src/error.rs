@@ -24,9 +24,9 @@ pub enum SimError {
     },
     /// An operator whose control depends on the error of the same sample.
     #[error(
-        "the operator of {scenario} answers an error within its sample: its delay is {tau_e_s} s, it has no neuromuscular part and \
-         its response is not strictly proper; expected a delay of at least half a sample ({half_a_sample_s} s): make tau_e longer \
-         or the sample time shorter, or give omega_nm and zeta_nm"
+        "the operator of {scenario} responds to an error within the same sample: its delay is {tau_e_s} s, it has no \
+         neuromuscular part and its response is not strictly proper; expected a delay of at least half a sample \
+         ({half_a_sample_s} s): make tau_e longer or the sample time shorter, or give omega_nm and zeta_nm"
     )]
     AnswersAtOnce {
         /// Name of the scenario.
@@ -36,9 +36,9 @@ pub enum SimError {
         /// Half the sample time, s.
         half_a_sample_s: f64,
     },
-    /// Ranges in which no person is found.
+    /// Ranges in which no acceptable person is found.
     #[error(
-        "no loop is taken in {draws} draws of the form {form} on the element {plant}: widen the ranges of the population, or take smaller spreads"
+        "none of {draws} draws of the form {form} on the element {plant} gives an acceptable loop: widen the ranges of the population, or reduce its spreads"
     )]
     NobodyFound {
         /// Form of the operator.
@@ -49,7 +49,7 @@ pub enum SimError {
         draws: usize,
     },
     /// Noise whose length differs from that of the run.
-    #[error("the noise has {found} samples, the run needs {expected} (run-in and measurement)")]
+    #[error("the noise has {found} samples, but the run needs {expected} (run-in and measurement)")]
     NoiseLength {
         /// Number of samples given.
         found: usize,

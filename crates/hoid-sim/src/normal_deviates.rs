@@ -2,9 +2,9 @@
 //!
 //! Normal deviates are those of `rand_distr`, by the ziggurat: the area below the density is divided into 256 layers
 //! of equal area; a random layer i and a random position in it give a deviate directly if it lies below the edge of
-//! the next layer, 99 times in a hundred (G. Marsaglia and W. W. Tsang, *J. Statistical Software* 5 (2000) 8; J. A.
-//! Doornik, *An Improved Ziggurat Method to Generate Normal Random Samples*, 2005). These are computed here, many in a
-//! row, and the others by the crate, from the same numbers: the same deviates in less time.
+//! the next layer, 99 times out of 100 (G. Marsaglia and W. W. Tsang, *J. Statistical Software* 5 (2000) 8; J. A.
+//! Doornik, *An Improved Ziggurat Method to Generate Normal Random Samples*, 2005). Such deviates are computed here,
+//! many at a time, and the others by the crate, from the same numbers: the deviates are the same, in less time.
 
 use std::{convert::Infallible, sync::OnceLock};
 

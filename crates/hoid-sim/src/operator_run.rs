@@ -1,4 +1,4 @@
-//! The operator of a scenario alone, sample by sample: for a loop that is closed elsewhere.
+//! Only the operator of a scenario, sample by sample: for a loop that is closed elsewhere.
 //!
 //! Simulates, as [`Simulator`] does in a loop, `u = y(k - tau_e/Ts) + n`, with the same random numbers: a loop that
 //! responds to u like its controlled element gives the same run to the last bit. The control of a sample does not
@@ -86,7 +86,7 @@ impl OperatorRun {
     }
 
     /// Continues from a saved state of an operator of the same scenario and run ([`OperatorRun::saved`]), with the
-    /// same digits. False, without any change, if the numbers belong to another one.
+    /// same digits. Returns false, without any change, for numbers of another operator.
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
         let Some(([k], rest)) = numbers.split_first_chunk::<1>() else {
             return false;

@@ -7,13 +7,13 @@
 //! where y is the operator's response without delay, x the output of the controlled element and z that of the unit
 //! remnant cascade. Each block is then advanced by one sample exactly, for a held input: the operator driven by e, the
 //! controlled element by u, the cascade by one normal deviate. The hold delays the response by one more sample, so
-//! that `nk = tau_e/Ts + 1`. The remnant is not delayed. A changing delay is that of the sample at which the response
-//! arrives: if it grows, parts of the response are repeated; if it shrinks, some are skipped.
+//! that `nk = tau_e/Ts + 1`. The remnant is not delayed. A changing delay has its value at the sample at which the
+//! response arrives: if it grows, parts of the response are repeated; if it shrinks, some are skipped.
 //!
 //! Operator and controlled element are in controllable canonical form (states: output and rate of
-//! `1/den`). The operator's gains are in its output matrix; those of the controlled element are placed as
-//! [`Realisation`] states. For changing parameters the matrices of each sample are those of the continuous model with
-//! the values at that sample.
+//! `1/den`). The operator's gains are in its output matrix; those of the controlled element are placed according to
+//! [`Realisation`]. For changing parameters the matrices of each sample are those of the continuous model with the
+//! values at that sample.
 
 use std::ops::Range;
 
@@ -387,8 +387,8 @@ impl<R: Number> LoopState<R> {
         }
     }
 
-    /// True if all values of a lane were finite. A value that is not finite stays in the states for ever: zero times
-    /// it is not finite either.
+    /// True if all values of a lane were finite. A value that is not finite remains in the states: its product with
+    /// zero is not finite either.
     fn is_finite(&self, lane: usize) -> bool {
         let states = self.operator.iter().chain(&self.element).chain(&self.remnant);
         states.chain(&self.memory).all(|state| state.lane(lane).is_finite())

@@ -54,7 +54,7 @@ impl BatchFits {
         Some(Self { requested, fits })
     }
 
-    /// The fit of a run for an estimator (by index); none if it needs none.
+    /// The fit of a run for an estimator (by index); `None` if it needs none.
     pub fn of_run(&self, estimator: usize, run: usize) -> Option<&Result<Fit, String>> {
         let request = (*self.requested.get(estimator)?)?;
         self.fits.get(request)?.get(run)

@@ -52,7 +52,7 @@ pub(crate) fn blocks(plan: &Plan) -> Vec<Block> {
     all
 }
 
-/// Runs a block. `done` is called with the number of completed estimates; none if `go_on` returns false.
+/// Runs a block. `done` is called with the number of completed estimates; `None` if `go_on` returns false.
 pub(crate) fn run_block(
     plan: &Plan,
     schemas: &Schemas,

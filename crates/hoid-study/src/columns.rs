@@ -147,7 +147,7 @@ pub(crate) fn comments(plan: &Plan) -> Vec<String> {
     ]
 }
 
-/// Axes without a column of their own: each gets one with its name.
+/// Axes without a dedicated column: each gets a column with its name.
 pub(crate) fn extra_axes(plan: &Plan) -> Vec<String> {
     const KNOWN: [&str; 15] = [
         "name",

@@ -29,7 +29,8 @@ pub enum StudyError {
     },
     /// An invalid `study.json`.
     #[error(
-        "{file}: {reason}; expected the file that hoid wrote: take another directory, or remove this one to start again"
+        "{file}: {reason}; expected the file that hoid wrote: choose another directory, or remove this one to start \
+         again"
     )]
     Manifest {
         /// The file.
@@ -38,29 +39,28 @@ pub enum StudyError {
         reason: String,
     },
     /// Results that would be overwritten.
-    #[error("{directory} already holds a study: continue with --resume, or take another directory")]
+    #[error("{directory} already holds a study: continue with --resume, or choose another directory")]
     Occupied {
         /// The directory.
         directory: String,
     },
     /// A plan or manifest of the user that the copy with the results would replace.
-    #[error(
-        "{file} is already present and would be replaced by what is run now; take another directory for the results"
-    )]
+    #[error("{file} is already present and would be replaced by this run; choose another directory for the results")]
     SourceThere {
         /// The file.
         file: String,
     },
     /// Parts without checksums.
     #[error(
-        "the blocks of {directory} carry no checksums, an earlier hoid wrote them: run that shard again with --resume, which computes them again"
+        "the blocks of {directory} have no checksums, because an earlier hoid wrote them: run that shard again with \
+         --resume, which computes them again"
     )]
     Unsealed {
         /// The directory.
         directory: String,
     },
     /// Results that do not belong together.
-    #[error("{directory} holds another study: {reason}; take another directory")]
+    #[error("{directory} holds another study: {reason}; choose another directory")]
     OtherStudy {
         /// The directory.
         directory: String,
@@ -88,7 +88,10 @@ pub enum StudyError {
         reason: String,
     },
     /// A study that is already complete.
-    #[error("{directory} holds a whole study, there is nothing to merge: expected directories written with --shard")]
+    #[error(
+        "{directory} holds a complete study, so that there is nothing to merge: expected directories written with \
+             --shard"
+    )]
     Whole {
         /// The directory.
         directory: String,
@@ -98,9 +101,9 @@ pub enum StudyError {
     Overlap {
         /// The block.
         block: u64,
-        /// Its first place.
+        /// Location of its first copy.
         first: String,
-        /// Its second place.
+        /// Location of its second copy.
         second: String,
     },
     /// Missing parts.
@@ -145,7 +148,8 @@ pub enum StudyError {
     },
     /// A directory without runs.
     #[error(
-        "no file in {directory} is called {pattern}; it has {found}: state by --pattern what their names mean, as {{subject}}_{{run}}.csv"
+        "no file in {directory} matches {pattern}; it has {found}: state with --pattern what their names mean, such as \
+         {{subject}}_{{run}}.csv"
     )]
     NoRuns {
         /// The directory.
@@ -156,7 +160,7 @@ pub enum StudyError {
         found: String,
     },
     /// A virtual experiment that would overwrite another.
-    #[error("{directory} already holds an experiment; take another directory")]
+    #[error("{directory} already holds an experiment; choose another directory")]
     ExperimentThere {
         /// The directory.
         directory: String,

@@ -29,7 +29,7 @@ pub(crate) struct BlockTables {
 pub(crate) struct EstimateRows<'a> {
     plan: &'a Plan,
     cell: &'a Cell,
-    /// Axes with a column of their own.
+    /// Axes with a dedicated column.
     extra: Vec<String>,
     true_response: Option<TrueResponse>,
     /// VAF of the estimators in this replication, by name and nk.

@@ -1,9 +1,9 @@
 //! Monte Carlo studies of estimators, and groups of recorded runs.
 //!
-//! How large are the bias and spread of an estimate, and do its standard errors cover the error? A single record cannot
-//! answer this. A study simulates many: a [`Plan`] contains scenarios (operator, task, remnant) and estimators, each
-//! list in it is an axis of a grid, and [`run`] estimates every cell of the grid in many replications, each with its
-//! own random stream. [`Results`] reads the tables, and a [`Query`] selects rows:
+//! The bias and spread of an estimate, and the coverage of its standard errors, cannot be determined from a single
+//! record. A study simulates many: a [`Plan`] contains scenarios (operator, task, remnant) and estimators, each list in
+//! it is an axis of a grid, and [`run`] estimates every cell of the grid in many replications, each with its own random
+//! stream. [`Results`] reads the tables, and a [`Query`] selects rows:
 //!
 //! ```
 //! use hoid_study::{Plan, Query, Results, RunOptions, run};
@@ -41,7 +41,7 @@
 //! # Ok::<(), hoid_study::StudyError>(())
 //! ```
 //!
-//! Replications are run and stored in blocks. A study that was stopped continues where it was (`resume`), shards of a
+//! Replications are run and stored in blocks. A study that was stopped continues from there (`resume`), shards of a
 //! study can run on several machines and are joined by [`merge`], and the bytes of the tables depend on neither.
 //!
 //! | module | contents |

@@ -9,7 +9,7 @@ use crate::plan::EstimatorCell;
 /// Preparation of a record before an estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Preparation {
-    /// Span that is used, s; none for the whole record.
+    /// Span that is used, s; `None` for the whole record.
     pub span_s: Option<(f64, f64)>,
     /// Every `decimate`-th sample.
     pub decimate: usize,

@@ -1,9 +1,9 @@
 //! Execution of a study: blocks over threads, parts on disk, resume.
 //!
-//! A finished block is written as one file per table, traces first, each next to its place and then renamed, and
-//! finally its seal (`seal`). A killed study therefore has complete blocks only, and continues with the blocks that
-//! have no seal or do not agree with it. When all blocks are complete, the parts are joined in the order of the plan;
-//! the result does not depend on the thread or machine that computed a part.
+//! A finished block is written as one file per table, traces first, each under a temporary name in the same directory
+//! and then renamed, and finally its seal (`seal`). A killed study therefore has complete blocks only, and continues
+//! with the blocks that have no seal or do not agree with it. When all blocks are complete, the parts are joined in the
+//! order of the plan; the result does not depend on the thread or machine that computed a part.
 
 use std::{
     path::{Path, PathBuf},
@@ -28,9 +28,9 @@ use crate::{
 /// Options of running a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RunOptions {
-    /// Shard of the study; none for all.
+    /// Shard of the study; `None` for all.
     pub shard: Option<Shard>,
-    /// Number of threads; none for one per core.
+    /// Number of threads; `None` for one per core.
     pub jobs: Option<usize>,
     /// Continue a stopped study.
     pub resume: bool,

@@ -49,11 +49,12 @@ impl RunRecord {
     /// Note on a directory whose blocks have no seals.
     pub fn note_on_seals(&self) -> Option<String> {
         let unsealed = !self.sealed && !self.complete;
-        unsealed
-            .then(|| "its blocks carry no checksums, an earlier hoid wrote them: all were computed again".to_owned())
+        unsealed.then(|| {
+            "its blocks have no checksums, because an earlier hoid wrote them: all were computed again".to_owned()
+        })
     }
 
-    /// The record of a directory; none if it holds no study.
+    /// The record of a directory; `None` if it holds no study.
     pub fn read(directory: &Path) -> Result<Option<Self>, StudyError> {
         let path = directory.join(NAME);
         if !path.exists() {
@@ -74,7 +75,7 @@ impl RunRecord {
         Ok(hoid_io::write_atomically(&path, |file| writeln!(file, "{text}"))?)
     }
 
-    /// Difference that prevents merging two parts into one study; none if they match.
+    /// Difference that prevents merging two parts into one study; `None` if they match.
     pub fn differs(&self, other: &Self) -> Option<String> {
         // Settings that a user may have changed first: each of these also changes the hash of the
         // plan, which is less informative.

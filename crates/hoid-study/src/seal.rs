@@ -72,12 +72,12 @@ pub(crate) fn on_disk(directory: &Path, plan_sha256: &str, block: u64) -> OnDisk
         return OnDisk::Damaged(format!("it is block {}", seal.block));
     }
     if seal.plan_sha256 != plan_sha256 {
-        return OnDisk::Damaged("it is of another plan".to_owned());
+        return OnDisk::Damaged("it is from another plan".to_owned());
     }
     for (table, sum) in &seal.tables {
         match hoid_io::read_bytes(&part(directory, block, table)) {
             Ok(bytes) if sha256(&bytes) == *sum => {}
-            Ok(_) => return OnDisk::Damaged(format!("its table {table} is not what was written")),
+            Ok(_) => return OnDisk::Damaged(format!("its table {table} is not as it was written")),
             Err(_) => return OnDisk::Damaged(format!("its table {table} cannot be read")),
         }
     }
@@ -133,7 +133,10 @@ mod tests {
         write_block(d, "plan", 1, &[("fits", &table(3.0))]).unwrap();
         assert_eq!(on_disk(d, "plan", 0), OnDisk::Whole);
         assert_eq!(on_disk(d, "plan", 1), OnDisk::Whole);
-        assert_eq!(on_disk(d, "other", 1), OnDisk::Damaged("it is of another plan".into()));
+        assert_eq!(
+            on_disk(d, "other", 1),
+            OnDisk::Damaged("it is from another plan".into())
+        );
         let path = part(d, 0, "fits");
         let good = fs::read(&path).unwrap();
         for at in 0..good.len() {

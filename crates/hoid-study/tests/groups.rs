@@ -271,7 +271,7 @@ fn a_bad_file_is_a_row_and_a_bad_manifest_an_error() {
         Err(error @ StudyError::NoRuns { .. }) => error.to_string(),
         other => panic!("{other:?}"),
     };
-    assert!(said(&pattern).contains("is called {run}.csv; it has no files"));
+    assert!(said(&pattern).contains("matches {run}.csv; it has no files"));
     for n in 1..=4 {
         std::fs::write(empty.path().join(format!("anna-{n}.csv")), "").unwrap();
     }

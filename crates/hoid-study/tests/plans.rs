@@ -164,7 +164,7 @@ fn options_of_an_operator_are_checked() {
         (
             "method = \"operator\"\norders.nf = 2",
             18,
-            "nc and nd of the noise alone",
+            "only the orders nc and nd of the noise",
         ),
         ("method = \"operator\"\norders.nd = 25", 18, "within 0..24"),
         ("method = \"operator\"\norders.nd = \"4..1\"", 18, "as \"0..8\""),
@@ -189,12 +189,12 @@ fn options_of_an_operator_are_checked() {
         (
             "method = \"sriv\"\nform = \"lead\"",
             18,
-            "form has no effect here: it belongs to operator",
+            "form has no effect here: it applies to operator",
         ),
         (
             "method = \"fit\"\nstructure = \"bj\"\norders.nd = \"1..2\"",
             19,
-            "belongs to operator",
+            "applies to operator",
         ),
     ] {
         let message = of(text).expect_err(text).to_string();
@@ -217,7 +217,7 @@ fn a_plan_without_scenarios_or_estimators_says_so() {
         .replace("method = \"fit\"", "method = \"fit\"\nscenarios = [\"C1\"]");
     let unused = unused.replace("method = \"rls\"", "method = \"rls\"\nscenarios = [\"C1\"]");
     let message = Plan::parse(&unused, "bad.toml").unwrap_err().to_string();
-    assert!(message.contains("no estimator takes the scenario idle"), "{message}");
+    assert!(message.contains("no estimator uses the scenario idle"), "{message}");
 }
 
 #[test]

@@ -486,7 +486,7 @@ fn blocks_of_an_earlier_program_are_computed_again_or_refused() {
         ..RunOptions::default()
     };
     let outcome = run(&plan(), &old, &resumed, &|_| (), &|| true).unwrap();
-    assert!(outcome.notes[0].contains("carry no checksums"), "{:?}", outcome.notes);
+    assert!(outcome.notes[0].contains("have no checksums"), "{:?}", outcome.notes);
     assert!(content(&whole) == content(&old));
 }
 
@@ -515,7 +515,7 @@ fn two_runs_do_not_share_a_directory_and_no_plan_is_written_over() {
             .finished
     );
     let message = second.into_inner().unwrap().unwrap().unwrap_err().to_string();
-    assert!(message.contains("another process works on"), "{message}");
+    assert!(message.contains("another process is working on"), "{message}");
 
     let own = out.path().join("own");
     fs::create_dir(&own).unwrap();

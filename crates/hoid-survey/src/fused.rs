@@ -36,11 +36,10 @@ const B: usize = 2;
 settings! {
     /// Options of least squares with the poles of the prediction-error method.
     pub struct FusedOptions {
-        /// Covariance P at the start: X times the unit matrix, in units of the innovation variance
-        /// (the thesis: 0.1)
-        #[setting(bounds(Bounds::PositiveFinite), default("that of the start fit; 1e6 where there is none"))]
+        /// Initial covariance P: X times the unit matrix, in units of the innovation variance (thesis: 0.1)
+        #[setting(bounds(Bounds::PositiveFinite), default("that of the start fit, else 1e6"))]
         pub covariance: Option<f64> = None,
-        /// Standard deviations beyond which an innovation moves the estimate no further
+        /// Limit on innovations, in standard deviations
         #[setting(bounds(Bounds::Positive), default("5"))]
         pub limit: Option<f64> = None,
     }
@@ -110,7 +109,7 @@ impl RecursiveMethod for FusedOptions {
     }
 }
 
-/// RLS next to RPEM.
+/// RLS in parallel with RPEM.
 pub(crate) struct FusedRecursion {
     rpem: Box<dyn Recursion>,
     rls: Rls<AnyShape, B, Gain<B>>,

@@ -9,8 +9,8 @@
 //!
 //! and `K_e = w_0/s_0`, `K_e_dot = w_1/s_1`. A signal and its rate are orthogonal over time and the
 //! inputs have unit power, so that each weight forgets with the time constant T. Neuromuscular part,
-//! delay and first weights are those of the Box-Jenkins fit of the start span, and what does not
-//! belong to the equalization stays. The rule has no covariance.
+//! delay and first weights are those of the Box-Jenkins fit of the start span, and parameters outside the equalization
+//! stay constant. The rule has no covariance.
 
 use hoid_core::{
     delay::DelayLine,
@@ -34,7 +34,7 @@ const NAME: &str = "linear-network";
 settings! {
     /// Options of the linear network.
     pub struct LinearNetworkOptions {
-        /// Time constant with which a weight is learned
+        /// Time constant for learning a weight
         #[setting(unit("s"), bounds(Bounds::PositiveFinite))]
         pub learning: f64 = 4.0,
     }

@@ -145,7 +145,7 @@ pub fn set(method: &mut Method, name: &str, text: &str) -> Result<(), IdentError
         of => Err(bad(
             name,
             format!("with the method {}", method.name()),
-            &format!("the method {}, to which it belongs", of.join(" or ")),
+            &format!("the method {}, whose option it is", of.join(" or ")),
         )),
     }
 }

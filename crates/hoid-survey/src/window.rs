@@ -1,9 +1,8 @@
 //! The batch fit over a sliding window.
 //!
 //! The last W samples are kept, and every k samples they are fitted by the batch estimator, from
-//! the last theta; between the fits theta stays. So the estimate has the rectangular memory of W
-//! samples, initial states, bounds and all else that the estimator has, and the covariance is that
-//! of the fit.
+//! the last theta; between the fits theta stays. The estimate therefore has a rectangular memory of W samples, the
+//! initial states, bounds and other properties of the estimator, and the covariance of the fit.
 //!
 //! **Wrong minima.** A search from the last theta stays in the valley it is in. The estimator's own
 //! starts are searched as well where there is no last theta or that search does not converge, where
@@ -42,9 +41,9 @@ const RESIDUALS_EACH: usize = 5;
 settings! {
     /// Options of the sliding window.
     pub struct WindowOptions {
-        /// Length of the window: samples or seconds
+        /// Window length, in samples or seconds
         pub window: Memory = Memory::Seconds(20.0),
-        /// Samples between two fits
+        /// Samples between fits
         #[setting(bounds(Bounds::AtLeast(1.0)))]
         pub refit: usize = 25,
     }
@@ -54,7 +53,7 @@ impl RecursiveMethod for WindowOptions {
     fn about(&self) -> About {
         About {
             name: "window",
-            help: "a batch fit of the last seconds, again and again",
+            help: "a batch fit of the last seconds, repeated",
             source: "the thesis, section VII",
             structures: &Structure::ALL,
             defaults: &[],
@@ -213,7 +212,7 @@ impl WindowRecursion {
             && (theta.len() != p || theta.iter().any(|v| !v.is_finite()))
         {
             return Err(IdentError::BadStart {
-                reason: format!("it is {theta:?}, the orders {orders} need {p} finite coefficients"),
+                reason: format!("it is {theta:?}, but the orders {orders} need {p} finite coefficients"),
             });
         }
         let covariance = start.and_then(|(_, covariance)| covariance);
@@ -221,7 +220,7 @@ impl WindowRecursion {
             && (c.len() != p * p || c.iter().any(|v| !v.is_finite()))
         {
             return Err(IdentError::BadStart {
-                reason: format!("its covariance has to have {} finite elements", p * p),
+                reason: format!("its covariance must have {} finite elements", p * p),
             });
         }
         Ok(Self {
@@ -281,8 +280,8 @@ impl WindowRecursion {
                 self.theta.copy_from_slice(fit.model().theta());
                 self.covariance = fit.covariance().map(<[f64]>::to_vec);
                 self.variance = fit.innovation_variance();
-                // Innovations of the samples to come shall not hold what the theta before has left
-                // in the filters.
+                // Innovations of later samples must not contain the effect of the previous theta that remains in the
+                // filters.
                 self.predictor.reset();
                 for (e, u) in self.e.iter().zip(&self.u) {
                     self.predictor.step(&self.theta, *e, *u);
@@ -290,7 +289,7 @@ impl WindowRecursion {
             }
             Err(failure) => {
                 self.failures += 1;
-                // The loss to compare with is that of another time.
+                // The loss to be compared is that of an earlier time.
                 self.since_comparison = COMPARE;
                 self.last_failure = Some(failure);
             }

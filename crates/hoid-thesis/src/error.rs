@@ -13,7 +13,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum ThesisError {
     /// A name that is neither a table nor a figure of the reproduction.
-    #[error("{name}: no table, figure or study is called so; expected {CLAIMS}, or a name, study or appendix of: {known}", CLAIMS = crate::CLAIMS)]
+    #[error("{name}: there is no table, figure or study of this name; expected {CLAIMS}, or a name, study or appendix of: {known}", CLAIMS = crate::CLAIMS)]
     UnknownItem {
         /// The name.
         name: String,
@@ -21,7 +21,7 @@ pub enum ThesisError {
         known: String,
     },
     /// Recordings for something that is made without them.
-    #[error("recordings are for the experiment alone: make only \"experiment\" with them")]
+    #[error("recordings apply to the experiment only: make only \"experiment\" with them")]
     NotTheExperiment,
     /// Recordings to which the procedure of the text cannot be applied.
     #[error("{place}: {reason}")]

@@ -1,7 +1,7 @@
-//! A delay that is tracked in whole samples, next to any recursion whose delay is given: one recursion for each delay
-//! of a range, and the one that predicts best is reported (D. T. Magill, *Optimal adaptive estimation of sampled
-//! stochastic processes*, 1965; with evidence that is forgotten as in A. H. Jazwinski, *Stochastic Processes and
-//! Filtering Theory*, 1970, section 8.8).
+//! A delay that is tracked in whole samples, for any recursion with a given delay: one recursion for each delay of a
+//! range, and the one that predicts best is reported (D. T. Magill, *Optimal adaptive estimation of sampled stochastic
+//! processes*, 1965; with evidence that is forgotten as in A. H. Jazwinski, *Stochastic Processes and Filtering
+//! Theory*, 1970, section 8.8).
 //!
 //! With the a-priori innovation eps_k of the recursion with the delay k, and sigma^2 of the reported one, the
 //! logarithm of the evidence is
@@ -9,10 +9,11 @@
 //! `L_k(t) = gamma L_k(t-1) - eps_k(t)^2/(2 sigma^2)`,  `gamma = 1 - Ts/T`,
 //!
 //! with T = 10 s: evidence from before a change fades with time. Another delay is reported once it leads by 2. Its
-//! recursion has run all the time, so that the estimate does not restart. The weights `p_k` are proportional to
+//! recursion has run all the time, so that the estimate need not restart. The weights `p_k` are proportional to
 //! `exp(L_k/3)`, because neighbouring innovations of a wrong model carry the same information more than once (without
-//! the factor 3, bands of 95 % hold 82 % for a constant delay; with it 95 %). tau_e is reported as their mean; its
-//! variance is that of the weights plus that of a delay uniformly distributed between two samples, `Ts^2/12`.
+//! the factor 3, bands of 95 % hold 82 % for a constant delay; with it 95 %). tau_e is reported as the weighted mean of
+//! the delays; its variance is that of the weights plus that of a delay uniformly distributed between two samples,
+//! `Ts^2/12`.
 //!
 //! Before there is evidence the delay is distributed about that of the start, `L_k = -(tau_k - tau_start)^2/(2 s^2)`
 //! with s = 0.03 s; this fades like all evidence. An innovation counts up to [`LARGEST`] standard deviations, so that
@@ -123,7 +124,7 @@ impl DelayBank {
         let mut most = f64::NEG_INFINITY;
         for (evidence, innovation) in self.evidence.iter_mut().zip(&self.innovations) {
             let square = (innovation * innovation / variance).min(LARGEST * LARGEST);
-            // A recursion that has lost its numbers predicts nothing.
+            // An innovation that is NaN counts as the largest.
             let square = if square.is_nan() { LARGEST * LARGEST } else { square };
             *evidence = self.keeps * *evidence - 0.5 * square;
             most = most.max(*evidence);
@@ -198,7 +199,7 @@ impl Recursion for DelayBank {
         let mean = moment(&|k| k);
         let variance = moment(&|k| (k - mean) * (k - mean)) + 1.0 / 12.0;
         let ts = self.sample_time_s;
-        // A ZOH delays by a sample more.
+        // A zero-order hold adds a delay of one sample.
         let tau_s = (self.first_nk as f64 - 1.0 + mean) * ts;
         Some(Delay {
             nk: self.first_nk + self.best,

@@ -1,6 +1,6 @@
 //! The parameters of an operator that the data determine.
 //!
-//! A parameter is determined if it is more than two standard errors from zero and, if the method has a prior of it, if
+//! A parameter is determined if it is more than two standard errors from zero and, if the method has a prior for it,
 //! the data have at least halved the prior variance: otherwise the value is that of the prior.
 
 use hoid_model::uncertainty::OperatorEstimate;

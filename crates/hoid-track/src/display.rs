@@ -66,7 +66,7 @@ impl TrackOptions {
         match &self.start {
             StartAt::Span(Some((from, to))) => format!("batch fit of {from:.2} to {to:.2} s, {covariance}"),
             StartAt::Span(None) => format!("batch fit of the first third, {covariance}"),
-            StartAt::Theta(_) => "from coefficients that were given".to_owned(),
+            StartAt::Theta(_) => "from the given coefficients".to_owned(),
             StartAt::Nothing => "from nothing".to_owned(),
         }
     }

@@ -71,29 +71,29 @@ impl Value for ForgettingRule {
 impl ForgettingRule {
     fn rule() -> Setting {
         Setting::of("forgetting", &Self::Exponential)
-            .help(&["How it forgets; window, variable and directional take the shortest memory"])
+            .help(&["Type of forgetting; window, variable and directional use the shortest memory"])
     }
 
     fn drift() -> Setting {
         Setting::of("drift", &BTreeMap::<String, f64>::new())
             .bounds(Bounds::NonNegative)
             .help(&[
-                "For forgetting by a random walk: by how much a parameter drifts in one second (standard deviation),",
-                "as K_e=.01,K_e_dot=.01",
+                "For forgetting by a random walk: drift of a parameter in one second (standard deviation),",
+                "such as K_e=.01,K_e_dot=.01",
             ])
     }
 
     fn rate() -> Setting {
         Setting::of("rate", &DEFAULT_RATE)
             .bounds(Bounds::Between(0.0, 2.0))
-            .help(&["For forgetting by the gradient: step size"])
+            .help(&["For gradient: step size"])
     }
 
     fn belongs(name: &str, rule: &str) -> IdentError {
         IdentError::BadOption {
             option: name.to_owned(),
             found: "with another way of forgetting".to_owned(),
-            expected: format!("forgetting = {rule}, to which it belongs"),
+            expected: format!("forgetting = {rule}, whose option it is"),
         }
     }
 
@@ -106,7 +106,7 @@ impl ForgettingRule {
             Self::RandomWalk(drift) if drift.is_empty() => Err(IdentError::BadOption {
                 option: "forgetting".to_owned(),
                 found: "random-walk, which needs drift".to_owned(),
-                expected: "the standard deviation of the drift in one second, as drift K_e=.01".to_owned(),
+                expected: "the standard deviation of the drift in one second, such as drift K_e=.01".to_owned(),
             }),
             Self::Gradient(rate) if !Self::rate().bounds.hold(*rate) => Err(IdentError::BadOption {
                 option: "the rate of the gradient".to_owned(),

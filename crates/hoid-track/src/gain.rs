@@ -48,8 +48,8 @@ impl<const N: usize> State for Gain<N> {
 
 impl<const N: usize> Gain<N> {
     /// Builds the adaptation with capacity for N parameters. With `growing`, a start without a fit has a growing
-    /// memory: gradients of early estimates without support in the data must be forgotten. Least squares has no such
-    /// gradients.
+    /// memory: gradients of early estimates, which the data do not yet support, must be forgotten. Least squares has no
+    /// such gradients.
     ///
     /// # Errors
     /// [`IdentError`] for options that contradict each other, or a start covariance that is not positive.
@@ -138,7 +138,7 @@ impl<const N: usize> Gain<N> {
     }
 }
 
-/// A gain with a covariance that can be changed from outside.
+/// A gain with a covariance that the caller can change.
 pub trait Scaled {
     /// Multiplies P by a factor; false if there is no P.
     fn scale(&mut self, factor: f64) -> bool;

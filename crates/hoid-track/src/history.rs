@@ -2,16 +2,16 @@
 
 use hoid_core::state::{State, visit_all};
 
-/// Largest size of a value in a recursion. Its fourth power is still finite, so that covariances of filtered signals
-/// are.
+/// Largest size of a value in a recursion. Its fourth power is still finite, and therefore also the covariances of
+/// filtered signals.
 const LARGEST: f64 = 1e60;
 
-/// Limits a value to 1e60; NaN, as from products of large numbers, becomes zero.
+/// Limits a value to 1e60; NaN, which products of large numbers may give, becomes zero.
 pub fn bounded(x: f64) -> f64 {
     if x.is_nan() { 0.0 } else { x.clamp(-LARGEST, LARGEST) }
 }
 
-/// The last n values in one slice. Each is written twice, n places apart, so that nothing is moved.
+/// The last n values in one slice. Each is written twice, n elements apart, so that nothing is moved.
 #[derive(Debug, Clone)]
 pub struct History {
     values: Vec<f64>,

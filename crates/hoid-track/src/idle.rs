@@ -1,10 +1,10 @@
-//! The idle head of a record: what was recorded before the run started.
+//! The idle head of a record: the samples recorded before the run started.
 //!
-//! A person who waits for the run to start is not tracking. A fit of such samples gives a delay and poles without
-//! information, with small standard errors. The head is the longest run of first samples in which both e and u stay
-//! within [`SHARE`] of their later size about their first second, or within a step of their resolution; the size is
-//! the 90 % quantile of the distance from the median in the second half of the record. A head shorter than [`LEAST_S`]
-//! does not count: signals start near zero.
+//! A person who waits for the run to start is not tracking. A fit of such samples gives meaningless delays and poles
+//! with small standard errors. The head is the longest run of first samples in which both e and u stay within [`SHARE`]
+//! of their later size about their first second, or within a step of their resolution; the size is the 90 % quantile of
+//! the distance from the median in the second half of the record. A head shorter than [`LEAST_S`] does not count:
+//! signals start near zero.
 
 use hoid_model::Record;
 use hoid_numerics::statistics::{upper_median, upper_quantile};

@@ -151,7 +151,7 @@ impl<'a> Plan<'a> {
             self.bars::<N, K>()?,
         )
         .ok_or_else(|| IdentError::BadStart {
-            reason: "it is not stable; give another start, or the structure fewer poles".to_owned(),
+            reason: "it is not stable; give another start, or a structure with fewer poles".to_owned(),
         })?;
         Ok(Box::new(Polynomials {
             rpem,

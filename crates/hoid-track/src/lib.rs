@@ -1,12 +1,11 @@
 //! Recursive estimates: sample by sample, over a record or live.
 //!
-//! A person changes while they act. A recursion moves the estimate at every sample against the
-//! prediction error,
+//! A person changes while acting. A recursion corrects the estimate at every sample by the prediction error,
 //!
 //! `theta(t) = theta(t-1) + P(t) psi(t) eps(t)`,
 //!
 //! and forgets the past, so that it can follow (L. Ljung, *System Identification*, 1999, chapter
-//! 11). The methods differ in psi, in the parameters theta, and in their prior of the change.
+//! 11). The methods differ in psi, in the parameters theta, and in their prior for the change.
 //!
 //! ```
 //! use hoid_model::scenario::{Condition, Scenario};
@@ -50,14 +49,14 @@
 //! | `change` | [`Change`]: when a person changed |
 //!
 //! **A recursion starts from the available knowledge.** By default this is the batch fit of the first third of a
-//! record, with the covariance of that fit; until the end of that span the filters follow and the estimate stays
-//! constant, so that no sample counts twice and the error bars are valid. With the start of the thesis, `P_0 = 0.1 I`
-//! (eq. 38, 5.41, 5.55), the estimate moves from the first sample on.
+//! record, with the covariance of that fit; until the end of that span only the filters are updated and the estimate
+//! stays constant, so that no sample counts twice and the error bars are valid. With the start of the thesis,
+//! `P_0 = 0.1 I` (eq. 38, 5.41, 5.55), the estimate is updated from the first sample on.
 //!
 //! **Faulty samples** never reach the filters. A value is a fault if it is not a finite number or is larger than
 //! [`TrackOptions::largest`]. A faulty error e is replaced by the last good one and a faulty output u by the one-step
-//! prediction, and the estimate stays constant at that sample. Each is counted. With a guard (`guard`; by default for
-//! `adaptive`) the same holds for outliers and for spans that no tracking produces.
+//! prediction, and the estimate stays constant at that sample. These samples are counted. With a guard (`guard`; by
+//! default for `adaptive`) the same holds for outliers and for spans that no tracking produces.
 
 pub mod building;
 mod change;

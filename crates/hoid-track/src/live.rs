@@ -35,7 +35,8 @@ impl Live {
     /// Builds the requested recursion for samples of a rate.
     ///
     /// # Errors
-    /// [`IdentError`] for options that contradict each other, a warm-up that is no time, and a method that smooths.
+    /// [`IdentError`] for options that contradict each other, a warm-up that is not a valid time, and a method that
+    /// smooths.
     pub fn new(
         asked: &TrackRequest,
         sample_time: SampleTime,
@@ -216,7 +217,8 @@ impl Live {
         let mut of_stage = numbers;
         if let Some(decimator) = &mut self.decimator {
             let wrong = || IdentError::BadStart {
-                reason: "the saved tracker is of another rate, or was changed or cut since; save it again".to_owned(),
+                reason: "the saved tracker has another rate, or was changed or truncated since; save it \
+                         again".to_owned(),
             };
             let (length, all) = opened(numbers).and_then(<[f64]>::split_last).ok_or_else(wrong)?;
             let (stage, of_decimator) = all.split_at_checked(*length as usize).ok_or_else(wrong)?;

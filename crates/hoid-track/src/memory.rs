@@ -15,7 +15,7 @@ pub enum Memory {
     Samples(f64),
     /// T seconds: `lambda = 1 - Ts/T`. (`exp(-Ts/T)` agrees to first order.)
     Seconds(f64),
-    /// For ever: `lambda = 1`.
+    /// Infinite: `lambda = 1`.
     Infinite,
 }
 
@@ -34,7 +34,7 @@ impl Memory {
     /// Whole samples of a window as long as the memory.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a memory without end, or not longer than one sample.
+    /// [`IdentError::BadOption`] for an infinite memory, or one not longer than one sample.
     pub fn samples(self, sample_time: SampleTime) -> Result<usize, IdentError> {
         Ok(self.length(sample_time)?.round() as usize)
     }
@@ -52,7 +52,7 @@ impl Memory {
             Err(IdentError::BadOption {
                 option: "the memory".to_owned(),
                 found: format!("{samples} samples"),
-                expected: "more than one sample and at most 1e9, or inf where nothing is to be forgotten".to_owned(),
+                expected: "more than one sample and at most 1e9, or inf to forget nothing".to_owned(),
             })
         }
     }
@@ -95,7 +95,7 @@ impl FromStr for Memory {
     }
 }
 
-/// The memory of all parameters: as such, or by its factor of forgetting.
+/// The memory of all parameters: given directly, or by its forgetting factor.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct CommonMemory(pub Option<Memory>);
 
@@ -110,7 +110,7 @@ impl CommonMemory {
     fn factor() -> Setting {
         Setting::of("lambda", &None::<f64>)
             .bounds(Bounds::UpTo(0.0, 1.0))
-            .help(&["Factor of forgetting instead of a memory: lambda = 1 - 1/memory in samples"])
+            .help(&["Forgetting factor instead of a memory: lambda = 1 - 1/memory in samples"])
     }
 }
 
@@ -147,7 +147,7 @@ impl Settings for CommonMemory {
 settings! {
     /// Memories of a recursion that forgets.
     pub struct MemoryOptions {
-        /// Memory of single parameters, or of all of one letter, as b0=256,f=inf,K_e=5s
+        /// Memory of single parameters, or of all with one letter, such as b0=256,f=inf,K_e=5s
         pub memory_of: BTreeMap<String, Memory> = BTreeMap::new(),
     }
     groups {

@@ -1,7 +1,7 @@
 //! Self-description of a recursive method.
 //!
 //! A method is a file or folder: its options (a struct made by `settings!`), [`RecursiveMethod`] for them, and the
-//! [`Recursion`] that it builds. That makes it a [`Method`](crate::Method), in this or any other crate; a line in the
+//! [`Recursion`] that it builds. This makes it a [`Method`](crate::Method), in this or any other crate; a line in the
 //! list of `hoid-survey` adds it to the command line, plans, Python and the book.
 
 use std::{any::Any, collections::BTreeMap, fmt};
@@ -45,7 +45,7 @@ pub trait Boxed: fmt::Debug + Send + Sync {
     fn boxed(&self) -> Box<dyn RecursiveMethod>;
     /// True if the other is the same method with the same options.
     fn is_same(&self, other: &dyn RecursiveMethod) -> bool;
-    /// Returns it as a value of any type.
+    /// Returns the method as a value of any type.
     fn as_any(&self) -> &dyn Any;
 }
 
@@ -101,7 +101,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         Ok(())
     }
 
-    /// Order of the noise model if none is named; none for that of the structure.
+    /// Order of the noise model if none is named; `None` for that of the structure.
     fn default_nd(&self) -> Option<usize> {
         None
     }
@@ -166,7 +166,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
             .map_or(ForgettingRule::Exponential, |gain| gain.forgetting.clone())
     }
 
-    /// P at the start as a multiple of the unit matrix; none for that of the start fit.
+    /// P at the start as a multiple of the unit matrix; `None` for that of the start fit.
     fn covariance(&self) -> Option<f64> {
         self.gain().and_then(|gain| gain.covariance)
     }
@@ -176,12 +176,12 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         f64::INFINITY
     }
 
-    /// Limit of P where nothing excites a parameter; none if that follows from the start.
+    /// Limit of P where nothing excites a parameter; `None` if that follows from the start.
     fn windup_guard(&self, _structure: Structure) -> Option<WindupGuard> {
         self.gain().and_then(|gain| gain.windup_guard)
     }
 
-    /// Whether a guard was requested or refused; none if nothing was specified and the default is to have none.
+    /// Whether a guard was requested or refused; `None` if nothing was specified and the default is to have none.
     fn guard(&self) -> Option<GuardChoice> {
         None
     }

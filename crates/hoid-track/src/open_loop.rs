@@ -40,7 +40,7 @@ impl NoCrossover {
     pub fn words(self) -> &'static str {
         match self {
             Self::NoEstimate => "there is no estimate yet",
-            Self::NeverFalls => "the gain of the open loop does not fall through one between .05 and 60 rad/s",
+            Self::NeverFalls => "the gain of the open loop does not cross one from above between .05 and 60 rad/s",
             Self::NotDetermined => "the standard error of the crossover is more than half of it",
         }
     }

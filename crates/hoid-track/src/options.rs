@@ -24,8 +24,8 @@ pub struct TrackOptions {
     pub orders: Orders,
     /// Start. Default: a batch fit of the first third.
     pub start: StartAt,
-    /// Time from which the estimate moves, s; before it only the filters follow. Default: the end of the start span if
-    /// P is that of its fit, else the start of the record.
+    /// Time from which the estimate is updated, s; before it, only the filters are updated. Default: the end of the
+    /// start span if P is that of its fit, else the start of the record.
     pub update_from_s: Option<f64>,
     /// Limits of the search of start fits and windows.
     pub search: SearchOptions,
@@ -56,7 +56,7 @@ impl TrackOptions {
         }
     }
 
-    /// Returns the defaults of a method that starts itself without prior knowledge of the person.
+    /// Returns the defaults of a method that starts by itself, without prior knowledge of the person.
     pub fn without_prior(method: Method, sample_time: SampleTime) -> Self {
         Self::default_for(method, sample_time.nk(DEFAULT_DELAY_S))
     }
@@ -67,8 +67,7 @@ impl TrackOptions {
         Self::new(method, structure, orders)
     }
 
-    /// Sets options of the method from their texts, as
-    /// `[("memory", "256"), ("covariance", "0.1")]`.
+    /// Sets options of the method from text, such as `[("memory", "256"), ("covariance", "0.1")]`.
     ///
     /// # Errors
     /// As [`Method::set`].
@@ -87,7 +86,7 @@ impl TrackOptions {
         }
     }
 
-    /// Returns the span of the start fit in a record, s; none without a start fit.
+    /// Returns the span of the start fit in a record, s; `None` without a start fit.
     pub fn start_span(&self, record: &Record) -> Option<(f64, f64)> {
         let StartAt::Span(span) = self.start else { return None };
         Some(span.unwrap_or_else(|| default_start_span(record)))
@@ -223,7 +222,7 @@ impl TrackOptions {
             return Err(bad(
                 "a frequency of the response",
                 format!("{wrong} rad/s"),
-                "positive frequencies in rad/s, as 0.5,1,2.5",
+                "positive frequencies in rad/s, such as 0.5,1,2.5",
             ));
         }
         Ok(())

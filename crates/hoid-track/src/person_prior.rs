@@ -22,7 +22,7 @@ pub enum PersonPrior {
 }
 
 impl PersonPrior {
-    /// Returns the fit, if it is one.
+    /// Returns the fit, if the prior is a fit.
     pub fn fit(&self) -> Option<&FittedOperator> {
         match self {
             Self::Fit(fit) => Some(fit),
@@ -46,7 +46,7 @@ impl PersonPrior {
     pub(crate) fn as_text(&self) -> String {
         match self {
             Self::Population => "the defaults for people".to_owned(),
-            Self::Nothing => "next to nothing: the defaults for people, with wide errors".to_owned(),
+            Self::Nothing => "almost no knowledge: the defaults for people, with wide errors".to_owned(),
             Self::Named(prior) => format!("the defaults for people, with {prior}"),
             Self::Fit(fit) => format!(
                 "the fit in {} with its covariance, form {}",
@@ -77,8 +77,9 @@ impl Value for PersonPrior {
 
     /// A file of a fit is read by the program and passed to [`Method::start_from`](crate::Method).
     fn read(text: &str) -> Result<Self, String> {
-        let expected = "population, none, NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e and T_I separated by commas, as \
-                        omega_nm=10.5:0.3, or the file of a fit that hoid identify --json has printed, as fit.json";
+        let expected = "population, none, NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e and T_I separated by commas, \
+                        such as omega_nm=10.5:0.3, or the file of a fit that hoid identify --json has printed, such as \
+                        fit.json";
         Ok(match text {
             "population" => Self::Population,
             "none" => Self::Nothing,

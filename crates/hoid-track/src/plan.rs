@@ -114,12 +114,12 @@ impl TrackPlan {
 /// Error for a given start while orders are searched.
 pub fn of_one_model() -> IdentError {
     IdentError::BadStart {
-        reason: "it belongs to one model, but a range of orders or delays is searched; give nk and the orders as single numbers"
+        reason: "it applies to a single model, but a range of orders or delays is searched; give nk and the orders as single numbers"
             .to_owned(),
     }
 }
 
-/// Ranges of a method that searches none: the default orders, as near as the ranges allow.
+/// Ranges of a method that does not search: the default orders, or those nearest to them within the ranges.
 fn default_ranges(method: &Method, ranges: &OrderRanges, sample_time: SampleTime) -> OrderRanges {
     let known = method.person_prior().and_then(PersonPrior::delay_s);
     let nk = sample_time.nk(known.unwrap_or(DEFAULT_DELAY_S));

@@ -60,7 +60,7 @@ impl Predictor {
     /// Takes a sample whose output is missing; returns the prediction that replaces it.
     pub fn bridge(&mut self, theta: &[f64], e: f64) -> f64 {
         let theta = padded(theta);
-        // eps is the output less its prediction.
+        // eps is the output minus its prediction.
         let prediction = -self.predict(&theta, e, 0.0);
         self.kernel.bridge(&theta);
         self.correct(&theta);

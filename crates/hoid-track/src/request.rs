@@ -1,5 +1,5 @@
-//! A requested recursion, before the sample time is known: a delay in seconds is not yet an order, and a start names
-//! its coefficients.
+//! A requested recursion, before the sample time is known: a delay in seconds is not yet an order, and the coefficients
+//! of a start are given by name.
 
 use std::collections::BTreeMap;
 
@@ -30,7 +30,7 @@ pub enum RequestedStart {
 pub struct TrackRequest {
     /// The recursion, with its options.
     pub method: Method,
-    /// The structure; none for that of the method.
+    /// The structure; `None` for that of the method.
     pub structure: Option<Structure>,
     /// Orders by name, each a range.
     pub orders: NamedOrders,
@@ -92,7 +92,7 @@ impl TrackRequest {
                 return Err(IdentError::BadOption {
                     option: "nk".to_owned(),
                     found: "it and the delay in s".to_owned(),
-                    expected: "one of them: they are one thing in samples and in s".to_owned(),
+                    expected: "one of them: they are the same quantity in samples and in s".to_owned(),
                 });
             }
             if let DelayRange::Seconds(low, _) = delay

@@ -10,7 +10,7 @@
 
 use hoid_model::{Orders, SampleTime, uncertainty::Estimate};
 
-/// Decibels of a factor of e.
+/// Decibels that correspond to a factor of e.
 const DB: f64 = 8.685_889_638_065_037;
 
 /// Response at a frequency.

@@ -1,6 +1,6 @@
 //! A tracker as numbers, so that it can continue elsewhere: in another process, or after a restart.
 //!
-//! The numbers are those of the start, from which gains and bounds are made, then all that change
+//! The numbers are those of the start, from which gains and bounds are computed, then all numbers that change
 //! ([`hoid_core::state`]), and a seal against damage. A restored tracker continues with the same digits. It no longer
 //! has the start fit.
 
@@ -82,7 +82,7 @@ impl Tracker {
             reason: "the numbers are those of a tracker with other options; save it again".to_owned(),
         };
         let numbers = opened(numbers).ok_or_else(|| IdentError::BadStart {
-            reason: "the numbers of the saved tracker were changed or cut since; save it again".to_owned(),
+            reason: "the numbers of the saved tracker were changed or truncated since; save it again".to_owned(),
         })?;
         let p = options.parameter_names().len();
         let square = p.saturating_mul(p);

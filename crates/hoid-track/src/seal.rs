@@ -18,7 +18,7 @@ pub fn sealed(mut numbers: Vec<f64>) -> Vec<f64> {
     numbers
 }
 
-/// Returns the numbers without their seal; none if it does not match.
+/// Returns the numbers without their seal; `None` if it does not match.
 pub fn opened(sealed: &[f64]) -> Option<&[f64]> {
     let (stated, numbers) = sealed.split_last()?;
     (stated.to_bits() == seal(numbers).to_bits()).then_some(numbers)

@@ -8,7 +8,7 @@ use hoid_model::{Orders, Structure};
 
 use crate::{forgetting::ForgettingRule, memory::Memory, shared_options::WindupGuard};
 
-/// Delay of people who track, s: the prior if none is given.
+/// Delay of people who track, s: the prior if no delay is given.
 pub(crate) const DEFAULT_DELAY_S: f64 = 0.2;
 
 /// Names of the operator's parameters in a physical recursion.
@@ -40,9 +40,9 @@ pub struct Setup {
     pub memories: Vec<(String, Memory)>,
     /// Rule of forgetting.
     pub forgetting: ForgettingRule,
-    /// P at the start as a multiple of the unit matrix; none for that of the start fit.
+    /// P at the start as a multiple of the unit matrix; `None` for that of the start fit.
     pub covariance: Option<f64>,
-    /// Limit of P where nothing excites a parameter; none if that follows from the start.
+    /// Limit of P where nothing excites a parameter; `None` if that follows from the start.
     pub windup_guard: Option<WindupGuard>,
     /// Limit of an innovation in the update, in standard deviations of the innovation.
     pub limit: f64,

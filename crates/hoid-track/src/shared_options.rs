@@ -13,9 +13,9 @@ use crate::{forgetting::ForgettingRule, memory::MemoryOptions};
 /// How far the variances of P may grow where nothing excites a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum WindupGuard {
-    /// As far as forgetting takes them: equations 5.26 and 31 of the thesis unchanged.
+    /// Without limit: equations 5.26 and 31 of the thesis unchanged.
     Off,
-    /// To this multiple of their initial value.
+    /// Up to this multiple of their initial value.
     Bound(f64),
 }
 
@@ -50,28 +50,27 @@ impl Value for WindupGuard {
 settings! {
     /// The gain of a recursion of the kernel.
     pub struct GainOptions {
-        /// Covariance P at the start: X times the unit matrix, in units of the innovation variance
-        /// (the thesis: 0.1)
-        #[setting(bounds(Bounds::PositiveFinite), default("that of the start fit; 1e6 where there is none"))]
+        /// Initial covariance P: X times the unit matrix, in units of the innovation variance (thesis: 0.1)
+        #[setting(bounds(Bounds::PositiveFinite), default("that of the start fit, else 1e6"))]
         pub covariance: Option<f64> = None,
-        /// Standard deviations beyond which an innovation moves the estimate no further
+        /// Limit on innovations, in standard deviations
         #[setting(bounds(Bounds::Positive))]
         pub limit: Option<f64> = None,
-        /// How far each variance in P may grow where nothing excites its parameter, as a multiple of
-        /// its initial value; off: without end
-        #[setting(bounds(Bounds::AtLeast(1.0)), default("1e4 with a covariance or without a start fit, else 10 times what the memory has under the excitation of that fit"))]
+        /// How far each variance in P may grow where nothing excites its parameter, as a multiple of its initial value;
+        /// off: no limit
+        #[setting(bounds(Bounds::AtLeast(1.0)), default("1e4 with a covariance or without a start fit, else 10 times the value for the memory under the excitation of that fit"))]
         pub windup_guard: Option<WindupGuard> = None,
     }
     groups {
         /// Memories.
         pub memories: MemoryOptions,
-        /// How it forgets.
+        /// Rule of forgetting.
         pub forgetting: ForgettingRule,
     }
 }
 
 impl GainOptions {
-    /// The limit in use: none for a sliding window, whose sums hold every sample as it came.
+    /// The limit in use: none for a sliding window, whose sums contain every sample as recorded.
     pub fn limit_or(&self, default: f64) -> f64 {
         match self.forgetting {
             ForgettingRule::Window => f64::INFINITY,
@@ -88,7 +87,7 @@ impl GainOptions {
         self.windup_guard.or(of_the_text.then_some(WindupGuard::Off))
     }
 
-    /// Leaves out what was reported about parameters that are not known.
+    /// Removes the memories of parameters that do not exist.
     pub fn retain(&mut self, known: &dyn Fn(&str) -> bool) {
         self.memories.memory_of.retain(|key, _| known(key));
         if let ForgettingRule::RandomWalk(drift) = &mut self.forgetting {
@@ -108,7 +107,7 @@ settings! {
 settings! {
     /// Bounds of the operator's parameters.
     pub struct BoundOptions {
-        /// Bounds of physical parameters, as omega_nm=5..30,zeta_nm=0.1..2; an end may be left open
+        /// Bounds of physical parameters, such as omega_nm=5..30,zeta_nm=0.1..2; either end may be omitted
         pub bound: BTreeMap<String, Constraint> = BTreeMap::new(),
     }
 }
@@ -116,8 +115,8 @@ settings! {
 settings! {
     /// A tracked delay.
     pub struct DelayOptions {
-        /// Follow the delay tau_e too, within this range: as a parameter by physical, in whole
-        /// samples by rpem and multiple-model
+        /// Also track the delay tau_e within this range: as a parameter (physical) or in whole samples (rpem,
+        /// multiple-model)
         #[setting(name("track_delay"), unit("s"), bounds(Bounds::NonNegative), default("nk stays"))]
         pub track_delay_s: Option<(f64, f64)> = None,
     }

@@ -19,7 +19,7 @@ pub type Choose<'a> = &'a dyn Fn(&Record) -> Result<(TrackOptions, Option<Choice
 const QUARTER: usize = 4;
 /// Length that is kept of a warm-up that continues, as a multiple of its length.
 const KEPT: usize = 2;
-/// Place of the number of kept samples in a saved warm-up.
+/// Index of the number of kept samples in a saved warm-up.
 const COUNT: usize = 4;
 /// Longest run of faulty samples within a warm-up, s; after a longer one the warm-up restarts.
 const LONGEST_FAULT_S: f64 = 1.0;
@@ -40,7 +40,7 @@ pub struct LiveOutcome {
     pub outcome: Option<Outcome>,
     /// Options and search of a start fit that was made at this sample.
     pub started: Option<(TrackOptions, Option<Choice>)>,
-    /// True if the sample completed none of the lower rate: the recursion did not advance.
+    /// True if the sample completed no sample of the lower rate: the recursion did not advance.
     pub between: bool,
 }
 
@@ -79,7 +79,7 @@ impl Stage {
     ) -> Result<Self, IdentError> {
         let Some(orders) = orders else {
             let warm_up = WarmUp::restored(sample_time, numbers).ok_or_else(|| IdentError::BadStart {
-                reason: "the numbers of the saved warm-up were changed or cut since; save it again".to_owned(),
+                reason: "the numbers of the saved warm-up were changed or truncated since; save it again".to_owned(),
             })?;
             return Ok(Self::Collecting(warm_up));
         };
@@ -226,7 +226,7 @@ impl WarmUp {
         self.collected = self.collected.saturating_add(1);
     }
 
-    /// Leaves out the idle head, and collects as many samples in its place; false if there is none.
+    /// Excludes the idle head, and collects as many samples to replace it; false if there is none.
     fn leave_out_idle(&mut self) -> bool {
         let Ok(record) = self.record() else { return false };
         let idle = idle_head(&record);

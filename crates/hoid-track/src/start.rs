@@ -29,7 +29,7 @@ const SLOWEST_OMEGA: f64 = 0.5;
 const FASTEST_SHARE: f64 = 0.5;
 const DAMPING: [f64; 2] = [0.02, 5.0];
 /// Longest sample time of a tracker, s: beyond it the fastest neuromuscular system that the samples can represent is
-/// slower than the slowest of people.
+/// slower than the slowest that people have.
 const LONGEST_SAMPLE_TIME_S: f64 = FASTEST_SHARE * std::f64::consts::PI / SLOWEST_OMEGA;
 /// Factor by which the roots of an unstable noise model are moved inwards until it is stable.
 const DRAWN_INSIDE: f64 = 0.99;
@@ -48,8 +48,8 @@ pub(crate) fn check_sample_time(sample_time: SampleTime) -> Result<(), IdentErro
         option: "the sample time of a tracker".to_owned(),
         found: format!("{ts} s"),
         expected: format!(
-            "less than {LONGEST_SAMPLE_TIME_S:.2} s, for a person cannot be followed with fewer samples; if the time is in ms, \
-             divide it by 1000 (a sample time of {} s) or name its unit",
+            "less than {LONGEST_SAMPLE_TIME_S:.2} s, since a person cannot be followed with fewer samples; if the time \
+             is in ms, divide it by 1000 (a sample time of {} s) or name its unit",
             ts / 1000.0
         ),
     })

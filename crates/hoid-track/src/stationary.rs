@@ -13,8 +13,8 @@
 //!   value at the start of the block; before ten blocks are known, a stationary span has a single value.
 //! - There is **no information** if both e and u are stationary for [`BOTH_S`], or one of them for [`ONE_S`]: a frozen
 //!   channel, or a resting hand, whose response cannot be distinguished from none.
-//! - The recursion is then restored to the first sample of the span, bit for bit (a jump to its value belongs to it):
-//!   to the numbers that were stored before it, from which it takes the samples again. Estimate, covariance and
+//! - The recursion is then restored to the first sample of the span, bit for bit (including a jump to its value): to
+//!   the numbers that were stored before it, from which the recursion takes the samples again. Estimate, covariance and
 //!   innovation variance keep their values of that time for the whole span.
 //! - It continues once both signals move and the filters have settled ([`crate::guard`]).
 //!
@@ -228,7 +228,7 @@ impl State for StationaryWatch {
 }
 
 impl StationaryWatch {
-    /// Builds the watch for a recursion with a delay of nk samples; none if the sample time is too short.
+    /// Builds the watch for a recursion with a delay of nk samples; `None` if the sample time is too short.
     pub fn new(nk: usize, sample_time: SampleTime) -> Option<Self> {
         let samples = |seconds: f64| ((seconds / sample_time.s()).round() as u64).max(LEAST);
         let one = samples(ONE_S);

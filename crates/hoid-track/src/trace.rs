@@ -64,7 +64,7 @@ pub struct Trace {
     pub(crate) every: usize,
     /// Length of the moving average in rows, 1 for none.
     pub(crate) averaged: usize,
-    /// Time from which the estimate moved, s.
+    /// Time from which the estimate was updated, s.
     pub(crate) updated_from_s: f64,
 }
 
@@ -356,7 +356,7 @@ impl Trace {
         self.failures.as_ref()
     }
 
-    /// Returns the time from which the estimate moved, s.
+    /// Returns the time from which the estimate was updated, s.
     pub fn updated_from_s(&self) -> f64 {
         self.updated_from_s
     }

@@ -328,8 +328,9 @@ impl Tracker {
             Finding::doubt(
                 "sign",
                 format!(
-                    "the response at {LOW_RAD_S} rad/s has a phase of {:.0} deg: they would push the error away; turn the sign of \
-                     e or u over, or, where the controlled element has a negative gain, name it with --controlled-element",
+                    "the response at {LOW_RAD_S} rad/s has a phase of {:.0} deg: the person would increase the error; \
+                     reverse the sign of e or u, or, if the controlled element has a negative gain, give it with \
+                     --controlled-element",
                     phase.value
                 ),
             )

@@ -9,10 +9,10 @@
 //!
 //! `VAF = max(0, 1 - sum (u - w)^2/sum u^2) 100 %`,
 //!
-//! and of a grid of `P_0 = p I` the p is chosen whose trace explains most of it. An estimate that
-//! follows the remnant of the first run explains less of the second, which has another remnant; one that is too stiff
-//! explains less after a change of the person. The runs are aligned at their first samples, so that changes of the
-//! task have to occur at the same time in both.
+//! and from a grid of `P_0 = p I` the p is chosen whose trace explains most of that run. An estimate that follows the
+//! remnant of the first run explains less of the second, which has another remnant; one that is too stiff explains less
+//! after a change of the person. The runs are aligned at their first samples, so that changes of the task have to occur
+//! at the same time in both.
 //!
 //! [`track_validated`] follows the proposal literally: P is updated during the run. At regular times the current model
 //! and that of one interval before are both simulated over the last seconds of the second run; if the current one
@@ -23,8 +23,8 @@
 //! the estimate moves less until it has forgotten; if it explains more, P stays constant. The share that the remnant
 //! leaves unexplained is in both, so that noise does not penalise a correct model.
 //!
-//! The VAF removes no mean. The first seconds are left out, since the simulation starts at rest and the person does
-//! not.
+//! No mean is removed for the VAF. The first seconds are excluded, since the simulation starts at rest and the person
+//! does not.
 
 use hoid_ident::{IdentError, validation::vaf};
 use hoid_model::{Orders, Record, SampleTime};
@@ -84,7 +84,7 @@ impl Trace {
         if span_s.1 - span_s.0 < SHORTEST_S {
             return Err(bad(
                 "the run for validation",
-                format!("{} s in common with the run that is tracked", span_s.1),
+                format!("{} s in common with the tracked run", span_s.1),
                 &format!(
                     "at least {} s: a longer run of the same person in the same task",
                     span_s.0 + SHORTEST_S
@@ -117,8 +117,8 @@ fn check(other: &Record, options: &TrackOptions, ts: SampleTime) -> Result<(), I
     if options.method.track_delay_s().is_some() || options.method.starts_itself() {
         return Err(bad(
             "the validation of a trace",
-            "a delay that moves".to_owned(),
-            "a method with a delay that is given, without track_delay",
+            "a tracked delay".to_owned(),
+            "a method with a given delay, without track_delay",
         ));
     }
     Ok(())
@@ -161,19 +161,19 @@ fn check_method(options: &TrackOptions) -> Result<(), IdentError> {
     if !has_p || matches!(forgets, ForgettingRule::Window | ForgettingRule::Gradient(_)) {
         return Err(bad(
             "the run for validation",
-            format!("{method}, whose gain does not start with a covariance that can be chosen"),
-            "a method with the option covariance, as rls or rpem, and a way of forgetting that has P",
+            format!("{method}, whose gain has no start covariance to choose"),
+            "a method with the option covariance, such as rls or rpem, and a way of forgetting that has P",
         ));
     }
     Ok(())
 }
 
-/// Returns the options with the initial covariance whose trace of the record explains most of a second run; of two
-/// that explain the same, the smaller.
+/// Returns the options with the initial covariance whose trace of the record explains most of a second run; if two
+/// explain the same, the smaller.
 ///
 /// # Errors
-/// [`IdentError`] for a method without such a covariance, or one that is given already, and as
-/// [`track_from`] and [`Trace::vaf_of`].
+/// [`IdentError`] for a method without such a covariance, or with a given one, and as [`track_from`] and
+/// [`Trace::vaf_of`].
 pub fn choose_covariance(
     record: &Record,
     validation: &Record,
@@ -264,7 +264,7 @@ pub fn track_validated(
         return Err(bad(
             "the run for validation",
             format!("{} samples", validation.len()),
-            &format!("the {} of the run that is tracked, or more", record.len()),
+            &format!("the {} of the tracked run, or more", record.len()),
         ));
     }
     let samples = |time_s: f64| ((time_s / ts.s()).round() as usize).max(1);

@@ -147,7 +147,7 @@ class ExperimentDesign(Written):
             f"{r['quantity']}: {r['value']:.4g} ± {r['standard_error']:.2g} {r['unit']}"
             for r in self._parameters
         ]
-        return "\n".join([f"Errors to be expected of {runs}", *(row.rstrip() for row in rows)])
+        return "\n".join([f"Expected errors of {runs}", *(row.rstrip() for row in rows)])
 
 
 def _rows(found: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -418,7 +418,7 @@ class OperatorFit(Model, Result):
         prior = ", ".join(f"{name} = {c:g}:{s:g}" for name, (c, s) in self.prior.items())
         rate = said(self.records)
         return (f"{rate}\n" if rate else "") + (
-            f"Errors by the scatter of {self.errors['clusters']} {self.errors['kind']}: variances"
+            f"Errors from the scatter of {self.errors['clusters']} {self.errors['kind']}: variances"
             f" {self.errors['inflation']:.2f} times those of white residuals\n"
             f"Loss {_text.number(self.loss)}; {self.termination['reason']} after"
             f" {self.termination['iterations']} steps\n"

@@ -29,8 +29,8 @@ use crate::{
 pub trait BatchEstimator: Sized + 'static {
     /// Its result.
     type Fit: Answers;
-    /// Whose records it judges: for those of a person, who responds to an error within a second, a missing response is
-    /// reported.
+    /// Kind of system whose records it judges: for a person, who responds to an error within a second, a missing
+    /// response is reported.
     const OF: Of = Of::Person;
 
     /// Its entries in the registry: one, or one for each of its methods.

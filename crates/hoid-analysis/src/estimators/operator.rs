@@ -41,7 +41,7 @@ impl BatchEstimator for FamilyEstimator {
         all
     }
 
-    /// A first-order hold is that between the samples as recorded.
+    /// A first-order hold applies between the samples as recorded.
     fn counts_samples(&self) -> bool {
         self.intersample == Intersample::Foh
     }
@@ -59,7 +59,7 @@ impl BatchEstimator for FamilyEstimator {
     }
 
     fn beside_options(&self) -> Option<Setting> {
-        Some(Setting::new("taken out of e and u", self.detrend.to_string()))
+        Some(Setting::new("removed from e and u", self.detrend.to_string()))
     }
 
     fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<FamilyFit>, AnalysisError> {

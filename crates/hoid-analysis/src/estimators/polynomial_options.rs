@@ -20,7 +20,7 @@ const HUBER: f64 = 1.345;
 pub struct Polynomials {
     /// Structure, initial states, search, constraints, loss, focus. Orders and start are those below.
     pub template: Estimator,
-    /// Orders that are given, or searched in a range, by name; the others are those of the operator.
+    /// Orders that are given, or searched in a range, by name; all other orders are those of the operator.
     pub orders: NamedOrders,
     /// Shortest and longest dead time in s, in place of an order nk.
     pub delay_s: Option<(f64, f64)>,
@@ -58,7 +58,7 @@ impl Polynomials {
     }
 }
 
-/// Names of the options of the prediction error method alone, and of those of instrumental variables alone.
+/// Names of the options that only the prediction error method has, and of those that only instrumental variables have.
 pub(super) fn names_of_methods() -> [Vec<&'static str>; 2] {
     [by_prediction(), by_instruments()].map(|options| options.iter().map(|option| option.setting.name).collect())
 }
@@ -78,8 +78,8 @@ impl BatchOptions for Polynomials {
 fn searched() -> Vec<BatchOption<Polynomials>> {
     let default = "the operator's: bj nb=2,nd=1..4,nf=2; arx na=2,nb=2";
     let nk =
-        "Delay of b0 in samples (29), or dead time in s (0.28s); a number or a range (20..40, 0.1s..0.4s) to search";
-    let criterion = "What decides between candidates when something is searched";
+        "Delay of b0 in samples (29) or dead time in s (0.28s), or a range (20..40, 0.1s..0.4s) to search";
+    let criterion = "Criterion that selects among searched candidates";
     vec![
         BatchOption::new(shared::orders(default), |how: &mut Polynomials, option, text| {
             for (name, range) in option.read::<NamedOrders>(text)? {
@@ -113,7 +113,7 @@ fn searched() -> Vec<BatchOption<Polynomials>> {
         .printed("criterion", |how, _| Some(how.criterion.to_string())),
         BatchOption::new(shared::delay(""), |how: &mut Polynomials, option, text| {
             if how.delay_s.is_some() || how.orders.contains_key("nk") {
-                return Err(option.error("it is nk in s in place of samples; give one of them"));
+                return Err(option.error("it is nk in s in place of samples; give only one of them"));
             }
             let OneOrSpan(low, high) = option.read(text)?;
             how.delay_s = Some((low, high));
@@ -126,13 +126,14 @@ fn searched() -> Vec<BatchOption<Polynomials>> {
     ]
 }
 
-/// Options of the prediction error method alone.
+/// Options that only the prediction error method has.
 fn by_prediction() -> Vec<BatchOption<Polynomials>> {
-    let focus = "What the model is to be good at: one-step prediction, or simulation from the input alone";
-    let start = "Start of the search, all coefficients as f1=-1.9,f2=.92,b0=.04,...";
-    let guess = "Guesses of coefficients with a weight W, as f1=-1.9:0.5: the loss grows by W (f1 + 1.9)^2";
-    let robust = "Loss of Huber instead of squares: residuals beyond a given number of standard deviations count linearly; of no number 1.345";
-    let stable = "Take only models that are stable from e to u (C and F always are stable)";
+    let focus = "Purpose of the model: one-step prediction, or simulation from the input alone";
+    let start = "Start of the search, all coefficients, such as f1=-1.9,f2=.92,b0=.04,...";
+    let guess = "Prior values of coefficients with a weight W, such as f1=-1.9:0.5, which adds W (f1 + 1.9)^2 to the \
+                 loss";
+    let robust = "Huber loss instead of squares: linear beyond X standard deviations; 1.345 if X is not given";
+    let stable = "Accept only models that are stable from e to u (C and F are always stable)";
     let mut all = vec![
         BatchOption::new(
             Setting::new("focus", Kind::Choice(&Focus::NAMES), focus).default(Focus::default().name()),
@@ -208,9 +209,9 @@ fn by_prediction() -> Vec<BatchOption<Polynomials>> {
     all
 }
 
-/// Options of instrumental variables alone.
+/// Options that only instrumental variables have.
 fn by_instruments() -> Vec<BatchOption<Polynomials>> {
-    let help = "Instruments: a channel that the noise does not reach, or `simulated` from the input, for an open loop";
+    let help = "Instruments: a channel independent of the noise, or `simulated` from the input (for an open loop)";
     let setting =
         Setting::new("instruments", Kind::Channel, help).default("f_t where all records have it, else simulated");
     vec![BatchOption::new(setting, |how: &mut Polynomials, _, text| {

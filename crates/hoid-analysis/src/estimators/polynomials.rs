@@ -52,7 +52,7 @@ impl Polynomials {
         if let Some((low, high)) = self.delay_s {
             if orders.contains_key("nk") {
                 return Err(AnalysisError::Options {
-                    reason: "nk and delay are one thing in samples and in s; give one of them".to_owned(),
+                    reason: "nk and delay are the same quantity in samples and in s; give only one of them".to_owned(),
                 });
             }
             if !(0.0 <= low && low <= high && high.is_finite()) {
@@ -80,8 +80,8 @@ impl Polynomials {
             }
             (Some(_), _) => {
                 return Err(refuse(
-                    "--start belongs to one model, but a range of orders or delays is searched; give --nk and --orders as \
-                     single numbers"
+                    "--start applies to a single model, but a range of orders or delays is searched; give --nk and \
+                     --orders as single numbers"
                         .to_owned(),
                 ));
             }

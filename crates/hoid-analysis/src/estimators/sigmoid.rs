@@ -1,5 +1,5 @@
-//! An operator whose gains change once, by a sigmoid. The level of u is one of its unknowns: the mean of e is that of
-//! two operators.
+//! An operator whose gains change once, by a sigmoid. The level of u is one of its unknowns, because the mean of e
+//! depends on two operators.
 
 use hoid_ident::{
     InitialState, SearchOptions, SigmoidChange, SigmoidFit, diagnostics::second_opinion, settings::MethodSpec,

@@ -53,8 +53,7 @@ impl BatchResult {
     /// Reads a result that [`Identified::to_json`] wrote.
     ///
     /// # Errors
-    /// [`AnalysisError::NotAResult`] for a text that is invalid, is damaged, or is of another
-    /// version.
+    /// [`AnalysisError::NotAResult`] for a text that is invalid, damaged, or of another version.
     pub fn from_json(text: &str) -> Result<Self, AnalysisError> {
         let object = parsed(text)?;
         let estimator = object.get("estimator").and_then(Value::as_str).unwrap_or_default();

@@ -21,7 +21,7 @@ struct Table<T> {
     value: T,
 }
 
-/// Returns a value as text; none if it cannot be written.
+/// Returns a value as text; `None` if it cannot be written.
 pub fn written<T: Serialize>(value: &T) -> Option<String> {
     let text = toml::to_string(&Table { value }).ok()?;
     Some(format!("{}{text}", sum(&text)))
@@ -32,17 +32,13 @@ pub fn written<T: Serialize>(value: &T) -> Option<String> {
 /// # Errors
 /// For a text that was cut or changed, or is of another version.
 pub fn read<T: DeserializeOwned>(text: &str) -> Result<T, String> {
-    let (stated, text) = text.split_at_checked(DIGITS).ok_or("its state is cut")?;
+    let (stated, text) = text.split_at_checked(DIGITS).ok_or("its state is truncated")?;
     if stated != sum(text) {
-        return Err("its state is not the one that was written: it was cut or changed".to_owned());
+        return Err("its state is not the one that was written: it was truncated or changed".to_owned());
     }
     let version = env!("CARGO_PKG_VERSION");
-    let table: Table<T> = toml::from_str(text).map_err(|error| {
-        format!(
-            "its state is that of another version than {version}: {}",
-            error.message()
-        )
-    })?;
+    let table: Table<T> = toml::from_str(text)
+        .map_err(|error| format!("its state is from a version other than {version}: {}", error.message()))?;
     Ok(table.value)
 }
 

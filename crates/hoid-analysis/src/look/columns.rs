@@ -14,7 +14,7 @@ pub struct Role {
     pub column: String,
     /// Reason for the choice.
     pub why: String,
-    /// True if no other column is as likely.
+    /// True if no other column is equally likely.
     pub certain: bool,
 }
 
@@ -38,8 +38,8 @@ impl Role {
 }
 
 impl Roles {
-    /// Finds input and output among the columns; requested columns are kept. If no name is known the common names are
-    /// used, to be replaced by hand.
+    /// Finds input and output among the columns; requested columns are kept. For a signal that is not found, the common
+    /// name (`e` or `u`) is returned as uncertain, for the user to replace.
     pub fn of(columns: &[&str], input: Option<&str>, output: Option<&str>) -> Self {
         let known = |names: &[&str]| -> Vec<&str> {
             let all = names.iter();
@@ -58,7 +58,7 @@ impl Roles {
             (_, Some(name), _) => Role::new(name, "the tracking error, by its name", true),
             (_, _, Some((r, y))) => Role::new(
                 format!("{r}-{y}"),
-                format!("no column is called e: target {r} less output {y}"),
+                format!("no column is called e: target {r} minus output {y}"),
                 targets.len() == 1 && outputs.len() == 1,
             ),
             _ => Role::new(

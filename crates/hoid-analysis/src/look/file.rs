@@ -86,7 +86,7 @@ fn seen(path: &Path, roles: &Roles, known: &LookOptions) -> Result<RecordSummary
         sampling_hz: known.sampling_hz,
         ..ReadOptions::default()
     };
-    // Of several trials the first is examined.
+    // If there are several trials, the first is examined.
     let record = match read_record(path, &options) {
         Err(IoError::SeveralTrials { by, trials, .. }) => {
             let first = trials.first().map_or("", String::as_str);

@@ -24,7 +24,7 @@ pub(super) fn of_control(
 ) -> Result<Lag, String> {
     let Some(found) = recorded_element(std::slice::from_ref(record), element, excitation) else {
         return Err(
-            "e does not follow from u by one controlled element: a target or a disturbance was not recorded, the \
+            "e does not follow from u through one controlled element: a target or a disturbance was not recorded, the \
              record is short, or the element changes"
                 .to_owned(),
         );
@@ -42,8 +42,8 @@ pub(super) fn of_control(
         samples,
         seconds: samples * ts_s,
         words: format!(
-            "e returns from u by the controlled element with the control {samples} sample{plural} late; {:.2} % of the \
-             power is left",
+            "e follows from u through the controlled element with the control {samples} sample{plural} late; {:.2} % \
+             of the power is unexplained",
             100.0 * found.unexplained
         ),
     })
@@ -95,7 +95,7 @@ mod tests {
     fn another_element_and_a_signal_that_is_missing_are_named() {
         let record = integrated(1);
         let why = of_control(&record, None, &"1/(s^2+0.01s)".parse().unwrap()).unwrap_err();
-        assert!(why.contains("e returns from u by 1/s, not by"), "{why}");
+        assert!(why.contains("e follows from u through 1/s, not through"), "{why}");
         let without = Record::new(
             record.sample_time(),
             record.input_channel().unwrap().clone(),

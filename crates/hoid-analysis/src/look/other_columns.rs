@@ -47,7 +47,7 @@ impl OtherColumns {
         all.collect::<Vec<_>>().join(", ")
     }
 
-    /// Returns the remedy as a command: the typed one, without its program, with these columns.
+    /// Returns the remedy as a command line: the typed arguments, with the column options replaced by these.
     pub fn command(&self, typed_words: impl IntoIterator<Item = String>) -> String {
         let mut words = vec!["hoid".to_owned()];
         let mut all = typed_words.into_iter();
@@ -69,7 +69,7 @@ impl OtherColumns {
     }
 }
 
-/// Returns the columns that a file has in place of e and u; `None` for another error, or if they are not certain.
+/// Returns the columns that a file has instead of e and u; `None` for another error, or if they are not certain.
 pub fn other_columns(error: &IoError, path: &Path, options: &ReadOptions) -> Option<OtherColumns> {
     let IoError::NoSuchColumn {
         file,

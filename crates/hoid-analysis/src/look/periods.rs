@@ -17,9 +17,9 @@ const MOST_CUT_S: f64 = 20.0;
 const MOST_CUT_SHARE: f64 = 0.4;
 /// Least number of lines of an excitation: people predict a sine.
 const FEWEST_LINES: usize = 3;
-/// Largest ratio of two shares of the power next to the lines that count as equal.
+/// Largest ratio of two leaked shares of the power that count as equal.
 const LEAKS_ALIKE: f64 = 3.0;
-/// Share of the power next to the lines that rounding to about five digits may cause.
+/// Share of the power outside the lines that rounding to about five digits may cause.
 const ROUNDING: f64 = 1e-9;
 
 /// The excitation of a run.
@@ -65,14 +65,14 @@ pub(super) fn search(record: &Record, known: &LookOptions) -> Result<Periods, St
             return "there is no column other than error and control".to_owned();
         }
         format!(
-            "no column among {} has its power in lines over whole periods; name one by --excitation and its span by --from and --to",
+            "no column among {} has its power in lines over whole periods; name one with --excitation and its span with --from and --to",
             candidates.join(", ")
         )
     })
 }
 
 /// Finds the longest span of whole periods of a channel. A span that is some samples too long leaks little, and would
-/// pass: of those that are shorter by less than a second the one with the least leakage is chosen.
+/// pass: among the spans that are shorter by less than a second, the one with the least leakage is chosen.
 fn in_channel(record: &Record, channel: &str, known: &LookOptions) -> Option<Periods> {
     let all = spans(record, known);
     let longest = all.iter().position(|span| lines_in(record, channel, *span).is_some())?;
@@ -83,7 +83,7 @@ fn in_channel(record: &Record, channel: &str, known: &LookOptions) -> Option<Per
         .filter_map(|span| lines_in(record, channel, *span).map(|(excitation, leak)| (*span, excitation, leak)))
         .collect();
     let least = near.iter().map(|(.., leak)| *leak).fold(f64::INFINITY, f64::min);
-    // Of those with equal leakage the first, which is the longest.
+    // Among spans with equal leakage the first, which is the longest.
     let limit = LEAKS_ALIKE * least.max(ROUNDING);
     let ((from_s, to_s), excitation, _) = near.into_iter().find(|(.., leak)| *leak <= limit)?;
     let (omega, period_s) = (excitation.omega_rad_s(), excitation.period_s());
@@ -103,7 +103,7 @@ fn in_channel(record: &Record, channel: &str, known: &LookOptions) -> Option<Per
 }
 
 /// Returns the lines of a channel over a span, if they contain nearly all of its power, and the share of the power
-/// next to them.
+/// outside them.
 fn lines_in(record: &Record, channel: &str, (from_s, to_s): (f64, f64)) -> Option<(Excitation, f64)> {
     let span = record.span(from_s, to_s).ok()?;
     let excitation = Excitation::found_in(&span, channel, &LineSearch::default()).ok()?;
@@ -126,7 +126,8 @@ fn lines_in(record: &Record, channel: &str, (from_s, to_s): (f64, f64)) -> Optio
     Some((excitation, (1.0 - of_lines / power).max(0.0)))
 }
 
-/// Spans that are tried: the longest first, of equal ones the latest, since a person needs time to settle.
+/// Spans that are tried: the longest first and, among spans of equal length, the latest first, since a person needs
+/// time to settle.
 fn spans(record: &Record, known: &LookOptions) -> Vec<(f64, f64)> {
     let (begin, end) = (record.time_s(0), record.time_s(record.len()));
     let most = MOST_CUT_S.min(MOST_CUT_SHARE * (end - begin));

@@ -6,7 +6,7 @@
 //!
 //! A high rate is lowered; open orders are searched on the start span; the recursion processes the record, with a
 //! second run that chooses its covariance if one is given; the verdict is that of the trace together with the findings
-//! of the recording. Faults are handled by the guard, sample by sample: a recording is not repaired before.
+//! of the recording. Faults are handled by the guard, sample by sample: a recording is not repaired beforehand.
 
 mod errors;
 mod run;

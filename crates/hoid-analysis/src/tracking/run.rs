@@ -22,9 +22,9 @@ use crate::{
 pub struct Tracking {
     /// The recursion.
     pub recursion: TrackRequest,
-    /// Span of the start fit, s; none for the first third.
+    /// Span of the start fit, s; `None` for the first third.
     pub start_span_s: Option<(f64, f64)>,
-    /// Time from which the estimate moves, s.
+    /// Time from which the estimate is updated, s.
     pub update_from_s: Option<f64>,
     /// Length of the moving average of the trace, s.
     pub moving_average_s: Option<f64>,
@@ -96,7 +96,7 @@ impl Tracking {
         let (record, account) = (&data.records[0], &data.accounts[0]);
         let every = match named_rate {
             true => self.every,
-            // The distance of rows in time is that of the requested samples of the file.
+            // The time between rows is that between the requested samples of the file.
             false => (self.every as f64 * read_ts.s() / record.sample_time().s()).round() as usize,
         }
         .max(1);

@@ -89,7 +89,7 @@ impl OwnSettings<'_> {
         match self.covariance {
             Some(Covariance::Chosen(file, choice)) => {
                 let words = format!(
-                    "of {} values that whose trace explains most of {file} from {:.2} to {:.2} s, VAF {:.2} %",
+                    "of {} values the one whose trace explains most of {file} from {:.2} to {:.2} s, VAF {:.2} %",
                     choice.candidates.len(),
                     choice.span_s.0,
                     choice.span_s.1,
@@ -98,7 +98,7 @@ impl OwnSettings<'_> {
                 list.push(Setting::new("covariance chosen", words));
             }
             Some(Covariance::Updated(file)) => {
-                let words = format!("by what the estimate explains of {file}, VAF");
+                let words = format!("by the VAF of the estimate on {file}");
                 list.push(Setting::new("covariance updated", words).given(true));
             }
             None => {}

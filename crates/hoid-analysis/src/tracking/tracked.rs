@@ -105,7 +105,7 @@ impl Tracked {
         );
         let mut comments = vec![
             format!("hoid {} track {}", env!("CARGO_PKG_VERSION"), self.name()),
-            "units: t s, T_L s, omega_nm rad/s; gains are u by e; gain_db@W dB and phase_deg@W deg at W rad/s; _se are standard errors"
+            "units: t s, T_L s, omega_nm rad/s; gains are in u/e; gain_db@W dB and phase_deg@W deg at W rad/s; _se are standard errors"
                 .to_owned(),
         ];
         comments.extend(self.settings.iter().map(|one| format!("{}: {}", one.name, one.value)));
@@ -138,7 +138,7 @@ impl Tracked {
         })
     }
 
-    /// Returns the first row in which the estimate has moved.
+    /// Returns the first row in which the estimate has been updated.
     pub fn first_moved_row(&self) -> usize {
         // Half a sample is added, so that rounding of the times has no effect.
         let from = self.trace.updated_from_s() - self.record().sample_time().s() / 2.0;
@@ -159,7 +159,9 @@ impl Tracked {
                 _ if self.trace.is_before_the_first(row) => ("none yet", "there is no estimate yet".to_owned()),
                 NotConvertible::NegativeRealPole { .. } => (
                     "pole",
-                    "a pole lies on the closed negative real axis, so that no real continuous system has it".to_owned(),
+                    "a pole lies on the closed negative real axis, so that no real continuous-time system corresponds \
+                     to the model"
+                        .to_owned(),
                 ),
                 NotConvertible::NoNaturalFrequency { .. } => (
                     "frequency",

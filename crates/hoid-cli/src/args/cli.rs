@@ -19,8 +19,8 @@ use super::{
 
 /// Human-operator identification: estimates how a person controls a machine.
 ///
-/// From the tracking error e and the control output u: gain, lead, delay, neuromuscular dynamics and
-/// remnant, with standard errors and a verdict on their reliability.
+/// Estimates gain, lead, delay, neuromuscular dynamics and remnant from the tracking error e and the control output u,
+/// with standard errors and a verdict on their reliability.
 #[derive(Debug, Parser)]
 #[command(name = "hoid", version, max_term_width = 110)]
 pub struct Cli {
@@ -30,51 +30,49 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Run the whole analysis on a simulated run, with a report
+    /// Run the whole analysis on a simulated run, with reports
     ///
-    /// Simulates a run in which the controlled element changes, identifies the operator, tracks it, and writes reports.
+    /// Simulates a run in which the controlled element changes, and identifies and tracks the operator.
     Demo(DemoArgs),
-    /// Simulate one closed-loop run into a file
+    /// Simulate one closed-loop run
     Simulate(SimulateArgs),
     /// Estimate the operator's parameters from recordings
     ///
-    /// Fits a model to one or several records and gives a verdict on the result.
+    /// Fits a model to one or more records and gives a verdict on the result.
     Identify(Box<IdentifyArgs>),
     /// Estimate gain and phase at the excited frequencies, without a model
     ///
-    /// Computes the response of a person at the frequencies of a periodic excitation: describing function,
-    /// crossover, margins and remnant.
+    /// Computes describing function, crossover, margins and remnant from records with a periodic excitation.
     Describe(Box<DescribeArgs>),
     /// Track the operator over a record, sample by sample
     ///
-    /// Tracks a model and the operator's parameters over a record and detects changes.
+    /// Tracks a model and the operator's parameters, and detects changes.
     Track(Box<TrackArgs>),
     /// Track live: samples in, one JSON line per sample out
     ///
-    /// Reads samples as lines from standard input and writes one JSON line per sample to standard output.
+    /// Reads lines from standard input and writes to standard output.
     Stream(Box<StreamArgs>),
-    /// Write a unit for simulators (FMI 2.0, 3.0)
+    /// Write a functional mock-up unit (FMI 2.0, 3.0)
     ///
-    /// Writes a functional mock-up unit: the tracker, or with --operator a simulated person. It takes the
-    /// shared library that `cargo xtask ffi` builds.
+    /// Writes the tracker, or with --operator a simulated person, as a unit for simulators. Needs the shared library
+    /// built by `cargo xtask ffi`.
     Fmu(FmuArgs),
     /// Show channels, sampling and data-quality problems
     ///
     /// Shows columns, sampling, ranges, suspicious values, and a sketch of each column.
     Info(InfoArgs),
-    /// Convert coefficients to operator parameters and back
+    /// Convert discrete coefficients to operator parameters and back
     ///
-    /// Converts discrete coefficients to operator parameters or back, or discretises a transfer function.
+    /// Also discretises transfer functions.
     Convert(ConvertArgs),
     /// Compute crossover and margins of a scenario
     ///
-    /// Computes crossover frequency, phase margin, gain margin and remnant gains of a scenario.
+    /// Computes crossover frequency, phase margin, gain margin and remnant gains.
     Margins(MarginsArgs),
     /// Run a tracking experiment in the browser
     ///
-    /// Serves a page on this computer in which a person tracks, identifies the operator during the run, and
-    /// verifies every run to the last bit. Prints the address of the page. Release binaries contain it; other
-    /// builds need --features lab.
+    /// Serves a tracking task as a page on this computer and prints its address. Identifies the operator during each
+    /// run, and verifies every run to the last bit. Included in release binaries; other builds need --features lab.
     Lab(LabArgs),
     /// Analyse many recorded runs by subject and condition
     ///
@@ -83,32 +81,32 @@ pub enum Command {
     Group(Box<GroupArgs>),
     /// Test differences between conditions or people
     ///
-    /// Estimates the differences between the conditions or people of a group, with intervals, tests, effect sizes and a
-    /// sentence each. It combines the results of `hoid group` over people.
+    /// Combines the results of `hoid group` over people, and estimates differences with intervals, tests, effect sizes
+    /// and a sentence each.
     Compare(CompareArgs),
-    /// Design the forcing function that is most informative about a person
+    /// Design the most informative forcing function for a person
     ///
-    /// Computes frequencies, amplitudes and phases of a forcing function, and the expected standard errors for a number of
-    /// runs, from approximate values of the person and the controlled element.
+    /// Computes frequencies, amplitudes and phases of a forcing function, and the standard errors expected from a
+    /// number of runs, from approximate values for the person and the controlled element.
     Design(DesignArgs),
     /// Simulate a virtual experiment for `hoid group`
     ///
-    /// Simulates subjects, conditions and runs, and writes the true values next to them.
+    /// Simulates subjects, conditions and runs, and also writes the true values.
     SimulateGroup(SimulateGroupArgs),
     /// Run Monte Carlo studies: run a plan, join shards, list plans
     #[command(subcommand)]
     Study(StudyCommand),
     /// Reproduce the thesis (Ortiz Moya 2023)
     ///
-    /// Computes the tables, figures and claims of the thesis, each from a named study.
+    /// Computes its tables, figures and claims, each from a named study.
     Reproduce(ReproduceArgs),
-    /// Write completions for bash, zsh, fish, PowerShell, Elvish
+    /// Write shell completions (bash, zsh, fish, PowerShell, Elvish)
     ///
-    /// Writes the completions of a shell to standard output.
+    /// Writes to standard output.
     Completions(CompletionsArgs),
     /// Write manual pages
     ///
-    /// Writes a manual page for the program and one for each command.
+    /// Writes one page for the program and one for each command.
     Man(ManArgs),
 }
 

@@ -9,37 +9,36 @@ use super::{choices::choice_of, figure::FigureArgs, show::ShowArgs};
 
 #[derive(Debug, Args)]
 pub struct CompareArgs {
-    /// Recordings with their manifest (group.toml), which are analysed first; or results: the directory that
-    /// `hoid group DIR --out` wrote, or what `hoid group --json` printed
+    /// Recordings with their manifest (group.toml), analysed first; or results: the directory written by
+    /// `hoid group DIR --out`, or the output of `hoid group --json`
     #[arg(value_name = "DIR|MANIFEST|RESULTS.json")]
     pub results: PathBuf,
-    /// Differences between conditions or people, as NAME:LEVEL=A,B;LEVEL=C with conditions or people of the group;
-    /// repeat it for several factors and their interactions [default: each condition is a level of the factor
-    /// condition]
+    /// Factor to compare, as NAME:LEVEL=A,B;LEVEL=C with conditions or people of the group; repeat for several factors
+    /// and their interactions [default: factor condition, with each condition as a level]
     #[arg(long, value_name = "FACTOR")]
     pub factor: Vec<Factor>,
-    /// The factor varies within people: each is in all of its levels [default: found from the group]
+    /// The factor varies within people: each person is in all levels [default: found from the group]
     #[arg(long, conflicts_with = "between")]
     pub within: bool,
-    /// The factor varies between people: each is in one of its levels
+    /// The factor varies between people: each person is in one level
     #[arg(long)]
     pub between: bool,
-    /// Quantities compared, separated by commas: crossover, phase_margin, tau_e, gain_db@W and phase_deg@W at W rad/s,
+    /// Quantities to compare, comma-separated: crossover, phase_margin, tau_e, gain_db@W and phase_deg@W at W rad/s,
     /// rms_e, rms_u, or parameters such as K, T_L, for which recordings are analysed in one form, chosen by the
     /// evidence of all people [default: crossover,phase_margin,tau_e]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub of: Vec<Quantity>,
-    /// Trend removed from the estimates, with its slope told: run
+    /// Remove the trend over this covariate from the estimates, and report its slope
     #[arg(long, value_name = "NAME", value_parser = choice_of(&Covariate::ALL))]
     pub covariate: Option<Covariate>,
-    /// Treatment of many tests: holm or none
+    /// Adjustment for multiple tests
     #[arg(long, value_name = "METHOD", default_value = "holm", value_parser = choice_of(&Adjustment::ALL))]
     pub adjust: Adjustment,
-    /// How people are weighted: by a variance between them that is kept away from zero (penalised), or that of
-    /// the restricted likelihood (reml), whose intervals are too short for few people
+    /// Variance between people in the weights: kept away from zero (penalised), or by restricted likelihood (reml),
+    /// whose intervals are too short for few people
     #[arg(long, value_name = "METHOD", default_value = "penalised", value_parser = choice_of(&Weights::ALL))]
     pub weights: Weights,
-    /// Directory for all of it: comparison.json, differences.csv, .md and .tex, people.svg, sentences.txt, and the
+    /// Directory for all results: comparison.json, differences.csv, .md and .tex, people.svg, sentences.txt, and the
     /// results of recordings, which are not analysed again
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,

@@ -11,7 +11,7 @@ use crate::orders::parse_numbers;
 
 #[derive(Debug, Args)]
 pub struct InfoArgs {
-    #[arg(value_name = "FILE", help = format!("File of any format that is read: {}", readable_endings()))]
+    #[arg(value_name = "FILE", help = format!("File to inspect: {}", readable_endings()))]
     pub file: PathBuf,
     #[command(flatten)]
     pub look: LookArgs,
@@ -23,8 +23,7 @@ pub struct InfoArgs {
 #[derive(Debug, Args)]
 #[command(group(clap::ArgGroup::new("what").required(true).args(["f", "operator", "transfer_function"])))]
 pub struct ConvertArgs {
-    /// F of the discrete operator: f1,f2 for a gain with a lead; one or three coefficients for
-    /// another form of the family
+    /// F of the discrete operator: f1,f2 for a gain with a lead; one or three coefficients for other forms
     #[arg(
         long,
         value_name = "F1,F2,...",
@@ -34,7 +33,7 @@ pub struct ConvertArgs {
         requires = "b"
     )]
     pub f: Option<Vec<f64>>,
-    /// B of the discrete operator: b0,b1, or as many as there are
+    /// B of the discrete operator: b0,b1, or as many coefficients as the form has
     #[arg(
         long,
         value_name = "B0,B1,...",
@@ -47,12 +46,10 @@ pub struct ConvertArgs {
     /// Delay of b0 in samples
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub nk: usize,
-    /// Operator parameters: K_e=.09,T_L=.4,omega_nm=11.25,zeta_nm=.35,tau_e=.28 (K_e_dot may
-    /// represent T_L)
+    /// Operator parameters: K_e=.09,T_L=.4,omega_nm=11.25,zeta_nm=.35,tau_e=.28 (K_e_dot may replace T_L)
     #[arg(long, value_name = "LIST", value_parser = parse_numbers, allow_hyphen_values = true)]
     pub operator: Option<std::vec::Vec<(String, f64)>>,
-    /// Transfer function to discretise, as (s+2)/(s^2+3s+4), or NUM/DEN by descending powers of s, as
-    /// 1,2/1,3,4
+    /// Transfer function to discretise, as (s+2)/(s^2+3s+4), or NUM/DEN in descending powers of s, as 1,2/1,3,4
     #[arg(long, value_name = "H", allow_hyphen_values = true)]
     pub transfer_function: Option<ContinuousTransferFunction>,
     /// Discretisation of the transfer function

@@ -27,19 +27,19 @@ pub struct DescribeArgs {
     #[command(flatten)]
     pub faults: FaultArgs,
     #[arg(long, value_name = "COLUMN", help = format!(
-        "Column of the recorded disturbance or target. Its lines are found in it; the span must be whole periods \
-         [default: the first of {} that there is with lines]",
+        "Column of the recorded disturbance or target, in which the lines are found; the span must be whole periods \
+         [default: the first of {} with lines]",
         COMMON_EXCITATIONS.join(", ")
     ))]
     pub excitation: Option<String>,
-    /// Lines of the excitation in rad/s, as 0.63,1.57,2.2; they need --period [default: those found]
+    /// Excitation lines in rad/s, as 0.63,1.57,2.2; requires --period [default: the lines found]
     #[arg(long, value_name = "LIST", value_delimiter = ',', requires = "period")]
     pub lines: Option<Vec<f64>>,
-    /// Period of the excitation in s [default: the longest that all lines found have in common]
+    /// Period of the excitation in s [default: shortest common period of the lines found]
     #[arg(long, value_name = "S")]
     pub period: Option<f64>,
-    /// Controlled element in s, as 90/(s(s+6)), or NUM/DEN by descending powers of s, as 90/1,6,0:
-    /// adds crossover frequency and margins
+    /// Controlled element in s, as 90/(s(s+6)), or NUM/DEN in descending powers of s, as 90/1,6,0: adds crossover
+    /// frequency and margins
     #[arg(long, value_name = "ELEMENT", allow_hyphen_values = true)]
     pub controlled_element: Option<ContinuousTransferFunction>,
     #[command(flatten)]

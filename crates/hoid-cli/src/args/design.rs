@@ -10,89 +10,90 @@ use super::{choices::choice_of, figure::FigureArgs, parse::parse_span, show::Sho
 
 #[derive(Debug, Args)]
 pub struct DesignArgs {
-    /// The people: population (as people are known to adapt to the controlled element), a scenario of the family (.toml),
-    /// a fit that `hoid identify --json` printed, the directory that `hoid group --out` wrote, its JSON or its
-    /// population.json. Of several people the errors of the typical one and of the worst one are reported
+    /// The people: population (people in general, adapted to the controlled element), a scenario of the family (.toml),
+    /// a fit (`hoid identify --json`), the directory of `hoid group --out`, its JSON or its population.json. For
+    /// several people, the errors of the typical and the worst person are reported
     #[arg(long, value_name = "population|FILE|DIR", default_value = "population")]
     pub people: People,
-    /// The condition of a group that has several
+    /// Condition, for a group with several
     #[arg(long, value_name = "NAME")]
     pub condition: Option<String>,
-    /// Form of the population's operator: gain, lead, lag, lead-lag ... [default: the one that people use with the element]
+    /// Form of the population's operator [default: the form that people use with the element]
     #[arg(long, value_name = "FORM", value_parser = choice_of(&Form::OF_ERROR))]
     pub form: Option<Form>,
-    /// The controlled element, as 90/(s(s+6)) or 90/1,6,0 [default: that of the scenario or group]
+    /// Controlled element, as 90/(s(s+6)) or 90/1,6,0 [default: that of the scenario or group]
     #[arg(long, value_name = "TF")]
     pub controlled_element: Option<ContinuousTransferFunction>,
-    /// The quantities requested, with the standard error that is accepted: crossover=3%,tau_e=5%,phase_margin=2 (deg), tau_f=0.02 (s)
-    /// [default: all parameters alike]
+    /// Quantities with their accepted standard errors: crossover=3%,tau_e=5%,phase_margin=2 (deg), tau_f=0.02 (s)
+    /// [default: all parameters equally]
     #[arg(long = "for", value_name = "LIST", value_delimiter = ',')]
     pub wanted: Vec<Wanted>,
-    /// The forcing function is a disturbance at the input of the controlled element, not a target
+    /// Apply the forcing function as a disturbance at the input of the controlled element, not as a target
     #[arg(long)]
     pub disturbance: bool,
     /// Share of the remnant in the variance of u
     #[arg(long, value_name = "P", default_value_t = Remnant::default().share)]
     pub remnant_share: f64,
-    /// Time constant of the remnant, of first order, in s; 0 is white
+    /// Time constant of the first-order remnant in s; 0 for white
     #[arg(long, value_name = "S", default_value_t = Remnant::default().time_constant_s)]
     pub remnant_time_constant: f64,
-    /// Length of a run in s: the period of the forcing function
+    /// Length of a run in s (the period of the forcing function)
     #[arg(long, value_name = "S", default_value_t = 81.92)]
     pub length: f64,
-    /// Number of runs [default: the number for the target, else 1]
+    /// Number of runs [default: the number needed for --for, else 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub runs: Option<u32>,
-    /// Lines of the forcing function, of each of two
+    /// Lines of each forcing function
     #[arg(long, value_name = "N", default_value_t = 10)]
     pub lines: usize,
-    /// Least distance of two lines, in multiples of the fundamental 1/length
+    /// Minimum distance between lines, in multiples of the fundamental 1/length
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
     pub spacing: u32,
     /// Lowest and highest frequency of the lines, rad/s
     #[arg(long, value_name = "LO..HI", default_value = "0.2..18", value_parser = parse_span)]
     pub band: (f64, f64),
-    /// Greatest amplitude of a line beyond the crossover, as a part of the mean of those below: of more, people let the crossover
-    /// fall
+    /// Largest amplitude of a line above the crossover, as a fraction of the mean of those below: with more, people
+    /// lower their crossover
     #[arg(long, value_name = "PART", default_value_t = 0.2)]
     pub shelf: f64,
-    /// Greatest rms of the error; without this and --max-u the forcing function has an rms of 1
+    /// Largest rms of the error; without this and --max-u, the forcing function has an rms of 1
     #[arg(long, value_name = "RMS")]
     pub max_rms_e: Option<f64>,
-    /// Greatest rms of the control
+    /// Largest rms of the control
     #[arg(long, value_name = "RMS")]
     pub max_u: Option<f64>,
-    /// A forcing function to be judged next to it: a scenario with a target or disturbance (or both), a table of lines (columns
-    /// omega_rad_s, amplitude, phase_rad), or reference (the ten sines of the text)
+    /// Forcing function to compare with the design: a scenario with a target or disturbance (or both), a table of lines
+    /// (columns omega_rad_s, amplitude, phase_rad), or reference (the ten sines of the thesis)
     #[arg(long, value_name = "FORCING.toml|.csv|reference")]
     pub against: Option<Against>,
-    /// Difference between two conditions to be found, each person in both: crossover=.5 (rad/s), phase_margin=5 (deg),
-    /// tau_e=10% (of its value). The answer is the number of people and of runs in each condition
+    /// Difference to detect between two conditions, with each person in both: crossover=.5 (rad/s), phase_margin=5
+    /// (deg), tau_e=10% (of its value). Reports the number of people, and of runs in each condition
     #[arg(long, value_name = "NAME=SIZE")]
     pub difference: Option<Sought>,
-    /// Probability with which the difference is to be found
+    /// Power: probability of detecting the difference
     #[arg(long, value_name = "P", default_value_t = POWER, requires = "difference")]
     pub power: f64,
-    /// Level of the test of the difference, of both sides
+    /// Two-sided significance level of the test
     #[arg(long, value_name = "P", default_value_t = ALPHA, requires = "difference")]
     pub alpha: f64,
-    /// Standard deviation of the difference between people, as a part of the quantity (of the phase margin: as by a gain
-    /// of this spread), or a file that has it: what `hoid compare --json` printed, the result of a group with several
-    /// conditions, a population.json [default: that of --people if it has one, else .1]
+    /// Standard deviation of the difference between people, as a fraction of the quantity (phase margin: as caused by
+    /// this spread of the gain), or a file with it: output of `hoid compare --json`, the result of a group with several
+    /// conditions, or a population.json [default: from --people if available, else .1]
     #[arg(long, value_name = "PART|FILE", requires = "difference")]
     pub between_people: Option<Between>,
-    /// Standard deviation of a person from run to run, likewise
+    /// Standard deviation of a person from run to run, as a fraction in the same way
     #[arg(long, value_name = "PART", default_value_t = RUN_TO_RUN, requires = "difference")]
     pub run_to_run: f64,
-    /// Display of the task: compensatory (error only), pursuit (target and output), preview (and its future). On the last
-    /// two a target and a disturbance are designed, on lines of their own, which separate the responses to error and target
+    /// Display of the task: compensatory (error only), pursuit (target and output), preview (also the future target).
+    /// For the last two, a target and a disturbance with different lines are designed, to separate the responses to
+    /// error and target
     #[arg(long, value_name = "NAME", default_value = "compensatory", value_parser = choice_of(&Display::ALL))]
     pub display: Display,
-    /// Start of the search for phases: each gives other phases of the same lines; the same seed gives the same design
+    /// Seed of the phase search: another seed gives other phases of the same lines, the same seed the same design
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
     /// Directory for the design: design.json, scenario.toml, lab.toml, forcing.csv, design.csv and .md, design.svg,
-    /// runs.svg; with --difference power.csv
+    /// runs.svg; with --difference also power.csv
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     #[command(flatten)]

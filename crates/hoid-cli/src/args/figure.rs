@@ -8,10 +8,10 @@ use super::parse::parse_width;
 
 #[derive(Debug, Args)]
 pub struct FigureArgs {
-    /// Draw what was found into this file (.svg; .pdf and .png where built with --features pdf-png)
+    /// Draw the result (.svg; .pdf and .png if built with --features pdf-png)
     #[arg(long, value_name = "FILE")]
     pub figure: Option<PathBuf>,
-    /// Width of the figure, as 85mm, 17cm or 3.3in [default: 420 pixels]
+    /// Figure width, as 85mm, 17cm or 3.3in [default: 420 pixels]
     #[arg(long, value_name = "WIDTH", value_parser = parse_width, requires = "figure")]
     pub width: Option<f64>,
 }

@@ -20,29 +20,29 @@ pub struct GroupArgs {
 
 #[derive(Debug, Subcommand)]
 pub enum GroupCommand {
-    /// Write a manifest of the files in a directory, to be looked through and completed
+    /// Write a manifest of the files in a directory, to be checked and completed
     Init(GroupInitArgs),
 }
 
 #[derive(Debug, Args)]
 pub struct GroupRunArgs {
-    /// Manifest in TOML, or a directory with group.toml
+    /// Manifest (TOML), or a directory with group.toml
     #[arg(value_name = "DIR|MANIFEST", required = true)]
     pub manifest: Option<PathBuf>,
-    /// Directory for tables, report and parts; it is made if it is missing
+    /// Directory for tables, report and parts; created if missing
     #[arg(long, value_name = "DIR", required = true)]
     pub out: Option<PathBuf>,
-    /// Threads. Default: one a core
+    /// Threads [default: one per core]
     #[arg(long, value_name = "J", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
-    /// Continue with a group that was stopped
+    /// Resume a stopped group
     #[arg(long)]
     pub resume: bool,
-    /// Write CSV next to Parquet
+    /// Write CSV as well as Parquet
     #[arg(long)]
     pub csv: bool,
-    /// Estimate each person from all of them too: pooled.csv, and population.json (of several conditions
-    /// population-NAME.json), which --prior reads
+    /// Also estimate each person with the data of all: pooled.csv, and population.json (population-NAME.json for
+    /// several conditions), which --prior reads
     #[arg(long)]
     pub pool: bool,
     #[command(flatten)]
@@ -53,17 +53,17 @@ pub struct GroupRunArgs {
 
 #[derive(Debug, Args)]
 pub struct GroupInitArgs {
-    /// Directory with one file a run
+    /// Directory with one file per run
     #[arg(value_name = "DIR")]
     pub directory: PathBuf,
-    /// Names of the files: {subject}, {condition}, {axis} and {run} represent what is taken from them, *
-    /// for anything; the condition of an axis is CONDITION-AXIS
+    /// Pattern of the file names: {subject}, {condition}, {axis} and {run} are read from them, * matches anything; the
+    /// condition of an axis is CONDITION-AXIS
     #[arg(long, value_name = "PATTERN", default_value = "{subject}_{condition}_{run}.csv")]
     pub pattern: String,
     #[command(flatten)]
     pub look: LookArgs,
-    /// Controlled element of the named conditions, and where it changes the element after it, the time in
-    /// s, and the rate G in 1/s (left out: sudden); * matches anything. May be repeated
+    /// Controlled element of the named conditions; if it changes, also the new element, the time in s and the rate G in
+    /// 1/s (without G: sudden); * matches anything. May be repeated
     #[arg(
         long,
         value_name = "NAMES=ELEMENT[>ELEMENT@S[:G]]",
@@ -71,11 +71,11 @@ pub struct GroupInitArgs {
         conflicts_with = "controlled_element"
     )]
     pub element: Vec<ConditionElement>,
-    /// Samples by which the control is recorded later than the error that it answers
-    /// [default: by the controlled element, else 0]
+    /// Samples by which the control is recorded later than the error [default: found with the controlled element, else
+    /// 0]
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     pub offset: Option<f64>,
-    /// The manifest; standard output where it is -. Default: group.toml in the directory
+    /// Manifest to write, - for standard output [default: group.toml in the directory]
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }
@@ -85,16 +85,16 @@ pub struct SimulateGroupArgs {
     /// Directory for the files, truth.csv and group.toml
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Subjects
+    /// Number of subjects
     #[arg(long, value_name = "N", default_value_t = 3)]
     pub subjects: u64,
-    /// People like people in place of subjects near the thesis: drawn over the family of operators,
-    /// on the elements of --plants, columns t, e, u, d, y
+    /// Simulate realistic people instead of subjects near the thesis: drawn from the family of operators, with the
+    /// elements of --plants and columns t, e, u, d, y
     #[arg(long, conflicts_with_all = ["conditions", "between_subjects", "remnant_order", "noise_level"])]
     pub people: bool,
     #[command(flatten)]
     pub people_options: PeopleOptions,
-    /// Conditions, separated by commas
+    /// Conditions, comma-separated
     #[arg(
         long,
         value_name = "LIST",
@@ -120,8 +120,7 @@ pub struct SimulateGroupArgs {
     /// Seed of the random streams
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Problems with the sampling: jitter, missing, repeated, slow-clock, saturated, quantised,
-    /// stalled
+    /// Recording problems to add: jitter, missing, repeated, slow-clock, saturated, quantised, stalled
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_trouble)]
     pub trouble: Vec<SamplingDefect>,
 }
@@ -129,7 +128,7 @@ pub struct SimulateGroupArgs {
 /// Additional options of --people.
 #[derive(Debug, Args)]
 pub struct PeopleOptions {
-    /// With --people: controlled elements 1/s, 1/(s(s+1)), 1/s^2 by name, separated by commas
+    /// With --people: controlled elements (1/s, 1/(s(s+1)), 1/s^2) by name, comma-separated
     #[arg(
         long,
         value_name = "LIST",
@@ -143,7 +142,7 @@ pub struct PeopleOptions {
     /// others]
     #[arg(long, value_name = "FORM", requires = "people", value_parser = choice_of(&Form::ALL))]
     pub form: Option<Form>,
-    /// With --people: kinds of remnant, separated by commas, subject after subject
+    /// With --people: kinds of remnant, comma-separated, assigned to subjects in turn
     #[arg(
         long,
         value_name = "LIST",
@@ -153,7 +152,7 @@ pub struct PeopleOptions {
         value_parser = choice_of(&RemnantKind::ALL)
     )]
     pub remnants: Vec<RemnantKind>,
-    /// With --people: share of the remnant in the variance of u
+    /// With --people: range of the remnant's share in the variance of u
     #[arg(long, value_name = "LO..HI", requires = "people", default_value = "0.05..0.5", value_parser = parse_span)]
     pub remnant_share: (f64, f64),
     /// With --people: sample time in s [default: 1/60]

@@ -26,47 +26,47 @@ use super::{
 #[derive(Debug, Args)]
 pub struct IdentifyArgs {
     #[arg(required = true, value_name = "RECORD", help = format!(
-        "Record files: {}; several share one model and have initial states of their own",
+        "Record files: {}; several share one model, each with its own initial states",
         readable_endings()
     ))]
     pub records: Vec<PathBuf>,
     #[command(flatten)]
     pub read: ReadArgs,
-    /// Error and control of an axis, as ex,ux, or with its recorded excitation, as ex,ux,rx. Repeat it for
-    /// each axis: each has an operator of its own, and the coupling between them is tested
+    /// Error and control of an axis, as ex,ux, or with its recorded excitation, as ex,ux,rx. Repeat for each axis: each
+    /// has its own operator, and the coupling between axes is tested
     #[arg(long, value_name = "INPUT,OUTPUT[,EXCITATION]", conflicts_with_all = ["input", "output"], allow_hyphen_values = true)]
     pub pair: Vec<AxisPair>,
     #[command(flatten)]
     pub mask: MaskArgs,
     #[command(flatten)]
     pub faults: FaultArgs,
-    /// The fitted model: operator (the operator of a person), or a polynomial structure [default: operator; that of
-    /// --method; bj with options that polynomials alone have, as --nk]
+    /// Model to fit: operator (human operator) or a polynomial structure [default: operator; that of --method; bj with
+    /// options that only polynomials have, as --nk]
     #[arg(long, value_name = "NAME", value_parser = structures(), ignore_case = true)]
     pub structure: Option<String>,
-    /// How polynomials are fitted: pem the prediction error method; iv4 (for arx), sriv (for oe), rivbj (for
-    /// bj) instrumental variables
+    /// Fitting method for polynomials: pem (prediction error), or instrumental variables: iv4 (for arx), sriv (for oe),
+    /// rivbj (for bj)
     #[arg(long, value_name = "NAME", default_value = PEM, value_parser = PossibleValuesParser::new(fit_methods()))]
     pub method: String,
     #[command(flatten)]
     pub options: SettingArgs<Batch>,
     #[arg(long, value_name = "FILE", help = format!(
-        "Write what changes (K_e, T_L, K_e_dot; K, T_L of another form) over time into this file, with --change sigmoid: {}",
+        "With --change sigmoid: write K_e, T_L, K_e_dot (K, T_L of other forms) over time to this file: {}",
         writable_endings()
     ))]
     pub trace: Option<PathBuf>,
-    /// Discretisation that is inverted to get T_n and K_n from the noise model
+    /// Discretisation inverted to get T_n and K_n from the noise model
     #[arg(long, value_name = "NAME", default_value = "zoh", value_parser = choice_of(&RemnantDiscretisation::ALL))]
     pub remnant_discretisation: RemnantDiscretisation,
     #[command(flatten)]
     pub picture: FigureArgs,
-    /// Also judge the prediction K samples ahead
+    /// Also evaluate the prediction K samples ahead
     #[arg(long, value_name = "K", value_parser = parse_horizon)]
     pub horizon: Option<usize>,
-    /// Another record to judge the model on
+    /// Evaluate the model on this other record
     #[arg(long, value_name = "FILE")]
     pub validate: Option<PathBuf>,
-    /// Write a report (HTML) into this directory
+    /// Write an HTML report to this directory
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
     #[command(flatten)]

@@ -10,34 +10,33 @@ use super::reading::{parse_time, parse_trial};
 /// Options given by the user, which are therefore not searched for.
 #[derive(Debug, Args)]
 pub struct LookArgs {
-    /// Column of the input (tracking error), or a difference such as r-y [default: by its name]
+    /// Input column (tracking error), or a difference such as r-y [default: by name]
     #[arg(long, value_name = "COLUMN", allow_hyphen_values = true)]
     pub input: Option<String>,
-    /// Column of the output (control) [default: by its name]
+    /// Output column (control) [default: by name]
     #[arg(long, value_name = "COLUMN", allow_hyphen_values = true)]
     pub output: Option<String>,
-    /// Column of the excitation, or none [default: the one whose power is in lines]
+    /// Excitation column, or none [default: the column with a line spectrum]
     #[arg(long, value_name = "COLUMN|none")]
     pub excitation: Option<String>,
-    /// Controlled element in s, as 90/(s(s+6)) or 90/1,6,0; with it, and a column y, it is found by how
-    /// many samples the control was recorded late
+    /// Controlled element in s, as 90/(s(s+6)) or 90/1,6,0: finds by how many samples the control was recorded late, if
+    /// every target and disturbance is recorded
     #[arg(long, value_name = "ELEMENT", value_parser = parse_element, allow_hyphen_values = true)]
     pub controlled_element: Option<(String, ContinuousTransferFunction)>,
-    /// Column of the time, and its unit after a colon: s, ms, us, ns, min, h, iso, sec+nanosec
-    /// [default: t, or a default name of a time]
+    /// Time column, and its unit: s, ms, us, ns, min, h, iso, sec+nanosec [default: t, or a column recognised as time]
     #[arg(long, value_name = "COLUMN[:UNIT]", value_parser = parse_time)]
     pub time: Option<TimeChoice>,
-    /// Column that counts the trials of a file, each a record of its own (t: where the time starts again),
-    /// or one of them, as trial=3 [default: where t starts again]
+    /// Column that numbers the trials, each a separate record (t: where time restarts), or one trial, as trial=3
+    /// [default: where t restarts]
     #[arg(long, value_name = "COLUMN[=VALUE]", value_parser = parse_trial)]
     pub trial: Option<TrialChoice>,
     /// Sampling frequency in Hz; replaces the column t
     #[arg(long, value_name = "HZ")]
     pub fs: Option<f64>,
-    /// Start of the span that counts, s [default: whole periods of the excitation]
+    /// Start of the span to use, s [default: whole periods of the excitation]
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub from: Option<f64>,
-    /// End of the span that counts, s
+    /// End of the span to use, s
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub to: Option<f64>,
 }

@@ -9,7 +9,7 @@ use super::choices::choice_of;
 /// How record files are read.
 #[derive(Debug, Clone, Args)]
 pub struct ReadArgs {
-    /// Column of the input (tracking error): a name, -name, or a difference such as r-y; repeat it for more inputs
+    /// Input column (tracking error): a name, -name, or a difference such as r-y; repeat for more inputs
     #[arg(
         id = "input",
         long = "input",
@@ -18,43 +18,43 @@ pub struct ReadArgs {
         allow_hyphen_values = true
     )]
     pub inputs: Vec<String>,
-    /// Column of the output (control): a name, -name, or a difference
+    /// Output column (control): a name, -name, or a difference
     #[arg(long, value_name = "COLUMN", default_value = "u", allow_hyphen_values = true)]
     pub output: String,
-    /// Column of the time, and its unit after a colon where it is not found automatically: s, ms, us, ns, min, h, iso
-    /// (dates and times), sec+nanosec [default: t, or a default name of a time]
+    /// Time column, and its unit if it is not recognised: s, ms, us, ns, min, h, iso (dates and times), sec+nanosec
+    /// [default: t, or a column recognised as time]
     #[arg(long, value_name = "COLUMN[:UNIT]", value_parser = parse_time)]
     pub time: Option<TimeChoice>,
-    /// Column that counts the trials of a file, each a record of its own (t: where the time starts again),
-    /// or one of them, as trial=3 [default: where t starts again]
+    /// Column that numbers the trials, each a separate record (t: where time restarts), or one trial, as trial=3
+    /// [default: where t restarts]
     #[arg(long, value_name = "COLUMN[=VALUE]", value_parser = parse_trial)]
     pub trial: Option<TrialChoice>,
-    /// Sampling frequency in Hz; without it column t (in s) gives the sampling
+    /// Sampling frequency in Hz [default: from column t, in s]
     #[arg(long, value_name = "HZ")]
     pub fs: Option<f64>,
     /// Start of the span to use, s
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub from: Option<f64>,
-    /// End of the span to use (not included), s
+    /// End of the span to use (excluded), s
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub to: Option<f64>,
-    /// Bring unevenly sampled data onto an even grid by linear interpolation
+    /// Interpolate unevenly sampled data linearly onto an even grid
     #[arg(long)]
     pub resample: bool,
-    /// Bridge missing values (empty, NaN) by linear interpolation
+    /// Interpolate missing values (empty, NaN) linearly
     #[arg(long)]
     pub fill: bool,
-    /// A column logged at instants of its own, so that some rows lack it: hold the last value, draw straight lines
-    /// (linear), or drop those rows. May be repeated
+    /// Column logged at its own times and missing in some rows: hold the last value, interpolate (linear), or drop
+    /// those rows. May be repeated
     #[arg(long, value_name = "COLUMN=hold|linear|drop", value_parser = parse_sparse, value_delimiter = ',', allow_hyphen_values = true)]
     pub sparse: Vec<(String, Sparse)>,
-    /// Columns to keep beyond input, output and time, as f_t,r or none: of a long CSV file the others take neither time
-    /// nor memory [default: all]
+    /// Columns to keep besides input, output and time, as f_t,r or none; saves time and memory for long CSV files
+    /// [default: all]
     #[arg(long, value_name = "COLUMN,...", value_delimiter = ',')]
     pub columns: Option<Vec<String>>,
     #[command(flatten)]
     pub prepare: PrepareArgs,
-    /// Take out the mean or the straight line of input and output, last
+    /// Finally, remove the mean or linear trend of input and output
     #[arg(long, value_name = "HOW", default_value = "none", value_parser = choice_of(&Detrend::ALL))]
     pub detrend: Detrend,
 }
@@ -83,28 +83,26 @@ impl ReadArgs {
 /// Treatment of a record before it is used, in this order.
 #[derive(Debug, Clone, Args)]
 pub struct PrepareArgs {
-    /// Units that the file does not report, as e=deg,u=deg: units are printed only where they are
-    /// declared
+    /// Units that the file lacks, as e=deg,u=deg; only declared units are printed
     #[arg(long, value_name = "CHANNEL=UNIT", value_parser = parse_unit, value_delimiter = ',')]
     pub unit: Vec<(String, String)>,
-    /// Drop rows that are duplicated, time included
+    /// Drop duplicate rows (time included)
     #[arg(long)]
     pub drop_repeated: bool,
-    /// Multiply a channel: by a factor (u=12.5), into a unit (u=12.5:deg), or from unit to unit
-    /// (e=rad:deg). A channel is a column, or e and u for input and output. May be repeated
+    /// Scale a channel by a factor (u=12.5), to a unit (u=12.5:deg), or from unit to unit (e=rad:deg). A channel is a
+    /// column, or e or u for input or output. May be repeated
     #[arg(long, value_name = "CHANNEL=FACTOR", value_parser = parse_scale, allow_hyphen_values = true)]
     pub scale: Vec<(String, Scaling)>,
-    /// A channel that was recorded late, by samples (u=1) or seconds (u=0.0167s); parts of a sample
-    /// by band-limited interpolation. May be repeated
+    /// Advance a channel recorded late, by samples (u=1) or seconds (u=0.0167s); fractions by band-limited
+    /// interpolation. May be repeated
     #[arg(long, value_name = "CHANNEL=N|Ss", value_parser = parse_offset, allow_hyphen_values = true)]
     pub offset: Vec<(String, Offset)>,
     #[command(flatten)]
     pub rate: DecimateArgs,
-    /// Bring evenly sampled data to another sampling frequency in Hz, after a low-pass filter on
-    /// all channels alike
+    /// Resample evenly sampled data to this frequency in Hz, after a low-pass filter on all channels
     #[arg(long, value_name = "HZ", conflicts_with = "decimate")]
     pub new_fs: Option<f64>,
-    /// Drop the first seconds of the data read
+    /// Drop the first S seconds of the data read
     #[arg(long, value_name = "S")]
     pub run_in: Option<f64>,
 }
@@ -112,9 +110,8 @@ pub struct PrepareArgs {
 /// Whether the sampling rate is lowered.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct DecimateArgs {
-    /// Keep every M-th sample after a linear-phase low-pass filter on all channels alike; auto: above 200 Hz by the M
-    /// that comes nearest to 100 Hz, where an operator is fitted or tracked. A polynomial structure, and a delay in
-    /// samples, take the samples as they are unless M is named
+    /// Keep every M-th sample after a linear-phase low-pass filter on all channels; auto: reduces rates above 200 Hz to
+    /// nearly 100 Hz, except for polynomial structures and delays in samples
     #[arg(long, value_name = "auto|off|M", default_value_t = Decimation::Auto)]
     pub decimate: Decimation,
 }
@@ -133,11 +130,10 @@ impl DecimateArgs {
 /// Parts that are left out of a record.
 #[derive(Debug, Args)]
 pub struct MaskArgs {
-    /// Leave out the problems of the sampling (see `hoid info`): the record is cut there, and each
-    /// segment has initial states of its own
+    /// Cut these sampling problems out of the record (see `hoid info`); each segment has its own initial states
     #[arg(long, value_name = "KINDS", value_delimiter = ',', value_parser = choice_of(&QualityIssueKind::MASKABLE))]
     pub mask: Vec<QualityIssueKind>,
-    /// Shortest segment between masked samples that is used, s
+    /// Shortest segment to use between masked samples, s
     #[arg(long, value_name = "S", default_value_t = 2.0)]
     pub shortest: f64,
 }
@@ -145,8 +141,8 @@ pub struct MaskArgs {
 /// Treatment of faults of a recording.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct FaultArgs {
-    /// Faults of the recording (spikes, dropouts, frozen and idle stretches, wraps, steps): bridge faults of up to 0.1
-    /// s and cut the record at longer ones, cut all, report and leave the data as they are, or keep: look for none
+    /// Recording faults (spikes, dropouts, frozen and idle stretches, wraps, steps): bridge faults up to 0.1 s and cut
+    /// the record at longer ones, cut at all, only report, or keep (no search)
     #[arg(long, value_name = "WHAT", default_value = "bridge", value_parser = choice_of(&FaultHandling::ALL))]
     pub faults: FaultHandling,
 }

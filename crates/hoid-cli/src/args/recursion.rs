@@ -24,42 +24,40 @@ use super::{
 /// The tracked signal, and how.
 #[derive(Debug, Args)]
 pub struct RecursionArgs {
-    /// The recursion
+    /// Recursive method
     #[arg(long, value_name = "NAME", long_help = method_help(), default_value_t = Method::default().name().to_owned(), value_parser = method_names())]
     pub method: String,
     /// Polynomial structure [default: arx for rls, else bj]
     #[arg(long, value_name = "NAME", value_parser = choice_of(&Structure::ALL))]
     pub structure: Option<Structure>,
-    /// Orders, each a number or a range to search on the start span, as nb=2,nc=0,nd=1..4,nf=2
-    /// [default: the operator's: bj nb=2,nd=1..4,nf=2, for adaptive nd=16, for multiple-model nd=6; arx
-    /// na=2,nb=2]
+    /// Orders, or ranges to search on the start span, as nb=2,nc=0,nd=1..4,nf=2 [default: the operator's: bj
+    /// nb=2,nd=1..4,nf=2, for adaptive nd=16, for multiple-model nd=6; arx na=2,nb=2]
     #[arg(long, value_name = "LIST")]
     pub orders: Option<String>,
-    /// Delay of b0 in samples (29), or dead time in s (0.28s); a number or a range (20..40,
-    /// 0.1s..0.4s) to search on the start span [default: 0.05 to 0.6 s; adaptive starts at 0.2 s and
-    /// follows the delay]
+    /// Delay of b0 in samples (29) or dead time in s (0.28s), or a range (20..40, 0.1s..0.4s) to search on the start
+    /// span [default: 0.05 to 0.6 s; adaptive starts at 0.2 s and tracks the delay]
     #[arg(long, value_name = "N|Ss|LO..HI")]
     pub nk: Option<DelayRange>,
-    /// Dead time tau_e in s in place of --nk: .28, or a range (0.1..0.4) to search on the start span
+    /// Dead time tau_e in s instead of --nk: .28, or a range (0.1..0.4) to search on the start span
     #[arg(long, value_name = "S|LO..HI", conflicts_with = "nk")]
     pub delay: Option<OneOrSpan>,
-    /// Criterion that decides between candidates when something is searched
+    /// Criterion that selects among searched candidates
     #[arg(long, value_name = "NAME", default_value = "bic", value_parser = choice_of(&Criterion::ALL))]
     pub criterion: Criterion,
-    /// Where the recursion starts: all coefficients as f1=-1.9,f2=.92,b0=.04,... or `nothing`
-    /// [default: a batch fit of the start span, or of the warm-up; adaptive starts from --prior]
+    /// Start of the recursion: all coefficients, as f1=-1.9,f2=.92,b0=.04,..., or `nothing` [default: a batch fit of
+    /// the start span or warm-up; adaptive starts from --prior]
     #[arg(long, value_name = "LIST|nothing", allow_hyphen_values = true)]
     pub start: Option<String>,
     #[command(flatten)]
     pub settings: SettingArgs,
-    /// Magnitude of e or u beyond which a sample is taken for a fault and skipped
+    /// Magnitude of e or u above which a sample is skipped as faulty
     #[arg(long, value_name = "X", default_value = "1e6")]
     pub largest: f64,
-    /// Frequencies in rad/s at which gain and phase are reported, with errors, as 0.5,1,2.5
+    /// Report gain and phase, with errors, at these frequencies in rad/s, as 0.5,1,2.5
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub at: Vec<f64>,
-    /// Controlled element in s, as 90/(s(s+6)), or NUM/DEN by descending powers of s, as 90/1,6,0:
-    /// adds crossover frequency and phase margin, with errors
+    /// Controlled element in s, as 90/(s(s+6)), or NUM/DEN in descending powers of s, as 90/1,6,0: adds crossover
+    /// frequency and phase margin, with errors
     #[arg(long, value_name = "ELEMENT", allow_hyphen_values = true)]
     pub controlled_element: Option<ContinuousTransferFunction>,
 }
@@ -71,45 +69,44 @@ pub struct TrackArgs {
     pub record: Option<PathBuf>,
     #[command(flatten)]
     pub read: ReadArgs,
-    /// List all methods, those for comparison too: what each is, its structures and its source. No RECORD is read
+    /// List all methods, including those for comparison, with description, structures and source. Reads no RECORD
     #[arg(long, conflicts_with = "record")]
     pub methods: bool,
     #[command(flatten)]
     pub recursion: RecursionArgs,
-    /// Span of the start fit, s, for methods that have one [default: the first third of the record]
+    /// Span of the start fit, s, for methods with one [default: the first third of the record]
     #[arg(long, value_name = "S..S", value_parser = parse_span, allow_hyphen_values = true)]
     pub start_span: Option<(f64, f64)>,
-    /// Time from which the estimate moves, s; before it only the filters follow
-    /// [default: the end of the start span; the first sample with --covariance or --start]
+    /// Time from which the estimate is updated, s; before it, only the filters run [default: the end of the start span;
+    /// the first sample with --covariance or --start]
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub update_from: Option<f64>,
-    /// A second run of the same person in the same task: the start covariance (--covariance) is the one
-    /// whose trace explains most of it (VAF) [for methods with --covariance]
+    /// Second run of the same person in the same task: selects the start covariance (--covariance) whose trace explains
+    /// most of it (VAF) [for methods with --covariance]
     #[arg(long, value_name = "FILE")]
     pub validate: Option<PathBuf>,
-    /// With --validate: P is not chosen at the start but made smaller in course, every half a second in
-    /// which the estimate has come to explain less of the second run
+    /// With --validate: instead of selecting P at the start, reduce it after every half second in which the estimate
+    /// explains less of the second run than before
     #[arg(long, requires = "validate")]
     pub update_covariance: bool,
-    /// Mean of the estimate over the last S seconds in place of each; it lags by S/2
+    /// Average the estimate over the last S seconds (lag S/2)
     #[arg(long, value_name = "S")]
     pub moving_average: Option<f64>,
     /// Keep every N-th sample of the trace
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = parse_count)]
     pub every: usize,
     #[arg(long, value_name = "TRACE", help = format!(
-        "File for the trace, the estimate at each sample with its standard errors: {}",
+        "File for the trace (estimate and standard errors at each sample): {}",
         writable_endings()
     ))]
     pub out: Option<PathBuf>,
-    /// Write a report (HTML) into this directory: parameters over time with bands, innovations,
-    /// standard errors
+    /// Write an HTML report to this directory: parameters over time with bands, innovations, standard errors
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
     #[command(flatten)]
     pub picture: FigureArgs,
-    /// Spans in s whose batch fits the report draws as dashed lines, as 0..30.72,51.2..81.92
-    /// [default: the start span and the last third]
+    /// Spans in s, as 0..30.72,51.2..81.92, whose batch fits are dashed lines in the report [default: the start span
+    /// and the last third]
     #[arg(long, value_name = "S..S", value_parser = parse_span, value_delimiter = ',', allow_hyphen_values = true)]
     pub batch: Vec<(f64, f64)>,
     #[command(flatten)]
@@ -126,21 +123,21 @@ pub struct StreamArgs {
     pub rate: DecimateArgs,
     #[command(flatten)]
     pub recursion: RecursionArgs,
-    /// Seconds that are collected before the start fit, for methods that have one [default: 20; none
-    /// with --start]
+    /// Seconds to collect before the start fit, for methods with one [default: 20; none with --start]
     #[arg(long, value_name = "S", conflicts_with = "start")]
     pub warm_up: Option<f64>,
-    /// Print a line for every N-th sample only
+    /// Print a line only for every N-th sample
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = parse_count)]
     pub every: usize,
-    /// Column of the input (tracking error) in the header line, where there is one
+    /// Input column (tracking error) in the header line, if there is one
     #[arg(long, value_name = "NAME", default_value = "e")]
     pub input: String,
-    /// Column of the output (control) in the header line, where there is one
+    /// Output column (control) in the header line, if there is one
     #[arg(long, value_name = "NAME", default_value = "u")]
     pub output: String,
-    /// Samples and answers as datagrams of UDP in place of lines: a line of text, an object of JSON as
-    /// {"t": 0.01, "e": 0.5, "u": -1}, or a struct of C, each answered in kind (text by JSON). Ports of 127.0.0.1, or addresses and ports, as 0.0.0.0:5005:192.168.1.7:5006
+    /// Use UDP datagrams instead of standard input and output: a line of text, a JSON object as {"t": 0.01, "e": 0.5,
+    /// "u": -1}, or a C struct, each answered in kind (text by JSON). Ports on 127.0.0.1, or addresses and ports, as
+    /// 0.0.0.0:5005:192.168.1.7:5006
     #[arg(long, value_name = "IN:OUT")]
     pub udp: Option<UdpPlaces>,
     /// Stream of LabStreamingLayer: in Python, by pyhoid.lsl
@@ -149,7 +146,7 @@ pub struct StreamArgs {
     /// Stream of LabStreamingLayer: in Python, by pyhoid.lsl
     #[arg(long, value_name = "NAME", hide = true)]
     pub lsl_out: Option<String>,
-    /// Multiply e or u: by a factor (u=12.5) or from unit to unit (e=rad:deg). May be repeated
+    /// Scale e or u by a factor (u=12.5) or from unit to unit (e=rad:deg). May be repeated
     #[arg(long, value_name = "e|u=FACTOR", value_parser = super::reading::parse_scale)]
     pub scale: Vec<(String, Scaling)>,
 }
@@ -163,7 +160,7 @@ fn method_help() -> String {
         .map(Method::name)
         .collect();
     format!(
-        "The recursion. For comparison there are also {}; hoid track --methods lists all",
+        "Recursive method. Also for comparison: {}; hoid track --methods lists all",
         others.join(", ")
     )
 }

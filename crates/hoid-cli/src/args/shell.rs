@@ -7,14 +7,14 @@ use clap_complete::Shell;
 
 #[derive(Debug, Args)]
 pub struct CompletionsArgs {
-    /// The shell
+    /// Shell
     #[arg(value_name = "SHELL")]
     pub shell: Shell,
 }
 
 #[derive(Debug, Args)]
 pub struct ManArgs {
-    /// Directory for the pages, one a command; it is made if it is missing
+    /// Directory for the pages; created if missing
     #[arg(value_name = "DIR")]
     pub directory: PathBuf,
 }

@@ -12,7 +12,7 @@ use super::choices::choice_of;
 
 #[derive(Debug, Args)]
 pub struct DemoArgs {
-    /// Directory for the record, the results and the report; it is made if it is missing
+    /// Directory for the record and the reports; created if missing
     #[arg(long, value_name = "DIR", default_value = "hoid-demo")]
     pub out: PathBuf,
     /// Seed of the simulated run
@@ -24,7 +24,7 @@ pub struct DemoArgs {
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
 pub struct ScenarioChoice {
-    /// Condition of the thesis: C1 to C6
+    /// Condition of the thesis
     #[arg(long, value_name = "C1..C6")]
     pub condition: Option<Condition>,
     /// Scenario file (TOML)
@@ -40,10 +40,10 @@ pub struct SimulateArgs {
     /// Order m of the remnant filter, 1 to 4 [default: 1, or the scenario's]
     #[arg(long, value_name = "M")]
     pub remnant_order: Option<usize>,
-    /// Noise level P_n; 0 is a run without remnant [default: 0.1, or the scenario's]
+    /// Noise level P_n; 0 for no remnant [default: 0.1, or the scenario's]
     #[arg(long, value_name = "P_N")]
     pub noise_level: Option<f64>,
-    /// Reference of the noise level: var(u_n)/var(u) or var(n)/var(u) [default: response, or the
+    /// Definition of the noise level: var(u_n)/var(u) (response) or var(n)/var(u) (remnant) [default: response, or the
     /// scenario's]
     #[arg(long, value_name = "WHICH", value_parser = choice_of(&NoiseDefinition::ALL))]
     pub noise_definition: Option<NoiseDefinition>,
@@ -53,24 +53,23 @@ pub struct SimulateArgs {
     /// Sample time Ts in s [default: 0.01, or the scenario's]
     #[arg(long, value_name = "S")]
     pub sample_time: Option<f64>,
-    /// Position of K_c when it changes: in the input matrix (x stays continuous) or in the output
-    /// matrix (as in the thesis) [default: input, or the scenario's]
+    /// Place of a changing K_c: in the input matrix (x stays continuous) or the output matrix (as in the thesis)
+    /// [default: input, or the scenario's]
     #[arg(long, value_name = "WHERE", value_parser = choice_of(&Realisation::ALL))]
     pub realisation: Option<Realisation>,
     /// Seed of the random streams
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Cell of a study, to repeat one of its runs: seed, cell and replication name the random
-    /// stream
+    /// Cell of a study, to repeat one of its runs: seed, cell and replication determine the random stream
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub cell: u64,
-    /// Replication: runs with the same seed and another replication are independent
+    /// Replication: runs with the same seed but different replications are independent
     #[arg(long, value_name = "R", default_value_t = 0)]
     pub replication: u64,
     /// Keep the run-in (t < 0) in the file
     #[arg(long)]
     pub keep_run_in: bool,
-    /// File to write; - writes CSV to standard output
+    /// File to write; - for CSV on standard output
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
 }
@@ -80,13 +79,13 @@ pub struct SimulateArgs {
 pub struct MarginsArgs {
     #[command(flatten)]
     pub base: ScenarioChoice,
-    /// Which state of a scenario that changes
+    /// State of a scenario that changes
     #[arg(long, value_name = "WHICH", default_value = "initial")]
     pub state: StateName,
     /// Noise levels P_n for the remnant gains
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = [0.01, 0.1, 0.2, 0.3])]
     pub noise_levels: Vec<f64>,
-    /// Reference of the noise level: var(u_n)/var(u) or var(n)/var(u)
+    /// Definition of the noise level: var(u_n)/var(u) (response) or var(n)/var(u) (remnant)
     #[arg(long, value_name = "WHICH", default_value = "response", value_parser = choice_of(&NoiseDefinition::ALL))]
     pub noise_definition: NoiseDefinition,
     /// Print one JSON object instead of tables

@@ -9,11 +9,11 @@ use hoid::study::Shard;
 pub enum StudyCommand {
     /// Run a plan, or a shard of it, and summarise the results
     Run(StudyRunArgs),
-    /// Join the shards of a study that were run apart
+    /// Join the shards of a study
     Merge(StudyMergeArgs),
-    /// Check a plan and report what it would do, without running anything
+    /// Check a plan and report what it would do, without running it
     Check(StudyCheckArgs),
-    /// List the plans that come with the program, or write one of them to standard output
+    /// List the built-in plans, or write one to standard output
     Plans(StudyPlansArgs),
     /// Write the JSON schema of plans to standard output
     Schema,
@@ -21,22 +21,22 @@ pub enum StudyCommand {
 
 #[derive(Debug, Args)]
 pub struct StudyRunArgs {
-    /// Plan in TOML, or the name of a plan that comes with the program
+    /// Plan (TOML), or the name of a built-in plan
     #[arg(value_name = "PLAN")]
     pub plan: PathBuf,
-    /// Directory for the results; it is made if it is missing
+    /// Directory for the results; created if missing
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Replications of each cell instead of those of the plan
+    /// Replications of each cell, instead of the plan's
     #[arg(long, value_name = "M")]
     pub replications: Option<u64>,
     /// Run one shard of the study, to be joined by `hoid study merge`
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
-    /// Threads. Default: one a core
+    /// Threads [default: one per core]
     #[arg(long, value_name = "J", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
-    /// Continue with a study that was stopped
+    /// Resume a stopped study
     #[arg(long)]
     pub resume: bool,
     /// Write CSV instead of Parquet
@@ -49,7 +49,7 @@ pub struct StudyRunArgs {
 
 #[derive(Debug, Args)]
 pub struct StudyMergeArgs {
-    /// Directories that `hoid study run --shard` has written, in any order
+    /// Directories written by `hoid study run --shard`, in any order
     #[arg(value_name = "DIR", required = true)]
     pub shards: Vec<PathBuf>,
     /// Directory for the results
@@ -65,39 +65,38 @@ pub struct StudyMergeArgs {
 
 #[derive(Debug, Args)]
 pub struct StudyCheckArgs {
-    /// Plan in TOML, or the name of a plan that comes with the program
+    /// Plan (TOML), or the name of a built-in plan
     #[arg(value_name = "PLAN")]
     pub plan: PathBuf,
 }
 
 #[derive(Debug, Args)]
 pub struct StudyPlansArgs {
-    /// The plan to write out
+    /// Plan to write
     #[arg(value_name = "NAME")]
     pub name: Option<String>,
 }
 
 #[derive(Debug, Args)]
 pub struct ReproduceArgs {
-    /// Tables, figures, appendices, studies, the experiment or the claims, separated by commas, as
-    /// fig-5,table-2,H,recursive,experiment,claims. Default: all
+    /// Tables, figures, appendices, studies, the experiment or the claims, comma-separated, as
+    /// fig-5,table-2,H,recursive,experiment,claims [default: all]
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub only: Vec<String>,
     /// Replications of each cell; 10 for a quick look
     #[arg(long, value_name = "M", default_value_t = 100)]
     pub replications: u64,
-    /// Recorded people in place of virtual ones, with --only experiment: a directory with the manifest that
-    /// `hoid group init` writes, or a manifest
+    /// With --only experiment: recorded people instead of virtual ones, as a manifest (see `hoid group init`) or a
+    /// directory with one
     #[arg(long, value_name = "DIR|MANIFEST")]
     pub recordings: Option<PathBuf>,
-    /// Directory for tables, figures, their data and the index page; studies that are already
-    /// present are not run again
+    /// Directory for tables, figures, their data and the index page; existing studies are not rerun
     #[arg(long, value_name = "DIR", default_value = "hoid-reproduction")]
     pub out: PathBuf,
-    /// Threads. Default: one a core
+    /// Threads [default: one per core]
     #[arg(long, value_name = "J", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
-    /// List the names that --only takes, and run nothing
+    /// List the names for --only, and run nothing
     #[arg(long)]
     pub list: bool,
 }

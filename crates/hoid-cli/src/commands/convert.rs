@@ -93,7 +93,7 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Polynomials of other orders than those of a gain with a lead: the operator of the family.
+/// Polynomials with orders other than those of a gain with a lead: the operator of the family.
 fn to_family(args: &ConvertArgs, f: &[f64], b: &[f64], sample_time: SampleTime) -> Result<(), CliError> {
     let orders = Orders {
         nb: b.len(),

@@ -249,8 +249,8 @@ fn report(args: &DemoArgs, stages: &[Stage]) -> Result<PathBuf, CliError> {
         answer: None,
         pictures: Vec::new(),
         notes: vec![
-            "Before: 0 to 30.72 s. After: 51.20 to 81.92 s. Delay and order of the noise model are searched for Box-Jenkins; \
-             ARX takes the same delay."
+            "Before: 0 to 30.72 s. After: 51.20 to 81.92 s. Delay and order of the noise model are searched for \
+             Box-Jenkins; ARX uses the same delay."
                 .to_owned(),
         ],
     };

@@ -95,7 +95,8 @@ fn write_all(found: &ExperimentDesign, out: &Path) -> Result<(), CliError> {
         Some(lab) => write("lab.toml", &lab)?,
         None => output::notice(
             "",
-            "lab.toml: none is written, the lab takes runs of whole hundredths of a second; give --length so"
+            "lab.toml: none is written, because runs of the lab last whole hundredths of a second; choose --length \
+             accordingly"
                 .to_owned(),
         ),
     }
@@ -117,7 +118,7 @@ fn write_all(found: &ExperimentDesign, out: &Path) -> Result<(), CliError> {
 fn page(found: &ExperimentDesign, verbose: bool) -> String {
     let counted = text::counted(found.runs as u64, "run");
     let mut page = format!(
-        "Errors to be expected of {counted} of {} s, {} ({})\n{}\n{}",
+        "Expected errors of {counted} of {} s, {} ({})\n{}\n{}",
         found.length_s,
         found.person,
         found.task.state.operator.form(),
@@ -130,14 +131,16 @@ fn page(found: &ExperimentDesign, verbose: bool) -> String {
     }
     if let Some(seen) = &found.task.feedforward {
         page.push_str(&format!(
-            "The response to the target ({}, preview {} s) has the parameters ..._f; target and disturbance have lines of their own.\n",
+            "The response to the target ({}, preview {} s) has the parameters ..._f; target and disturbance have their \
+             own lines.\n",
             seen.operator.form(),
             seen.preview_s
         ));
     }
     page.push_str(&format!(
         "\nThe forcing function, crest factor {:.2}\n{}\n\
-         By the information of its lines, of a person who is as supposed in every run: what they vary by from run to run comes on top.\n",
+         The errors follow from the information in these lines for a person with the assumed parameters in every run; \
+         variation from run to run adds to them.\n",
         found.crest_factor,
         lines(found)
     ));
@@ -216,7 +219,7 @@ fn needed(found: &ExperimentDesign) -> String {
         return String::new();
     }
     let mut needed = format!(
-        "What is wanted takes {}.\n",
+        "The requested errors take {}.\n",
         text::counted(found.runs_needed as u64, "run")
     );
     if let Some(worst) = &found.worst {

@@ -17,8 +17,8 @@ pub fn check(path: &Path) -> Result<(), CliError> {
 
 fn format_of(path: &Path) -> Result<FigureFormat, CliError> {
     let refused = |why: &str| CliError::Usage(format!("--figure {}: {why}", path.display()));
-    let format =
-        FigureFormat::of(path).ok_or_else(|| refused("figures are written as .svg, .pdf or .png; name the file so"))?;
+    let format = FigureFormat::of(path)
+        .ok_or_else(|| refused("figures are written as .svg, .pdf or .png; name the file accordingly"))?;
     if !format.is_built() {
         return Err(refused(
             "this hoid was built without PDF and PNG; name the file .svg, or build it with them: \

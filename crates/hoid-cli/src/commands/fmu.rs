@@ -109,7 +109,7 @@ fn of_operator(operator: &OperatorChoice, seed: i32) -> Result<Unit, CliError> {
     Ok((settings, read, step_s))
 }
 
-/// The library next to this program, as installed or as built.
+/// The library in the directory of this program, as installed or as built.
 fn beside_this_program() -> Result<PathBuf, CliError> {
     let program = env::current_exe().unwrap_or_default();
     let folder = program.parent().unwrap_or(Path::new("."));
@@ -118,7 +118,7 @@ fn beside_this_program() -> Result<PathBuf, CliError> {
     let found = places.iter().find(|place| place.is_file()).cloned();
     found.ok_or_else(|| {
         CliError::Usage(format!(
-            "there is no {prefix}hoid{suffix} in {}; build it with cargo xtask ffi, and name it by --library",
+            "there is no {prefix}hoid{suffix} in {}; build it with cargo xtask ffi, and name it with --library",
             folder.display()
         ))
     })

@@ -48,7 +48,8 @@ fn options(args: &ReadArgs, with_input: bool) -> Result<ReadOptions, CliError> {
             [_] => None,
             _ => {
                 return Err(CliError::Usage(
-                    "one --input is read here: several belong to hoid identify, of the structure operator".to_owned(),
+                    "only one --input is read here: several are for hoid identify with the structure operator"
+                        .to_owned(),
                 ));
             }
         },

@@ -48,10 +48,10 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
     bar.finish_and_clear();
     let found = found.map_err(|error| match error {
         ThesisError::UnknownItem { name, .. } => CliError::Usage(format!(
-            "--only {name}: no table, figure or study is called so; `hoid reproduce --list` lists them"
+            "--only {name}: no table, figure or study has this name; `hoid reproduce --list` lists them"
         )),
         ThesisError::NotTheExperiment => CliError::Usage(
-            "--recordings is for the experiment alone: add --only experiment, and no other name".to_owned(),
+            "--recordings applies only to the experiment: add --only experiment, and no other name".to_owned(),
         ),
         ThesisError::Study(error) => CliError::Study(*error),
         other => other.into(),

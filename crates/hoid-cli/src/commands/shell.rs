@@ -44,7 +44,7 @@ pub fn man(args: &ManArgs) -> Result<(), CliError> {
         write(command.display_name(name.clone()), &name)?;
     }
     output::print(&format!(
-        "{written} pages in {}; read one by: man -l FILE\n",
+        "{written} pages in {}; read one with: man -l FILE\n",
         args.directory.display()
     ))
 }

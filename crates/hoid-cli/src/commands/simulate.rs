@@ -100,7 +100,7 @@ fn of_family(mut scenario: FamilyScenario, args: &SimulateArgs) -> Result<Family
     ];
     if let Some((option, _)) = remnant.iter().find(|(_, given)| *given) {
         return Err(CliError::Usage(format!(
-            "{option} is of the thesis's remnant: in a scenario with a form the tables [[remnant]] specify it"
+            "{option} is for the thesis's remnant: in a scenario with a form the tables [[remnant]] specify it"
         )));
     }
     if let Some(ts) = args.sample_time {

@@ -116,11 +116,11 @@ fn words(summary: &OutputTable) -> String {
     }
     let more = match rows.len().checked_sub(MOST_ROWS) {
         None | Some(0) => String::new(),
-        Some(more) => format!("and {more} rows more\n"),
+        Some(more) => format!("and {more} more rows\n"),
     };
     format!(
-        "{table}\n{more}Relative bias in %: median over the fits that are an operator (of all), and its Monte Carlo error. \
-         Other parameters and their spread: table summary. Cells by number: hoid study check.\n"
+        "{table}\n{more}Relative bias in %: median over the fits that give an operator (of all), and its Monte Carlo \
+         error. Other parameters and their spread: table summary. Cells by number: hoid study check.\n"
     )
 }
 

@@ -52,7 +52,7 @@ pub fn rounds(bench: &Bench, work: &Work, count: usize, draw: &mut Draw) -> Opti
             continue;
         }
         outcome.full += 1;
-        if run.status.code() != Some(1) || !said.contains("No space left") || !said.contains("make room") {
+        if run.status.code() != Some(1) || !said.contains("No space left") || !said.contains("free space") {
             fail(format!("{}: {said}", run.status));
         }
         let left = files(&place);

@@ -1,12 +1,12 @@
 //! Other operators that predict u about as well.
 //!
 //! The covariance of an estimate describes one mode of the likelihood. Poles and delay have several, and the response of
-//! people below 10 rad/s carries little information about the right one. The operators at which the trials from other
-//! starting points ended therefore widen the errors, each with the weight `w = exp(-deficit/TEMPERATURE_NATS) f^2`, where
-//! `deficit` is its evidence below that of the estimate, and f the share of the current samples that it was fitted to. The
-//! scatter about the estimate is `sum w d d'/(1 + sum w)`. The evidence is tempered, since it assumes that the model is
-//! right (P. Grunwald and T. van Ommen, *Bayesian Analysis* 12 (2017) 1069-1103); f removes results that later samples have
-//! overtaken.
+//! people below 10 rad/s carries little information about the right one. The operators found by the trials from other
+//! starting points therefore widen the errors, each with the weight `w = exp(-deficit/TEMPERATURE_NATS) f^2`, where
+//! `deficit` is the amount by which its evidence is below that of the estimate, and f the share of the current samples
+//! that it was fitted to. The scatter about the estimate is `sum w d d'/(1 + sum w)`. The evidence is tempered, since
+//! it assumes that the model is right (P. Grunwald and T. van Ommen, *Bayesian Analysis* 12 (2017) 1069-1103); f
+//! removes results that later samples have overtaken.
 
 use super::sizes::{PARAMETERS, STARTS};
 
@@ -54,7 +54,8 @@ impl Alternatives {
         }
     }
 
-    /// Their scatter about an operator, for a current number of samples of which the last `window` are replayed.
+    /// Scatter of the alternatives about an operator, for a current number of samples of which the last `window` are
+    /// replayed.
     pub fn scatter(&self, about: &[f64; PARAMETERS], samples: u64, window: u64) -> [[f64; PARAMETERS]; PARAMETERS] {
         let mut scatter = [[0.0; PARAMETERS]; PARAMETERS];
         let mut weights = 1.0;

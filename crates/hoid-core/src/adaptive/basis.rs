@@ -42,7 +42,7 @@ const N: usize = SIGNALS - 1;
 const M: usize = N + 2;
 type Square = [[f64; M]; M];
 
-/// A complex number, real and imaginary part.
+/// A complex number: real and imaginary part.
 pub type Complex = [f64; 2];
 /// `z_0 .. z_5`.
 pub type Signals = [f64; SIGNALS];
@@ -75,7 +75,7 @@ impl Point {
     }
 }
 
-/// The responses of a sample, and their derivatives by omega, zeta and tau.
+/// The responses of a sample, and their derivatives with respect to omega, zeta and tau.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Regressors {
     /// r_i.
@@ -359,7 +359,7 @@ impl Basis {
     }
 }
 
-/// Products `Q z_i` that the responses and their derivatives by the delay need.
+/// Products `Q z_i` that the responses and their derivatives with respect to the delay need.
 const LINKS: usize = SIGNALS - 2;
 
 pub(super) fn times(a: Complex, b: Complex) -> Complex {

@@ -58,7 +58,7 @@ pub(super) struct Solution {
     pub state: [f64; STATES],
     /// `A^-1`.
     pub inverse: [[f64; STATES]; STATES],
-    /// Residual sum of squares, that of the prior included.
+    /// Residual sum of squares, including that of the prior.
     pub left: f64,
 }
 
@@ -152,7 +152,7 @@ impl Block {
         Some(Solution { state, inverse, left })
     }
 
-    /// The score of a state, `b - A x`: zero in the mean at the true state.
+    /// The score of a state, `b - A x`: its mean is zero at the true state.
     pub fn score(&self, state: &[f64; STATES]) -> [f64; STATES] {
         let matrix = self.matrix();
         core::array::from_fn(|i| self.with_output[i] - dot(&matrix[i], state))

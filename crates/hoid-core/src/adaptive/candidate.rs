@@ -1,16 +1,17 @@
 //! One pass over the data: a basis, a noise model, and the mixture of hypotheses about the gains.
 //!
-//! A candidate processes samples in order. Its whitening filter D and its basis stay fixed, so that it is the prediction
-//! error method for given D and a given linearisation (L. Ljung, *System Identification*, 1999, section 7.2). It estimates
-//! for the next candidate a better point of the basis (the corrections), a better noise model (`noise`, from the
-//! residuals) and how unevenly the innovations are distributed (`volatility`). [`super::filter`] runs one candidate after
-//! the other over the data.
+//! A candidate processes samples in order. Its whitening filter D and its basis stay fixed, so that the candidate is
+//! the prediction error method for given D and a given linearisation (L. Ljung, *System Identification*, 1999, section
+//! 7.2). It estimates for the next candidate a better point of the basis (the corrections), a better noise model
+//! (`noise`, from the residuals) and how unevenly the innovations are distributed (`volatility`). [`super::filter`]
+//! runs one candidate after the other over the data.
 //!
 //! `evidence` is the sum of the logarithms of the predictive densities of the blocks (A. P. Dawid, *J. Royal Statistical
-//! Society* A 147 (1984) 278-292); candidates of the same data are compared by it. Each block is predicted from earlier
-//! blocks only, so that additional parameters give no advantage. The density is Student's with the variance of the last
-//! seconds and as many degrees of freedom as the block has samples, so that an unpredicted change does not dominate. Old
-//! evidence is forgotten, so that it measures the quality of the estimate and not the speed of its start.
+//! Society* A 147 (1984) 278-292); it is the criterion by which candidates of the same data are compared. Each block is
+//! predicted from earlier blocks only, so that additional parameters give no advantage. The density is Student's with
+//! the variance of the last seconds and as many degrees of freedom as the block has samples, so that an unpredicted
+//! change does not dominate. Old evidence is forgotten, so that it measures the quality of the estimate and not the
+//! speed of its start.
 
 use super::{
     basis::{Basis, Complex, Point, Regressors},
@@ -413,7 +414,7 @@ impl Candidate {
     }
 
     /// As [`Candidate::response`], with the derivatives of its real and its imaginary part by gains, level
-    /// and corrections: exact by the gains, differences by the corrections.
+    /// and corrections: exact for the gains, finite differences for the corrections.
     pub fn response_with_derivatives(&self, omega_rad_s: f64) -> (Complex, [[f64; STATES]; 2]) {
         let (state, point) = (self.mixture.mean(), self.point());
         let h = self.basis.response(omega_rad_s, point);
@@ -439,7 +440,7 @@ impl Candidate {
         (of(&h), by)
     }
 
-    /// A state in the coordinates of another basis; without corrections if its point is not near.
+    /// A state in the coordinates of another basis; without corrections if the point of that basis is not near.
     pub fn carried(&self, to: &Basis, state: &[f64; STATES]) -> [f64; STATES] {
         let mut carried = self.basis.carried(to, state);
         let [omega, _, tau] = [carried[LINEAR], carried[LINEAR + 1], carried[LINEAR + 2]];

@@ -1,10 +1,11 @@
 //! The difference between two spans: two least-squares solutions with a covariance from their scores.
 //!
-//! The noise model whitens, but its spectrum in the band of control rests on few data: 16 lags at 100 Hz cover 0.16 s, and
-//! people act within seconds. Where that spectrum is wrong by a factor, `sigma^2 A^-1` is wrong by the same factor. The
-//! covariance of the score `g = b - A x` is therefore estimated as well (the sandwich of P. J. Huber, *Proc. Fifth Berkeley
-//! Symposium* 1 (1967) 221-233; H. White, *Econometrica* 48 (1980) 817-838). With the scores `g_k` of stretches of one
-//! second, which are nearly independent (W. K. Newey and K. D. West, *Econometrica* 55 (1987) 703-708),
+//! The noise model whitens, but its spectrum in the band of control is estimated from few data: 16 lags at 100 Hz cover
+//! 0.16 s, and people act within seconds. Where that spectrum is wrong by a factor, `sigma^2 A^-1` is wrong by the same
+//! factor. The covariance of the score `g = b - A x` is therefore estimated as well (the sandwich of P. J. Huber,
+//! *Proc. Fifth Berkeley Symposium* 1 (1967) 221-233; H. White, *Econometrica* 48 (1980) 817-838). With the scores
+//! `g_k` of stretches of one second, which are nearly independent (W. K. Newey and K. D. West, *Econometrica* 55 (1987)
+//! 703-708),
 //!
 //! `S = sum_k g_k g_k' / (1 - (N + 3)/K)`, `W_i = w n_i/n S + (1 - w) sigma^2 A_i`,
 //!

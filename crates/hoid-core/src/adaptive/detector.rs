@@ -1,9 +1,9 @@
-//! Has the operator changed? A Wald test of the last seconds against the time before, over blocks of half a second
-//! (`blocks`).
+//! Detector of changes of the operator: a Wald test of the last seconds against the time before, over blocks of half a
+//! second (`blocks`).
 //!
-//! Least squares over the last blocks and over those before, with gains, natural frequency, damping, delay and level free
-//! in both, give a difference d with the covariance C of the scores (`contrast`). For gains, natural frequency, damping
-//! and delay, but not for the level,
+//! Least squares over the last blocks and over the earlier blocks, with gains, natural frequency, damping, delay and
+//! level free in both, give a difference d with the covariance C of the scores (`contrast`). For gains, natural
+//! frequency, damping and delay, but not for the level,
 //!
 //! `T = d' C^-1 d`
 //!

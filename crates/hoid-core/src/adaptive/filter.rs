@@ -62,7 +62,7 @@ pub struct AdaptiveFilter<E> {
     age: u64,
     /// Number of samples in which neither signal has changed.
     still: u64,
-    /// Number of samples since then.
+    /// Number of samples since the last of these.
     settling: u64,
     /// Number of samples that only advanced the filters.
     passed: u64,
@@ -202,8 +202,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
                 Mixture::at(changes, state, covariance, known.variance)
             }
             None => {
-                // With replays the basis moves between them, and each replay has a trust region about its point; without,
-                // the corrections carry the whole prior of people.
+                // With replays, the basis moves from one replay to the next, and each replay has a trust region about
+                // its point; without replays, the corrections have the whole prior of people.
                 let dynamics = match self.replays_anything() {
                     true => trusted(point),
                     false => variances(&self.prior),
@@ -323,7 +323,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
     }
 
-    /// As [`AdaptiveFilter::step`], but the estimate stays constant: only the filters move on.
+    /// As [`AdaptiveFilter::step`], but the estimate stays constant: only the filters are advanced.
     pub fn step_without_update(&mut self, e: f64, u: f64) -> Step {
         self.respond(e);
         self.detector.pass_over();

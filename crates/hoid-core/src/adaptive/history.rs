@@ -1,4 +1,4 @@
-//! The last samples of the record, in memory of the caller.
+//! The last samples of the record, in the caller's memory.
 //!
 //! Errors, outputs, and the use of each sample, in three rings of the same length.
 

@@ -163,8 +163,8 @@ impl Hypothesis {
     /// of all hypotheses.
     pub fn weigh(&mut self, left: &BlockResidual, samples: f64, common: f64, dispersion: f64, memory: f64) {
         // n samples count as n/c (overdispersion). nu: degrees of freedom of sigma^2. The energy `common` to all
-        // hypotheses enters through Student's density, what a hypothesis has beyond it through the normal one: a block
-        // that no hypothesis predicts (an outlier) then does not decide between them.
+        // hypotheses enters through Student's density, and the excess of a hypothesis over it through the normal
+        // density: a block that no hypothesis predicts (an outlier) then does not decide between them.
         let (n, nu) = (samples / dispersion, self.residuals);
         let over = common / (self.variance * dispersion);
         self.log_weight += libm::lgamma(0.5 * (nu + n))

@@ -1,8 +1,8 @@
 //! An initial estimate from an earlier fit of the person: the recursion starts at it, with its covariance.
 //!
 //! Gains and corrections start at the fitted values with their covariance and are updated from the first sample on. The
-//! noise model starts with the products of a span with the remnant of the fit, so that it need not be found in the first
-//! seconds.
+//! noise model starts with the products of a span with the remnant of the fit, so that it need not be estimated in the
+//! first seconds.
 
 use super::{
     noise::{Lags, NoiseModel},

@@ -45,7 +45,7 @@ pub struct ChangePrior {
     pub settling: [f64; 2],
     /// Drift of the level of u in one second, relative to the root mean square of u.
     pub level: f64,
-    /// Memory of the innovation variance, s, and that of a newborn hypothesis.
+    /// Memory of the innovation variance, s, and the memory of a newborn hypothesis.
     pub variance: [f64; 2],
     /// Prior probability of steady gains.
     pub steady: f64,

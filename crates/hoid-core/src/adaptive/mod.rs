@@ -45,8 +45,8 @@
 //!
 //! Outputs at a limit of the stick are censored samples (`saturation`). Other poles and delays that predict u as well
 //! widen the reported errors (`alternatives`). The estimate starts after one second, whose ratio of output to error scales
-//! the prior of the gains, or at an earlier fit ([`initial_estimate`]). [`AdaptiveFilter`] needs no operating system; its
-//! memory is an array of the caller.
+//! the prior of the gains, or at an earlier fit ([`initial_estimate`]). [`AdaptiveFilter`] needs no operating system;
+//! its memory is an array that the caller owns.
 //! ```
 //! use hoid_core::adaptive::{AdaptiveFilter, least_memory, defaults::DefaultOperator};
 //!

@@ -122,8 +122,8 @@ pub(super) fn weights(basis: &Basis, state: &[f64; STATES]) -> [f64; INPUTS] {
     w
 }
 
-/// Derivatives of the weights `w` by each number of the state: exact, for the weights are linear in the
-/// gains and linear in the corrections.
+/// Derivatives of the weights `w` with respect to each element of the state. They are exact, because the weights are
+/// linear in the gains and linear in the corrections.
 fn derivatives(basis: &Basis, state: &[f64; STATES], w: &[f64; INPUTS]) -> [[f64; INPUTS]; STATES] {
     let mut t = [[0.0; INPUTS]; STATES];
     for i in 0..GAINS {

@@ -10,7 +10,7 @@
 //! with eps and not with v: the spectrum of a remnant of more than two poles falls far below a share of its power, and D has
 //! to follow it there.
 //!
-//! D is only used as a finite impulse response filter: it need not be stable.
+//! D is used only as an FIR filter, so its inverse need not be stable.
 
 use hoid_numerics::{cholesky, elimination};
 

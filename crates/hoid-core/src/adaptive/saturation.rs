@@ -1,12 +1,13 @@
 //! Outputs at a limit of the stick: censored samples.
 //!
-//! An output at a limit only shows that the intended output was at least as large. Used as measured, it would bias the gains
-//! towards zero, and the following samples would be compared with a wrong noise. These samples therefore do not update the
-//! estimate, and the filters get the predicted output if it lies beyond the limit, otherwise the limit (J. Tobin,
-//! *Econometrica* 26 (1958) 24-36, has the regression with censored outputs).
+//! An output at a limit shows only that the intended output was at least as large. If it were used as measured, it
+//! would bias the gains towards zero, and the following samples would be compared with a wrong noise. These samples
+//! therefore do not update the estimate, and the filters get the predicted output if it lies beyond the limit,
+//! otherwise the limit (J. Tobin, *Econometrica* 26 (1958) 24-36, has the regression with censored outputs).
 //!
-//! The stick is at a limit if two consecutive samples are equal and no output has been farther out; from then on one sample
-//! there is enough. The first time, the first of the two samples is known to be at the limit only in a replay.
+//! The stick is at a limit if two consecutive samples are equal and no output has been farther out; from then on, a
+//! single sample at the limit is enough. The first time, the first of the two samples is known to be at the limit only
+//! in a replay.
 
 use super::history::Use;
 
@@ -45,7 +46,7 @@ impl Saturation {
         }
     }
 
-    /// The output for the filters in place of one at a limit, from the prediction; at most one range beyond the limit.
+    /// The output that replaces one at a limit in the filters, from the prediction; at most one range beyond the limit.
     #[inline(always)]
     pub fn beyond(&self, end: Use, u: f64, predicted: f64) -> f64 {
         let range = self.highest - self.lowest;

@@ -56,7 +56,7 @@ impl PartialEq for SignalHistory {
 }
 
 impl State for SignalHistory {
-    /// Visits the newest first, wherever the ring starts: it is rotated to its start.
+    /// Visits the newest signals first, independent of the start of the ring, which is then rotated to its start.
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         self.twice[..LARGEST_ORDER].rotate_left(self.newest);
         self.newest = 0;

@@ -2,10 +2,10 @@
 //!
 //! For a remnant of constant power the block energies are chi-square: the logarithm of the energy of n samples has the
 //! variance 2/n. People who act in pulses have innovations in bursts, with a variance tens of times larger. A likelihood
-//! that treats their samples as independent is too sharp and splits a constant operator into many. Each sample therefore
-//! counts as `1/c` of one, the quasi-likelihood of overdispersed data (R. W. M. Wedderburn, *Biometrika* 61 (1974) 439-447),
-//! with `c = v^POWER`, v the ratio of the variance of the log energies to that for constant power. Differences of
-//! successive blocks remove slow drifts of the level:
+//! that treats their samples as independent is too sharp and splits a constant operator into many. Each sample
+//! therefore counts as `1/c` of a sample, the quasi-likelihood of overdispersed data (R. W. M. Wedderburn, *Biometrika*
+//! 61 (1974) 439-447), with `c = v^POWER`, v the ratio of the variance of the log energies to that for constant power.
+//! Differences of successive blocks remove slow drifts of the level:
 //!
 //! `v = (pi/2) (mean |ln E_k - ln E_{k-1}|)^2/(4/n)`,
 //!
@@ -21,7 +21,7 @@ const PRIOR_DIFFERENCES: f64 = 4.0;
 /// Largest v.
 const LARGEST: f64 = 1000.0;
 
-/// The running mean of the squared differences.
+/// The running mean of the absolute differences of the log energies, scaled so that a constant power gives 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Volatility {
     /// Blocks per energy.

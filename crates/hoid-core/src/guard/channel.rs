@@ -12,9 +12,9 @@
 //! `q <- q (1 + g (1 - p))` where `|r| > q`, else `q <- q (1 - g p)`, with p = .01, g = .05.
 //!
 //! The size of an outlier does not enter: one sample moves q by 5 % whatever its size. A quantile in the tail is used,
-//! not a median: people's u rests and moves by pulses, and the limit must accept its tails. p_j is the 90 % quantile,
-//! in the same way with g = .02. Samples at which the signal stays constant carry no information about how it moves:
-//! they enter neither.
+//! not a median: a person's u rests and moves in pulses, and the limit must accept the tails of its distribution. p_j
+//! is the 90 % quantile, computed in the same way with g = .02. Samples at which the signal stays constant carry no
+//! information about how it moves and enter neither quantile.
 //!
 //! **Outliers.** A sample is held back where `|r_j| > max(m_j q_j, floor)` with
 //!
@@ -118,13 +118,13 @@ impl ChannelGuard {
         }
     }
 
-    /// Sets quantiles that are known from the past of the signal, of the differences of order 1 to 4; one of zero or
-    /// less is unknown. The tails are Gaussian until they are learnt.
+    /// Sets quantiles that are known from the past of the signal, of the differences of order 1 to 4; a quantile of
+    /// zero or less is unknown. The tails are Gaussian until they are learnt.
     pub fn set_quantiles(&mut self, quantiles: [f64; ORDERS]) {
         self.set_tails(quantiles, quantiles.map(|q| GAUSSIAN_INNER * q));
     }
 
-    /// The same with the 90 % quantiles.
+    /// As [`ChannelGuard::set_quantiles`], with the 90 % quantiles.
     pub fn set_tails(&mut self, quantiles: [f64; ORDERS], inner: [f64; ORDERS]) {
         (self.quantiles, self.inner) = (quantiles, inner);
         self.averaged = 0;
@@ -234,7 +234,8 @@ impl ChannelGuard {
         if limit > self.floor { limit } else { self.floor }
     }
 
-    /// True for errors beyond the limit, and for NaN. False while the quantiles or the samples before are unknown.
+    /// True for an error beyond the limit once the quantiles and a preceding sample are known, and always for a sample
+    /// that is not finite.
     #[inline(always)]
     pub fn is_outlier(&self, errors: &[f64; ORDERS]) -> bool {
         let order = self.order_in_use();

@@ -1,4 +1,4 @@
-//! A guard in front of a recursion: samples that no tracking signal contains, and spans that are not tracking.
+//! A guard in front of a recursion: detects samples that no tracking signal contains, and spans without tracking.
 //!
 //! A wrong sample of e has more effect than its innovation. It enters `w = (B/F) q^-nk e` and the gradients of w only
 //! nk samples later, and stays in them for the time constants of F. Limiting innovations is therefore not enough: the

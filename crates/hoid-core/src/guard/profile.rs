@@ -1,9 +1,10 @@
-//! Signals of a second compared with those before.
+//! Comparison of the signals of one second with those of the time before.
 //!
 //! For each block of a second the mean magnitudes of e and u about their long-run means are kept, `m_c`, of their
 //! backward differences of order 1 to 4, `a_cj`, and of the innovations of the recursion, `a_eps`. Their long-run
 //! means M_c and A_cj follow with a time constant of 60 blocks; a block enters with no less than half and no more than
-//! twice the long-run value, so that no block moves them by more than 1/60. Blocks with a trouble do not enter.
+//! twice the long-run value, so that no block moves them by more than 1/60. Blocks in which a fault is found do not
+//! enter.
 //!
 //! | what | rule | why |
 //! |---|---|---|
@@ -50,7 +51,7 @@ const LEAST_GROWTH: f64 = 2.0;
 const MISFIT_BLOCKS: u32 = 2;
 /// Distance of a typical block: four logarithms of four.
 const ALIKE: f64 = 4.0 * 1.386;
-/// Distance of an unusual one.
+/// Distance of an unusual block.
 const UNLIKE: f64 = 4.0;
 /// Limit of the logarithms of features.
 const LARGEST_LOG: f64 = 10.0;
@@ -130,13 +131,13 @@ impl Block {
         }
     }
 
-    /// R: the mean innovation over the least mean difference of u; none if either is missing.
+    /// R: the mean innovation over the least mean difference of u; `None` if either is missing.
     fn ratio(&self) -> Option<f64> {
         let least = self.least_of_u();
         (self.innovations > 0 && least > 0.0).then(|| self.innovation / least)
     }
 
-    /// The least mean of the differences of u: the error of predicting u from its own past.
+    /// The smallest mean of the differences of u: the error of predicting u from its own past.
     fn least_of_u(&self) -> f64 {
         self.differences[1]
             .iter()
@@ -324,8 +325,8 @@ impl Profile {
         }
     }
 
-    /// Returns the trouble of a block, given those before it; `rests` if u is constant at its end because the person
-    /// rests.
+    /// Returns the fault found in a block, given the earlier blocks; `rests` if u is constant at its end because the
+    /// person rests.
     pub fn judge(&mut self, block: &Block, rests: bool) -> Option<Trouble> {
         if !self.is_known() {
             return None;

@@ -1,7 +1,8 @@
 //! A fixed model: how well the start of a recursion predicts the current u.
 //!
-//! The general model `A u = (B/F) q^-nk e + (C/D) eps` with the coefficients of the start gives the innovations eps_0
-//! next to those of the recursion, eps. Over a block of n samples the estimate is the worse of the two by
+//! The general model `A u = (B/F) q^-nk e + (C/D) eps` with the coefficients of the start gives the innovations eps_0,
+//! which are compared with those of the recursion, eps. Over a block of n samples the estimate is worse than the fixed
+//! model by
 //!
 //! `s = n log(mean |eps| / mean |eps_0|)`
 //!

@@ -7,12 +7,12 @@
 //!
 //! `n >= 3`, `s >= .05 t`, `T < max(8 s, 2 l)`
 //!
-//! after t seconds. A frozen channel has an arbitrary value, at which u was never or hardly ever before, since a
-//! distribution without an atom there gives it probability zero; and a channel that freezes within a rest is constant
-//! for longer than the person ever rested. After a longest of n equally distributed rests the next one is larger with
-//! probability 1/(n+1), whatever their distribution (order statistics; H. A. David and H. N. Nagaraja, *Order
-//! Statistics*, 2003, §2.1); it is twice as long, for exponential rests, with a probability of about `2/((n+1)(n+2))`.
-//! The minimum of 8 s is for the time in which only a few rests have been observed.
+//! after t seconds. A frozen channel has an arbitrary value, which u has never or hardly ever had before, since a
+//! distribution without an atom there gives that value probability zero; and a channel that freezes within a rest is
+//! constant for longer than the person ever rested. The next rest is longer than the longest of n identically
+//! distributed rests with probability 1/(n+1), whatever their distribution (order statistics; H. A. David and H. N.
+//! Nagaraja, *Order Statistics*, 2003, §2.1); for exponential rests, it is twice as long with a probability of about
+//! `2/((n+1)(n+2))`. The minimum of 8 s is for the time in which only a few rests have been observed.
 //!
 //! The caller checks the other conditions of a rest: e has to move meanwhile, and the innovations must be no larger
 //! than typical.

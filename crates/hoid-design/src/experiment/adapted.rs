@@ -1,16 +1,16 @@
-//! The operator that people are known to have with a controlled element, without a fit of theirs.
+//! The operator that people typically have with a controlled element, without a fit to their data.
 //!
 //! **Crossover model** (D. T. McRuer and H. R. Jex, *IEEE Trans. Human Factors in Electronics* 8 (1967) 231-249): people
 //! adapt lead and lag so that `|H P|` falls by 20 dB a decade near the crossover frequency. With
 //! `s = d ln|P|/d ln omega` at 3 rad/s the operator has to add the slope `p = -1 - s`; a lead adds
-//! `x^2/(1 + x^2)`, `x = T_L omega`, and a lag subtracts as much. Without a given form: above .3 a lead, below -.3 a lag,
-//! else a gain. Time constants are limited to those of people.
+//! `x^2/(1 + x^2)`, `x = T_L omega`, and a lag subtracts as much. If no form is given: a lead for p above .3, a lag
+//! below -.3, otherwise a gain. Time constants are limited to those of people.
 //!
 //! **Gain**: the largest crossover frequency up to 5 rad/s with a phase margin of 40 deg (the middle of 20 to 65 deg of
 //! the same source); if the delay leaves less, the crossover frequency with the largest margin, of at least 15 deg.
 //!
-//! **Neuromuscular system and delay**: the medians of [`OperatorPrior::population`], and one spread to each side for the
-//! people who differ from it. Each of them adapts the gain again.
+//! **Neuromuscular system and delay**: the medians of [`OperatorPrior::population`], and one spread to each side for
+//! people who differ from the typical person. Each of them adapts the gain again.
 
 use hoid_ident::family::OperatorPrior;
 use hoid_model::{
@@ -75,7 +75,7 @@ pub(super) fn population(
         for sign in [-1.0, 1.0] {
             let value = entry.centre * (sign * entry.spread).exp();
             let name = format!("{} = {value:.2}", entry.parameter);
-            // A delay with which no one could control this element is no person of the population.
+            // A delay with which no one could control this element does not occur in the population.
             others.extend(named(name, Muscles::with(Some((&entry.parameter, value)))).ok());
         }
     }

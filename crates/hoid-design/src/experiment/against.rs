@@ -1,4 +1,4 @@
-//! Forcing functions that are judged next to the designed one.
+//! Forcing functions that are compared with the designed one.
 
 use std::{
     convert::Infallible,
@@ -14,11 +14,11 @@ use hoid_model::{
 
 use super::{DesignError, Enters, Forcing};
 
-/// Another forcing function: the ten sines of the text by the name `reference`, those of a scenario, or the lines in a
-/// table with the columns omega_rad_s, amplitude and, if there is one, phase_rad.
+/// Another forcing function: the ten sines of the thesis by the name `reference`, those of a scenario, or the lines in
+/// a table with the columns omega_rad_s, amplitude and, if there is one, phase_rad.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Against {
-    /// The ten sines of the text.
+    /// The ten sines of the thesis.
     Reference,
     /// A scenario (`.toml`) or a table of lines.
     File(PathBuf),
@@ -28,7 +28,7 @@ pub enum Against {
 const REFERENCE: &str = "reference";
 
 impl Against {
-    /// Returns what a text names.
+    /// Parses the text of a request.
     pub fn of_text(text: &str) -> Self {
         match text {
             REFERENCE => Self::Reference,

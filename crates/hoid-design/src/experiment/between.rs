@@ -1,4 +1,4 @@
-//! The standard deviation of a difference between people, for the number of people that find it.
+//! The standard deviation of a difference between people, from which the number of people to detect it follows.
 //!
 //! | source | the standard deviation b of the difference between two conditions |
 //! |---|---|
@@ -7,8 +7,8 @@
 //! | the result of a group with several conditions | the same of the comparison of its conditions |
 //! | the population of one condition (`hoid group --pool`) | sigma of its people, as a bound |
 //!
-//! In two conditions with the correlation rho of people b is `sigma sqrt(2 (1 - rho))`: no more than sigma, if rho is half or
-//! more. A population of one condition does not determine rho.
+//! For two conditions with the correlation rho between people, b is `sigma sqrt(2 (1 - rho))`: no more than sigma if
+//! rho is one half or more. A population of one condition does not determine rho.
 
 use std::{
     convert::Infallible,
@@ -26,14 +26,14 @@ use crate::compare::{Comparing, Comparison, GroupEstimates, Quantity, Variation}
 /// Source of the spread of a difference between people.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Between {
-    /// A part of the quantity.
+    /// A fraction of the quantity.
     Part(f64),
     /// A comparison, the result of a group, or a population.
     File(PathBuf),
 }
 
 impl Between {
-    /// Returns what a text names.
+    /// Parses the text of a request.
     pub fn of_text(text: &str) -> Self {
         match text.parse() {
             Ok(part) => Self::Part(part),
@@ -67,8 +67,8 @@ pub(super) struct Spread {
 }
 
 impl Between {
-    /// The spread of a quantity with this value. Without a source it is that of the people of the design if they have
-    /// one, else the default part.
+    /// The spread of a quantity with this value. If no source is given, it is that of the people of the design if they
+    /// have one, otherwise the default fraction.
     ///
     /// # Errors
     /// [`DesignError::NoSpread`] for a file that has none.
@@ -110,7 +110,7 @@ fn of_file(path: &Path, (name, value): (&str, f64)) -> Result<Spread, DesignErro
         let text = hoid_io::read_settings(path)?;
         let object: Value = serde_json::from_str(&text).map_err(|error| none(format!("it is not JSON: {error}")))?;
         if object["kind"] == "population" {
-            let spread = in_population(&object, name).ok_or_else(|| none("its parameters are others".to_owned()))?;
+            let spread = in_population(&object, name).ok_or_else(|| none("its parameters are different".to_owned()))?;
             return Ok(Spread {
                 value: spread * value,
                 source: format!("at most, the spread of the people of one condition in {shown}"),

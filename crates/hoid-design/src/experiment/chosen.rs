@@ -1,4 +1,4 @@
-//! The people of a design: the typical one, for whom the forcing function is, and the others.
+//! The people of a design: the typical person, for whom the forcing function is designed, and the others.
 
 use hoid_model::{ContinuousTransferFunction, FamilyState, Finding, Form, family_scenario::Feedforward};
 

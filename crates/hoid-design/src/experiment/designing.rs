@@ -6,7 +6,7 @@
 //! gradients g and accepted errors s; the design minimises `J = sum over wanted g' I^-1 g/s^2`, the sum of the squared
 //! ratios of errors to accepted errors.
 //!
-//! Amplitudes, places and limits are those of the module `search`.
+//! Amplitudes, frequencies and limits are computed in the module `search`.
 
 use std::f64::consts::TAU;
 
@@ -34,7 +34,7 @@ pub struct Designing {
     pub spacing: u32,
     /// The lowest and the highest frequency, rad/s.
     pub band_rad_s: (f64, f64),
-    /// Largest amplitude of a line above the crossover, relative to the geometric mean of those below.
+    /// Largest amplitude of a line above the crossover, relative to the geometric mean of the amplitudes below it.
     pub shelf: f64,
     /// Largest rms of e and of u; without limits the forcing function has an rms of one.
     pub most_rms: [Option<f64>; 2],

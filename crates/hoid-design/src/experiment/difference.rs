@@ -5,12 +5,13 @@
 //! `sigma^2 = b^2 + 2 (w^2 + s^2)/r`
 //!
 //! with the standard deviation b of the true difference between people, w of a person from run to run, and the expected
-//! error s of one run (`information`). The power of the paired t test is that of `power`. More runs help against w and
-//! s, and only more people against b.
+//! error s of one run (`information`). The power of the paired t test is computed in `power`. More runs help against w
+//! and s, and only more people against b.
 //!
 //! **Defaults.** From run to run 6 % (4 to 9 % of the gain in three recorded people), between people 10 % (the crossover of three
 //! recorded people fell by .31 to .78 rad/s from one element to another: a standard deviation of 10 % of its mean). A
-//! spread is relative to the quantity, and of the phase margin that which a gain of this spread makes.
+//! spread is relative to the quantity, and for the phase margin it is the spread that results from a gain with this
+//! spread.
 //!
 //! **Answer.** Without a number of runs it is the one for which people cost least, if a person costs as much as four
 //! runs more (instruction and training).
@@ -123,7 +124,7 @@ pub struct DifferencePlan {
     pub people: Vec<usize>,
     /// Numbers of runs with their power.
     pub rows: Vec<RunsAndPeople>,
-    /// The row of the answer.
+    /// Index of the row of the answer.
     pub answer: usize,
 }
 
@@ -205,14 +206,18 @@ impl DifferenceRequest {
                 expected,
             }),
         };
-        part("power of the test", self.power, "above 0 and below 1, as 0.8")?;
-        part("level of the test (alpha)", self.alpha, "above 0 and below 1, as 0.05")?;
+        part("power of the test", self.power, "above 0 and below 1, such as 0.8")?;
+        part(
+            "level of the test (alpha)",
+            self.alpha,
+            "above 0 and below 1, such as 0.05",
+        )?;
         let spread = |quantity, found: f64| match (0.0..=10.0).contains(&found) {
             true => Ok(()),
             false => Err(DesignError::OutOfRange {
                 quantity,
                 found,
-                expected: "0 to 10, relative to the quantity, as 0.1",
+                expected: "0 to 10, relative to the quantity, such as 0.1",
             }),
         };
         if let Some(Between::Part(part)) = self.between_people {
@@ -223,7 +228,7 @@ impl DifferenceRequest {
             return Err(DesignError::OutOfRange {
                 quantity: "size of the difference",
                 found: self.sought.size,
-                expected: "a number other than zero, as crossover=0.5",
+                expected: "a number other than zero, such as crossover=0.5",
             });
         }
         Ok(())

@@ -39,7 +39,9 @@ pub enum DesignError {
     },
     /// A band without room for the lines.
     #[error(
-        "the band has room for {found} lines of {asked} that are {spacing} multiples of the fundamental apart and no harmonics of each other: give fewer lines (--lines), a wider band (--band), a longer run (--length), or less distance (--spacing)"
+        "the band has room for only {found} of the {asked} lines, which must be {spacing} multiples of the fundamental \
+         apart and no harmonics of each other: give fewer lines (--lines), a wider band (--band), a longer run \
+         (--length), or a smaller spacing (--spacing)"
     )]
     NoRoom {
         /// Number of lines that were asked for.
@@ -50,7 +52,7 @@ pub enum DesignError {
         spacing: u32,
     },
     /// A requested quantity that is not a parameter of the person.
-    #[error("{name} is nothing that this person has; expected one of {expected}")]
+    #[error("{name} is not a quantity of this person; expected one of {expected}")]
     NotThere {
         /// Name of the requested quantity.
         name: String,
@@ -58,7 +60,7 @@ pub enum DesignError {
         expected: String,
     },
     /// A quantity with a number that cannot be read.
-    #[error("{found:?} is no {what}; write NAME=5% or NAME=0.05, as tau_e=5%")]
+    #[error("{found:?} is not a {what}; write NAME=5% or NAME=0.05, such as tau_e=5%")]
     Unreadable {
         /// The value expected.
         what: &'static str,
@@ -66,7 +68,7 @@ pub enum DesignError {
         found: String,
     },
     /// People whose controlled element is not known.
-    #[error("the controlled element is not known from {people}: add it (--controlled-element), as 90/(s(s+6))")]
+    #[error("the controlled element is not known from {people}: add it (--controlled-element), such as 90/(s(s+6))")]
     NoElement {
         /// Source of the people.
         people: String,
@@ -86,10 +88,10 @@ pub enum DesignError {
     OneForcing {
         /// The forcing function.
         name: String,
-        /// What it lacks.
+        /// The lines that it lacks.
         missing: Enters,
     },
-    /// A form that is given next to people who have their own.
+    /// A form that is given together with people who have their own.
     #[error("the form {form} was given, but {people} has its own; leave the form out, or design for the population")]
     FormOfPeople {
         /// Source of the people.
@@ -135,7 +137,8 @@ pub enum DesignError {
     },
     /// A file without the spread of a difference between people.
     #[error(
-        "{path} has no spread between people of {name} ({reason}); expected a comparison with it (`hoid compare --of {name} --json`), the result of a group with several conditions, a population.json, or a number, as 0.1"
+        "{path} has no spread between people of {name} ({reason}); expected a comparison with it (`hoid compare --of \
+         {name} --json`), the result of a group with several conditions, a population.json, or a number, such as 0.1"
     )]
     NoSpread {
         /// The file.
@@ -146,7 +149,7 @@ pub enum DesignError {
         reason: String,
     },
     /// A scenario of the thesis, which has no operator of the family.
-    #[error("{path} is a scenario of the thesis; write one with the key form, as form = \"lead\"")]
+    #[error("{path} is a scenario of the thesis; write one with the key form, such as form = \"lead\"")]
     OtherScenario {
         /// The file.
         path: String,

@@ -49,7 +49,7 @@ impl ExperimentDesign {
         )
     }
 
-    /// Time between samples, of which a run is a whole number.
+    /// Time between samples, such that a run is a whole number of samples.
     fn sample_s(&self) -> f64 {
         let whole = self.length_s / SAMPLE_S;
         match (whole - whole.round()).abs() < 1e-6 {
@@ -76,7 +76,7 @@ const MOST_RUNS: usize = 100;
 
 impl ExperimentDesign {
     /// Returns an experiment for `hoid lab --config`, whose condition is the scenario in a file of this name next to it.
-    /// `None` if a run is no whole number of hundredths of a second, which the lab takes.
+    /// `None` if a run is not a whole number of hundredths of a second, as the lab requires.
     pub fn lab(&self, scenario: &str) -> Option<String> {
         if self.sample_s().to_bits() != SAMPLE_S.to_bits() {
             return None;

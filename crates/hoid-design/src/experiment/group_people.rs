@@ -93,8 +93,9 @@ pub(super) fn of_population(object: &Value, path: &Path, given: &Given<'_>) -> R
         .collect();
     if !missing.is_empty() {
         let names = missing.join(", ");
-        let reason =
-            format!("{names} could not be pooled; name the directory of the group, which has those of each person");
+        let reason = format!(
+            "{names} could not be pooled; name the directory of the group, which has the operators of each person"
+        );
         return Err(none(path, reason));
     }
     of_pooled(&pooled(object), path, &element)
@@ -116,7 +117,7 @@ fn condition_of(rows: &[Row], place: &Path, given: &Given<'_>) -> Result<String,
         }
     }
     match (given.condition, all.as_slice()) {
-        (_, []) => Err(none(place, "the data determine the operator of no person")),
+        (_, []) => Err(none(place, "the data do not determine the operator of any person")),
         (Some(wanted), _) if all.contains(&wanted) => Ok(wanted.to_owned()),
         (None, [one]) => Ok((*one).to_owned()),
         (wanted, _) => Err(DesignError::Condition {

@@ -1,20 +1,21 @@
-//! Standard errors of an experiment before it is done.
+//! Standard errors of an experiment before it is carried out.
 //!
-//! A person answers the error of a loop with the controlled element P, and the target f if they see it, `u = B e + F f + n` (`task`), with the
-//! parameters theta. With `S = 1/(1 + B P)` a line of amplitude A at omega makes `E = S (1 - P F) A` of e if it is of the target, and
-//! `E = -S P A` if it is of the disturbance. Over T seconds of whole periods the Fourier coefficients obey `U = B E + F X + N`, X that of f,
-//! `E|N|^2 = 4 S_n/T` with the power density `S_n(f)` of the remnant, of both signs of f: `var n = int S_n df`. Half of it is in the real and
-//! half in the imaginary part, and the information of the lines on theta is
+//! A person responds to the error of a loop with the controlled element P, and to the target f if it is displayed,
+//! `u = B e + F f + n` (`task`), with the parameters theta. With `S = 1/(1 + B P)` a line of amplitude A at omega makes
+//! `E = S (1 - P F) A` of e if it is of the target, and `E = -S P A` if it is of the disturbance. Over T seconds of
+//! whole periods the Fourier coefficients obey `U = B E + F X + N`, X that of f, `E|N|^2 = 4 S_n/T` with the power
+//! density `S_n(f)` of the remnant, of both signs of f: `var n = int S_n df`. Half of it is in the real and half in the
+//! imaginary part, and the information of the lines on theta is
 //!
 //! `I = sum over lines of T/(2 S_n) Re[g* g']`, `g = dB/dtheta E + dF/dtheta X` (`joint`),
 //!
 //! whose inverse is the least covariance that an unbiased estimate can have (H. Cramér, *Mathematical Methods of Statistics*, 1946, section
-//! 32.6). The part of the loop signals that the remnant itself excites is not counted: with a free noise model this
-//! information is lost to it (U. Forssell and L. Ljung, *Automatica* 35 (1999) 1215-1241, section 5). Errors of
-//! functions of theta, such as crossover and margin, are to first order.
+//! 32.6). The part of the loop signals that the remnant itself excites is not counted: a free noise model takes up this
+//! information (U. Forssell and L. Ljung, *Automatica* 35 (1999) 1215-1241, section 5). Errors of functions of theta,
+//! such as crossover and margin, are to first order.
 //!
-//! The lines have to exceed the remnant in e: at a line that does not, the estimate of B is drawn to -1/P, and the
-//! predicted error is too small.
+//! The lines have to exceed the remnant in e: at a line that does not, the estimate of B is biased towards -1/P, and
+//! the predicted error is too small.
 //!
 //! **The remnant** is a lag of order m, `S_n = K^2/(1 + (T_n omega)^2)^m`, whose share p of the variance of u, through the loop,
 //! sets K: `K^2 = p/(1 - p) sum |U|^2/2 / int |S|^2/(1 + (T_n omega)^2)^m df`. It is proportional to the forcing

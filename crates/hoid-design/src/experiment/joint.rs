@@ -1,11 +1,10 @@
 //! The coordinates of both responses of a person together: those of the response B to the error, then those of the
-//! response F to the target that it does not have in common with B, the neuromuscular system through which both move
-//! the hand.
+//! response F to the target, without the neuromuscular system, which F has in common with B.
 //!
 //! A line of the target with the amplitude X makes `E` of e, and `U = B E + F X + N`: its derivative with respect to a
-//! coordinate is `dB E + dF X`, in which F is zero at a line of the disturbance. What B alone leaves open at a line of
-//! the target, the lines of the disturbance determine (M. M. van Paassen and M. Mulder, *Identification of Human Operator
-//! Control Behaviour in Multiple-Loop Tracking Tasks*, IFAC 1998).
+//! coordinate is `dB E + dF X`, in which F is zero at a line of the disturbance. At a line of the target, the part of U
+//! due to B is determined by the lines of the disturbance (M. M. van Paassen and M. Mulder, *Identification of Human
+//! Operator Control Behaviour in Multiple-Loop Tracking Tasks*, IFAC 1998).
 
 use hoid_model::{
     Complex64, FamilyOperator, interned::interned, operator_family::Coordinate, operator_family::NamedParameter,
@@ -14,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::Task;
 
-/// The names of a parameter of F: those of its own, with `_f` at the end.
+/// The names of a parameter of F: its own names with the suffix `_f`.
 fn name_of_target(parameter: &NamedParameter) -> &'static str {
     let name = match parameter.name {
         "K_d" | "K_e" => "K".to_owned(),
@@ -53,7 +52,7 @@ impl Quantity {
     }
 }
 
-/// Places of the coordinates.
+/// Indices of the coordinates.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Joint {
     pub count: usize,

@@ -1,4 +1,4 @@
-//! Expected results of an experiment before it is done.
+//! Expected results of an experiment before it is carried out.
 //!
 //! | module | contents |
 //! |---|---|

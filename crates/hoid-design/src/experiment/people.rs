@@ -36,7 +36,7 @@ pub enum People {
 const POPULATION: &str = "population";
 
 impl People {
-    /// Returns what a text names.
+    /// Parses the text of a request.
     pub fn of_text(text: &str) -> Self {
         match text {
             POPULATION => Self::Population,

@@ -2,7 +2,7 @@
 //!
 //! Of n people the mean difference divided by its standard error has the noncentral t distribution with n - 1 degrees of
 //! freedom and `delta = D sqrt(n)/sigma`, D the true difference and sigma the standard deviation of a person's
-//! difference. The test of both sides finds it with the probability
+//! difference. The two-sided test detects it with the probability
 //!
 //! `1 - F(t_c; n - 1, delta) + F(-t_c; n - 1, delta)`, `t_c` the quantile of Student's t at `1 - alpha/2`.
 //!
@@ -48,7 +48,7 @@ pub fn noncentral_t_cdf(t: f64, degrees: f64, delta: f64) -> f64 {
     (base + 0.5 * sum).clamp(0.0, 1.0)
 }
 
-/// Probability that the paired t test of both sides finds a difference; `effect` is the difference divided by the
+/// Probability that the two-sided paired t test detects a difference; `effect` is the difference divided by the
 /// standard deviation of a person's difference. `None` for fewer than two people.
 pub fn power(effect: f64, people: usize, alpha: f64) -> Option<f64> {
     let degrees = people.checked_sub(1).filter(|d| *d > 0)? as f64;

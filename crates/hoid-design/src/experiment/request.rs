@@ -36,7 +36,7 @@ pub struct DesignRequest {
     pub designing: Designing,
     /// Number of runs; the number that the requested quantities need if `None`.
     pub runs: Option<usize>,
-    /// A forcing function to be judged next to the design.
+    /// A forcing function to be compared with the design.
     pub against: Option<Against>,
     /// A difference between two conditions to be found.
     pub difference: Option<DifferenceRequest>,
@@ -106,7 +106,7 @@ impl DesignRequest {
         })
     }
 
-    /// Where the forcing functions enter.
+    /// Points at which the forcing functions enter.
     fn points(&self) -> &'static [Enters] {
         match (self.enters, self.display) {
             (Enters::Target, Display::Compensatory) => &[Enters::Target],
@@ -238,13 +238,14 @@ fn drowned(lines: &[DesignedLine], is_seen: bool) -> Option<Finding> {
     let weak = of_error.filter(|l| l.to_remnant < LEAST_TO_REMNANT);
     let weak: Vec<String> = weak.map(|l| format!("{:.2}", l.line.omega_rad_s)).collect();
     let message = format!(
-        "in one run the lines at {} rad/s are less than {LEAST_TO_REMNANT} times the remnant in e: what is predicted there is too small; fewer lines or longer runs help",
+        "in one run the power of the lines at {} rad/s is less than {LEAST_TO_REMNANT} times that of the remnant in e, \
+         so that the errors predicted there are too small: use fewer lines or longer runs",
         weak.join(", ")
     );
     (!weak.is_empty()).then(|| Finding::note("lines-drown", message))
 }
 
-/// Ratio of powers below which the estimate at a line is drawn to `-1/P`: by a tenth.
+/// Ratio of powers below which the estimate at a line is biased towards `-1/P`, by a tenth.
 const LEAST_TO_REMNANT: f64 = 10.0;
 
 /// The person with the greatest errors, relative to the accepted ones; without these, relative to the parameters.

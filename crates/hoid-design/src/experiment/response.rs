@@ -6,10 +6,11 @@
 //! fewer parameters than lines have numbers: its error, `dH/H = sum dH/dtheta_k dtheta_k/H` with the inverse of the
 //! information, is smaller.
 //!
-//! In e the line exceeds the part of the remnant by `T a^2/(4 S_n |P S|^2)`.
+//! In e the line exceeds the power of the remnant by the factor `T a^2/(4 S_n |P S|^2)`.
 //!
 //! A line of a target X that is seen determines the response F to it by `F = (U - B E)/X`, with B from all lines:
-//! `dF/F = N/(F X) - (E B)/(X F) dB/B`, two independent parts, as the remnant at this line is not that at others.
+//! `dF/F = N/(F X) - (E B)/(X F) dB/B`, two independent parts, since the remnant at this line is independent of that at
+//! the others.
 
 use hoid_model::{Complex64, FamilyOperator, forcing::Sinusoid, uncertainty::Estimate};
 use serde::{Deserialize, Serialize};
@@ -33,15 +34,15 @@ pub struct ExpectedResponse {
 /// A line of the designed forcing function.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DesignedLine {
-    /// Where it enters.
+    /// Point at which it enters.
     pub enters: Enters,
     /// Amplitude, frequency and phase.
     pub line: Sinusoid,
-    /// The response that it determines, with the errors of the line alone: to the error, or of a line of a target that is
-    /// seen the response to the target.
+    /// The response that it determines, with the errors of this line alone: the response to the error or, for a line of
+    /// a displayed target, the response to the target.
     pub response: ExpectedResponse,
-    /// Power divided by that of the remnant at this frequency, in one run: in e, or of a line of a target that is seen
-    /// that of the response to the target in u.
+    /// Power divided by that of the remnant at this frequency, in one run: the power in e or, for a line of a displayed
+    /// target, that of the response to the target in u.
     pub to_remnant: f64,
 }
 

@@ -1,20 +1,21 @@
-//! Search for the places and amplitudes of the lines: the shares q of the lines in the response of u that minimise
+//! Search for the frequencies and amplitudes of the lines: the shares q of the lines in the response of u that minimise
 //! `J = sum over wanted g' I^-1 g/s^2`, `I = sum q_k M_k` (`designing`).
 //!
 //! - **Amplitudes.** J is convex in q. From equal shares, `q_k <- q_k sqrt(d_k/sum q d)`,
 //!   `d_k = sum g' I^-1 M_k I^-1 g/s^2`, decreases J in every step (D. M. Titterington, *Applied Statistics* 27 (1978)
-//!   227-234; Y. Yu, *Ann. Stat.* 38 (2010) 1593-1606). Each line keeps at least a part of an equal share, for people
-//!   who differ from the assumed operator.
+//!   227-234; Y. Yu, *Ann. Stat.* 38 (2010) 1593-1606). Each line keeps at least a fraction of an equal share, for
+//!   people who differ from the assumed operator.
 //! - **Frequencies.** Each line in turn is moved to multiples near it and keeps the one with the smallest J (V. V.
 //!   Fedorov, *Theory of Optimal Experiments*, 1972), on condition that no line is a harmonic of another.
-//! - **Two forcing functions.** A person who sees the target answers it and the error: lines of a target and of a disturbance,
-//!   in turns along the frequency, separate the two (`joint`). Their shares are searched together, the limits hold for each.
+//! - **Two forcing functions.** A person who sees the target responds to the target and to the error: lines of a target
+//!   and of a disturbance, alternating in frequency, separate the two responses (`joint`). Their shares are searched
+//!   together, and the limits hold for each.
 //! - **Limits.** If a target has much power above the crossover frequency, people lower their crossover frequency (D.
-//!   T. McRuer and H. R. Jex, *IEEE Trans. Human Factors in Electronics* 8 (1967) 231-249): lines there form a shelf,
-//!   with amplitudes up to a given part of the geometric mean of those below. Lines below are between half and twice
-//!   that mean. The size is then the largest that satisfies the limits of the rms of e and u.
-//!   Between two lines there is room (`spacing`): power of a person who varies over a run is near a line, not at it alone,
-//!   and the remnant at a line is estimated from the bins next to it.
+//!   T. McRuer and H. R. Jex, *IEEE Trans. Human Factors in Electronics* 8 (1967) 231-249): the lines above it
+//!   therefore form a shelf, with amplitudes of up to a given fraction of the geometric mean of the amplitudes below
+//!   it. Lines below are between half and twice that mean. The size is then the largest that satisfies the limits of
+//!   the rms of e and u. Lines have a minimum distance (`spacing`): if a person varies over a run, part of the power is
+//!   near a line instead of at it, and the remnant at a line is estimated from the neighbouring bins.
 
 use std::f64::consts::TAU;
 
@@ -29,7 +30,7 @@ use super::{
 
 /// Largest ratio of the amplitude of a line below the crossover to their geometric mean; its inverse is the smallest.
 const WITHIN: f64 = 2.0;
-/// Part of an equal share that each line keeps at least.
+/// Smallest fraction of an equal share that each line keeps.
 const LEAST_SHARE: f64 = 0.1;
 /// Steps of the iteration of the shares, and steps if a line is moved for a trial.
 const STEPS: usize = 400;
@@ -40,7 +41,7 @@ const ROUNDS: usize = 3;
 /// Least relative improvement for which a line is moved.
 const WORTH: f64 = 1e-3;
 
-/// A line: its multiple of the fundamental, and where it enters.
+/// A line: its multiple of the fundamental, and its point of entry.
 pub(super) type Place = (u32, Enters);
 
 pub(super) struct Search<'a> {

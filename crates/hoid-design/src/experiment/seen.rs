@@ -1,4 +1,4 @@
-//! The response of people to a target that they see, without a fit of theirs.
+//! The response of people to a target that they see, without a fit to their data.
 //!
 //! **Inverse of the machine.** People who see the target move the hand so that the machine follows it: `F P = g` near 3 rad/s,
 //! with g somewhat below one (R. J. Wasicko, D. T. McRuer and R. E. Magdaleno, *Human Pilot Dynamic Response in Single-Loop Systems
@@ -6,8 +6,8 @@
 //! 457-469). With `s = d ln|P|/d ln omega` at 3 rad/s F has to rise by -s: a gain, the rate (`K_d s`), or the rate with a lead that
 //! adds the rest. g is .7: .4 to 1 are the values of the virtual people of `cargo xtask slow inputs-coverage`.
 //!
-//! **Delay.** Without preview that of the response to the error. With preview people answer what is to come: the delay
-//! `-2 zeta_nm/omega_nm`, by which the neuromuscular system is late at low frequencies.
+//! **Delay.** Without preview that of the response to the error. With preview people respond to the future target: the
+//! delay is `-2 zeta_nm/omega_nm`, which compensates the lag of the neuromuscular system at low frequencies.
 
 use hoid_model::{
     FamilyOperator, FamilyState, Form,
@@ -20,14 +20,14 @@ use super::{
     adapted::{LONGEST_LEAD_S, NEAR_CROSSOVER_RAD_S, slope, time_constant},
 };
 
-/// Part of the target by which the machine moves along with it.
+/// Fraction of the target that the machine follows.
 const PART: f64 = 0.7;
 /// Preview in s: that of a condition of `hoid lab` without another.
 pub(super) const PREVIEW_S: f64 = 1.0;
-/// Slopes between which a form is not that of the next one.
+/// Slopes at which the form changes to the next one.
 const HALF: f64 = 0.5;
 
-/// The response to the target of a person who answers the error as in this state.
+/// The response to the target of a person who responds to the error as in this state.
 pub(super) fn typical(state: &FamilyState, display: Display) -> Result<Feedforward, DesignError> {
     let unknown = || DesignError::NoFeedforward {
         element: state.controlled_element.to_string(),
@@ -60,7 +60,7 @@ pub(super) fn typical(state: &FamilyState, display: Display) -> Result<Feedforwa
     let neuromuscular = operator.has_neuromuscular();
     let coordinates: Option<Vec<f64>> = form.coordinates(neuromuscular).iter().map(value).collect();
     let mut coordinates = coordinates.ok_or_else(unknown)?;
-    // Of the hand's motion that is asked for: without the neuromuscular system.
+    // For the intended motion of the hand: without the neuromuscular system.
     let omega = NEAR_CROSSOVER_RAD_S;
     let ([a, b, c], _) = form.shape(&lead_s.into_iter().collect::<Vec<_>>());
     let shape = (a - c * omega * omega).hypot(b * omega);

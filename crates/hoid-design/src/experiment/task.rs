@@ -1,7 +1,8 @@
 //! The loop of an experiment, and what excites it.
 //!
 //! `e = f - y`, `u = B e + F f + n`, `y = P (u + d)`: the target f and the disturbance d at the input of the controlled
-//! element P, a person who answers the error (B) and, on a display that shows it, the target (F), and the remnant n.
+//! element P, a person who responds to the error (B) and, on a display that shows it, to the target (F), and the
+//! remnant n.
 
 use hoid_model::{
     ModelError,
@@ -16,10 +17,10 @@ pub(super) const SAMPLE_S: f64 = 0.01;
 /// Point at which a forcing function enters the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Enters {
-    /// It is the target signal.
+    /// As the target signal.
     #[default]
     Target,
-    /// It is added at the input of the controlled element.
+    /// At the input of the controlled element, to which it is added.
     Disturbance,
 }
 

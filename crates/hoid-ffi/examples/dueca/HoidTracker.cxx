@@ -45,7 +45,7 @@ class HoidTracker : public Module {
     static const ParameterTable *getMyParameterTable() {
         static const ParameterTable table[] = {
             {"set-timing", new MemberCall<_ThisModule_, TimeSpec>(&_ThisModule_::setTimeSpec), set_timing_description},
-            {"method", new VarProbe<_ThisModule_, std::string>(&_ThisModule_::method), "recursive method, as of hoid track"},
+            {"method", new VarProbe<_ThisModule_, std::string>(&_ThisModule_::method), "recursive method, as for hoid track"},
             {"options", new VarProbe<_ThisModule_, std::string>(&_ThisModule_::options), "options in JSON, as of pyhoid.Tracker"},
             {NULL, NULL, "Estimates a person from what they see and do, sample by sample"}};
         return table;

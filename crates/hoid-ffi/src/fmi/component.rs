@@ -175,7 +175,7 @@ pub(super) unsafe fn words<'a>(pointer: *const c_char) -> &'a str {
     text.ok().flatten().unwrap_or_default()
 }
 
-/// The folder of a URI such as `file:///tmp/a%20b/resources`, or of a path; none for an empty one.
+/// The folder of a URI such as `file:///tmp/a%20b/resources`, or of a path; `None` for an empty one.
 pub(super) fn folder(uri: &str) -> Option<PathBuf> {
     if uri.is_empty() {
         return None;

@@ -16,7 +16,7 @@ use super::{
 /// Share of the sample time by which a time may be off.
 const OFF: f64 = 1e-6;
 
-/// Where an instance is.
+/// Phase of an instance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Phase {
     /// Parameters may be set.
@@ -48,7 +48,7 @@ impl Instance {
     pub fn new(token: &str, resources: Option<&Path>) -> Done<Self> {
         let kind = (FmuKind::ALL.into_iter().find(|kind| kind.token() == token)).ok_or_else(|| {
             format!(
-                "the description is of {token:?}, the library of {}; make the unit again by hoid fmu",
+                "the description is for {token:?}, the library for {}; build the unit again with hoid fmu",
                 FmuKind::ALL.map(FmuKind::token).join(" and ")
             )
         })?;
@@ -62,7 +62,7 @@ impl Instance {
         };
         if settings.kind()? != kind {
             return Err(format!(
-                "{FMU_SETTINGS} is of another unit than {token}; make it again by hoid fmu"
+                "{FMU_SETTINGS} is for a unit other than {token}; build it again with hoid fmu"
             ));
         }
         let variables = settings.variables()?;
@@ -120,7 +120,7 @@ impl Instance {
         }
     }
 
-    /// That a variable is of another type than that of the call.
+    /// Error for a variable whose type is not that of the call.
     pub fn other_type(&self, reference: u32) -> String {
         let name = self.variable(reference).map_or("?", |variable| variable.name);
         format!("{name} is of another type")
@@ -152,7 +152,7 @@ impl Instance {
             return Err(format!("the experiment starts at {start_s} s, expected a finite time"));
         }
         if self.phase != Phase::Setup {
-            return Err("the experiment runs already".to_owned());
+            return Err("the experiment is already running".to_owned());
         }
         (self.start_s, self.end_s) = (start_s, start_s);
         Ok(())
@@ -183,13 +183,13 @@ impl Instance {
         };
         let model = match (&mut self.model, self.phase) {
             (Some(model), Phase::Running) => model,
-            _ => return Err("the experiment does not run: initialise the unit first".to_owned()),
+            _ => return Err("the experiment is not running: initialise the unit first".to_owned()),
         };
         let ts = model.sample_time_s();
         if !(step_s > 0.0 && step_s <= ts * (1.0 + OFF)) {
             return Err(format!(
-                "the step is {step_s} s and the sample time {ts} s: samples would be lost; take the sample time as step, or a \
-                 part of it"
+                "the step is {step_s} s and the sample time {ts} s: samples would be lost; use the sample time as \
+                 step, or a fraction of it"
             ));
         }
         if !(t_s >= self.end_s - OFF * ts && t_s.is_finite()) {

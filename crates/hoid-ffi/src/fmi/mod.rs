@@ -1,7 +1,7 @@
 //! Functional mock-up units: the tracker, and the operator of a scenario, for simulators.
 //!
-//! The shared library is the one of the C ABI; `hoid fmu` packs it with a description. What a unit
-//! has is reported by [`hoid_io::fmu`]; here is its effect.
+//! The shared library is the one of the C ABI; `hoid fmu` packs it with a description. The contents of a unit are
+//! defined by [`hoid_io::fmu`]; this module implements them.
 //!
 //! | file | contents |
 //! |---|---|

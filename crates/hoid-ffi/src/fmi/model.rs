@@ -38,7 +38,7 @@ impl Model {
         })
     }
 
-    /// Numbers next to the recursion, and its bytes. It does not change.
+    /// Numbers in addition to the recursion, and its bytes. It does not change.
     pub fn saved(&mut self) -> (Vec<f64>, Vec<u8>) {
         match self {
             Self::Tracker(tracker) => {
@@ -57,7 +57,7 @@ impl Model {
         beside: &[f64],
         bytes: &[u8],
     ) -> Done<Self> {
-        let wrong = || "the state is of another model".to_owned();
+        let wrong = || "the state is from another model".to_owned();
         Ok(match settings.kind()? {
             FmuKind::Tracker => {
                 let &[innovation, changes, change_t_s] = beside else {
@@ -142,7 +142,7 @@ impl TrackerModel {
         let fit = settings.fit.as_deref().filter(|_| of_unit);
         if of_unit && fit.is_none() {
             return Err(
-                "prior is the fit of the unit, which has none; make it by hoid fmu --prior FILE.json".to_owned(),
+                "prior is the fit of the unit, which has none; build it with hoid fmu --prior FILE.json".to_owned(),
             );
         }
         let options = Value::Object(options).to_string();

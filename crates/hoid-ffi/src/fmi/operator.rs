@@ -19,7 +19,7 @@ enum Run {
 impl OperatorModel {
     pub fn new(settings: &FmuSettings, given: &VariableValues<'_>, start_s: f64) -> Done<Self> {
         let text = settings.scenario.as_deref();
-        let text = text.ok_or("the unit has no scenario; make it by hoid fmu --operator SCENARIO")?;
+        let text = text.ok_or("the unit has no scenario; build it with hoid fmu --operator SCENARIO")?;
         let seed = RunSeed {
             seed: given.count("seed"),
             replication: given.count("replication"),

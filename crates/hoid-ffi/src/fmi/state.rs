@@ -1,9 +1,9 @@
 //! The state of an instance, to go back to it or to continue elsewhere with the same digits (FMI 2.0.4, section 2.1.8;
 //! FMI 3.0.1, section 2.2.10).
 //!
-//! A state in the hands of an importer is what it is serialised to (`packed`). The description is the token of the
-//! unit, where the instance is in its experiment and the values of all variables; the bytes are those of the tracker,
-//! or the numbers of the operator. Numbers of 64 bits are in the description by their bits, for JSON has no NaN.
+//! An importer holds a state in its serialised form (`packed`). The description is the token of the unit, where the
+//! instance is in its experiment and the values of all variables; the bytes are those of the tracker, or the numbers of
+//! the operator. Numbers of 64 bits are in the description by their bits, for JSON has no NaN.
 
 #![allow(missing_docs, non_snake_case, clippy::missing_safety_doc)]
 
@@ -50,7 +50,7 @@ impl Instance {
 
     /// Goes to a state of this unit; one that cannot be leaves all as it is.
     fn restore(&mut self, bytes: &[u8]) -> Done {
-        let wrong = || "the state is none of this unit, or was changed or cut since it was taken".to_owned();
+        let wrong = || "the state is not from this unit, or was changed or truncated since it was saved".to_owned();
         let (description, bytes) = opened(MAGIC, bytes).map_err(|_| wrong())?;
         if description["unit"] != json!(self.token) {
             return Err(wrong());
@@ -121,7 +121,7 @@ unsafe fn held<'a>(place: *mut *mut State) -> Done<&'a mut *mut State> {
     let place = unsafe { list_mut(place, 1) }?;
     place
         .first_mut()
-        .ok_or_else(|| "there is no place for the state".to_owned())
+        .ok_or_else(|| "there is no pointer for the state".to_owned())
 }
 
 /// Hands a state over: into the one that is there, else as a new one.
@@ -219,7 +219,7 @@ macro_rules! states {
                 let bytes = unsafe { bytes_of(state) }?;
                 if size < bytes.len() {
                     return Err(format!(
-                        "there is room for {size} bytes, the state has {}",
+                        "there is room for {size} bytes, but the state has {}",
                         bytes.len()
                     ));
                 }
@@ -242,7 +242,8 @@ macro_rules! states {
             let read = |_: &mut Instance| {
                 // SAFETY: by the contract of the interface.
                 let bytes = unsafe { list(bytes, size) }?;
-                opened(MAGIC, bytes).map_err(|_| "the bytes are not a state, or were changed or cut".to_owned())?;
+                opened(MAGIC, bytes)
+                    .map_err(|_| "the bytes are not a state, or were changed or truncated".to_owned())?;
                 // SAFETY: by the contract of the interface.
                 unsafe { hand_over(bytes.to_vec(), state) }
             };

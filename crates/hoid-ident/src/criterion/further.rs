@@ -30,7 +30,7 @@ impl Criterion<'_> {
         })
     }
 
-    /// Returns the places of the coefficients of each further F in theta.
+    /// Returns the indices in theta of the coefficients of each further F.
     pub(super) fn further_poles(&self) -> impl Iterator<Item = Range<usize>> {
         let mut at = self.orders.parameters();
         self.further.iter().map(move |input| {
@@ -88,7 +88,7 @@ impl Criterion<'_> {
         }
     }
 
-    /// Returns the columns of psi of the further inputs over these places of the workspace.
+    /// Returns the columns of psi of the further inputs over these rows of the workspace.
     pub(super) fn further_columns<'w>(&self, counted: &Range<usize>, ws: &'w Workspace) -> Vec<Column<'w>> {
         let mut columns = Vec::new();
         let mut add = |signal: &'w [f64], shifts: Range<usize>, sign: f64| {

@@ -2,7 +2,7 @@
 //!
 //! The unknown past of a record enters the residuals linearly: the nf past values of w through the free responses of
 //! `1/F` (as `-(D/C) h`, h the impulse response of `1/F`), the nc past innovations through those of `1/C`. With G the
-//! matrix of these responses and `G = Q R`, the states of least squares are `x = -R^-1 Q' eps_0` and the residuals
+//! matrix of these responses and `G = Q R`, the least squares states are `x = -R^-1 Q' eps_0` and the residuals
 //! `eps = (I - Q Q') eps_0`. The responses die away, so that Q is short compared with the record. Source: G. H. Golub
 //! and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432.
 //!
@@ -30,7 +30,7 @@ pub(crate) struct InitialStateResponses {
     /// `G[:, kept[k]] = sum over l <= k of Q_l r[k][l]`.
     r: Vec<Vec<f64>>,
     kept: Vec<usize>,
-    /// Impulse response of the 1/F of each input.
+    /// Impulse response of 1/F for each input.
     h: Vec<Vec<f64>>,
     /// Input and number of each state of a 1/F; those of the noise model come after them.
     of_inputs: Vec<(usize, usize)>,

@@ -44,8 +44,8 @@ impl Criterion<'_> {
         value.is_finite().then_some((best, value))
     }
 
-    /// As [`Objective::linearise`], with the derivatives to the coefficients of one polynomial
-    /// alone; those to others are zero.
+    /// As [`Objective::linearise`], with only the derivatives with respect to the coefficients of one polynomial; the
+    /// others are zero.
     pub fn linearise_block(&self, theta: &[f64], block: Block, workspace: &mut Workspace) -> Linearisation {
         let (p, place) = (theta.len(), block.place(&self.orders));
         let count = place.len();
@@ -73,7 +73,7 @@ impl Criterion<'_> {
     pub fn residuals_of(&self, theta: &[f64], record: usize, workspace: &mut Workspace) -> Vec<f64> {
         let mut residuals = Vec::new();
         self.pass(theta, &[], record, workspace, |_, counted, ws| {
-            // For a short record the whole memory at once; for a long one only what it needs.
+            // For a short record the whole memory at once; for a long one only as much as it needs.
             residuals.reserve_exact(self.data[record].u.len() - self.first - residuals.len());
             residuals.extend_from_slice(&ws.eps[counted]);
         });

@@ -4,8 +4,8 @@
 //!
 //! `w = (B/F) q^-nk e`, `v = A u - w`, `eps = (D/C) v` (eq. 5.4)
 //!
-//! and the negative gradient `psi = -d eps/d theta` is made of shifts of one filtered signal each
-//! (Ljung, *System Identification*, 1999, eq. 10.53; with the signs of this notation):
+//! and the negative gradient `psi = -d eps/d theta` consists of shifts of one filtered signal per polynomial (Ljung,
+//! *System Identification*, 1999, eq. 10.53; with the signs of this notation):
 //!
 //! | parameter | psi(t) |
 //! |---|---|
@@ -21,23 +21,21 @@
 //! then remains unknown, the nf past values of w and the nc past values of eps, is estimated in
 //! each record. eps is affine in these states, so that they are eliminated exactly for each theta
 //! (variable projection; G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432):
-//! with the orthonormal basis Q of their responses, `eps = (I - Q Q') eps_0`. The loss is then a
-//! function of theta alone, its gradient is `-psi' eps` exactly (the states are optimal), and the
-//! Gauss-Newton matrix is `psi' (I - Q Q') psi` (the approximation of L. Kaufman, *BIT* 15 (1975)
-//! 49-57). A shifted signal differs from the true derivative only by a free response of 1/F or 1/C,
-//! which lies in the span of Q: shifting stays exact. So does it where u has a level ([`Data::level`]),
-//! which is one more such state.
+//! with the orthonormal basis Q of their responses, `eps = (I - Q Q') eps_0`. The loss is then a function of theta
+//! only, its gradient is `-psi' eps` exactly (the states are optimal), and the Gauss-Newton matrix is
+//! `psi' (I - Q Q') psi` (the approximation of L. Kaufman, *BIT* 15 (1975) 49-57). A shifted signal differs from the
+//! true derivative only by a free response of 1/F or 1/C, which lies in the span of Q: shifting stays exact. This also
+//! holds if u has a level ([`Data::level`]), which is one more such state.
 //!
 //! With [`InitialState::Backcast`] the past of w is unknown as before, but that of the noise is
 //! stationary ([`stationary_noise`]): the residuals start nd samples earlier, and the state of the
-//! noise model counts as r further residuals z. Without an input, A takes the place of D and the residuals start with
-//! the record.
+//! noise model counts as r further residuals z. Without an input, A replaces D and the residuals start with the record.
 //!
 //! **Several inputs.** `A u = sum_i (B_i/F_i) q^-nk_i e_i + (C/D) eps`: each has its own s, w, B and
 //! F, psi of its coefficients has the two rows of B and F above with its own signals, and the past
 //! values of each w are unknown ([`further`]). Ljung, 1999, section 4.2 (eq. 4.35).
 //!
-//! **Weights** multiply the squared residuals; they serve the robust loss.
+//! **Weights** multiply the squared residuals; they are used by the robust loss.
 //!
 //! **A long record** is processed span by span after its first part ([`pass`]), so that a fit needs little memory in
 //! addition to the record.

@@ -44,7 +44,7 @@ impl Criterion<'_> {
         })
     }
 
-    /// Returns the columns of psi, in the order of theta, over these places of the workspace.
+    /// Returns the columns of psi, in the order of theta, over these rows of the workspace.
     pub(super) fn columns<'w>(
         &self,
         parts: &Polynomials<'_>,

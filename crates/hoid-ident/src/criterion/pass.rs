@@ -5,7 +5,7 @@
 //! processor cache, each preceded by the last samples of the previous span. Memory and time per sample then do not grow
 //! with the length of the record.
 //!
-//! The initial states have an effect on the start only. Their responses must have died away within the head
+//! The initial states affect only the start. Their responses must have died away within the head
 //! ([`InitialStateResponses::have_died`](crate::criterion::initial_state_responses::InitialStateResponses::have_died));
 //! if a pole is so near the unit circle that they have not, the record is processed as a whole. The same holds with
 //! weights, of which there is one per sample, with further inputs, and with a stationary past, whose columns are
@@ -33,7 +33,7 @@ const SPAN: usize = 1 << 11;
 const HEAD: usize = 1 << 15;
 
 impl Criterion<'_> {
-    /// Processes a record and calls `show` with the eliminated initial states, the places in the workspace of the
+    /// Processes a record and calls `show` with the eliminated initial states, the rows of the workspace with the
     /// residuals that count, and the workspace; for a long record, once for each span. Returns the eliminated initial
     /// states.
     pub(super) fn pass(

@@ -41,7 +41,7 @@ pub(crate) enum Block {
 impl Block {
     pub(super) const ALL: [Self; 6] = [Self::A, Self::B, Self::C, Self::D, Self::F, Self::Further];
 
-    /// Returns the place of its coefficients in theta.
+    /// Returns the indices of its coefficients in theta.
     pub fn place(self, o: &Orders) -> Range<usize> {
         let counts = [o.na, o.nb, o.nc, o.nd, o.nf, 0];
         let from = counts[..self as usize].iter().sum();

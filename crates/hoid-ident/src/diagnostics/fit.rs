@@ -37,7 +37,7 @@ impl Fit {
             all.push(Finding::note(
                 "no-noise",
                 format!(
-                    "there is no noise: the model explains u to {:.0e} of its size; error bars are those of the digits of the data",
+                    "there is no noise: the model explains u to within {:.0e} of its size; error bars only reflect the rounding of the data",
                     share.sqrt()
                 ),
             ));
@@ -102,7 +102,7 @@ impl Fit {
         if self.responds() == Some(false) {
             all.push(Finding::undetermined(
                 "gain",
-                "B does not differ from zero (5 %): there is too little response to e",
+                "B does not differ significantly from zero (5 %): there is too little response to e",
             ));
         }
         all
@@ -147,7 +147,10 @@ impl Fit {
         if self.instrumented {
             // Instrumental variables assume nothing about the noise, and residuals of a closed loop follow e.
             let note = |finding: Finding| {
-                let words = format!("{}; the instruments do not need it white", finding.message);
+                let words = format!(
+                    "{}; instrumental variables do not require white residuals",
+                    finding.message
+                );
                 Finding::note(finding.kind, words)
             };
             return measures

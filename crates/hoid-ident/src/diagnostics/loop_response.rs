@@ -2,7 +2,7 @@
 //!
 //! In a loop every change of u returns in e. The test is whether the latest [`LATEST_S`] of u predict e better than the
 //! earlier errors and outputs do (C. W. J. Granger, *Econometrica* 37 (1969) 424-438). A common component of both
-//! signals, such as a forcing function, is in both pasts; the own component of u is not.
+//! signals, such as a forcing function, is in both pasts; the component of u alone is not.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};

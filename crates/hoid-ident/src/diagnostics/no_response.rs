@@ -1,9 +1,9 @@
 //! Test of whether u responds to e at all.
 //!
 //! A search over forms, delays and orders finds a response in any two records; its result carries little information on
-//! whether there is one. The test is done beforehand, for all forms at once. Both channels are whitened by an
-//! autoregression each, so that a slow component does not count for many samples. At the frequencies `omega_k` of the
-//! record up to [`HIGHEST_RAD_S`] the whitened output is regressed on a gain, a lead and a lag of e after a typical
+//! whether there is one. The test is done beforehand, for all forms at once. Each channel is whitened by an
+//! autoregression, so that a slow component does not count as many samples. At the frequencies `omega_k` of the record
+//! up to [`HIGHEST_RAD_S`] the whitened output is regressed on a gain, a lead and a lag of e after a typical
 //! neuromuscular system and a delay,
 //!
 //! `U_k = (A_u/A_e) N e^{-j omega tau} (b_1 + b_2 j omega + b_3/(j omega + a)) E_k + R_k`,
@@ -64,8 +64,9 @@ impl Response {
             Finding::undetermined(
                 "no-response",
                 format!(
-                    "no response of u to e can be distinguished from chance: {} of {} pairs of records with the same spectra and \
-                     no relation show as much (p = {:.2}); check that both channels are of one run, and which is which",
+                    "no response of u to e can be distinguished from chance: {} of {} pairs of unrelated records with \
+                     the same spectra show as much (p = {:.2}); check that both channels are from one run, and which \
+                     is which",
                     self.reached_by,
                     self.surrogates,
                     self.p_value()

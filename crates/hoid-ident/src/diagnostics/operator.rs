@@ -62,8 +62,8 @@ fn negative_lead(negative: &[String]) -> Option<Finding> {
         Finding::doubt(
             "negative-lead",
             format!(
-                "{} below zero, by two standard errors of K_e and of K_e_dot: a gain and a lead are not the form of this \
-                 person, who may have a lag; only the response is theirs (--structure operator finds the form)",
+                "{} below zero, by two standard errors of K_e and of K_e_dot: this person does not have the form of a \
+                 gain and a lead and may have a lag; only the response is valid (--structure operator finds the form)",
                 negative.join(", ")
             ),
         )
@@ -82,8 +82,8 @@ pub fn pole_findings(operator: &OperatorEstimate, sample_time: SampleTime) -> Ve
     not_determined(&open).into_iter().chain(lag).collect()
 }
 
-/// Returns a finding about poles that describe a lag: omega_nm (rad/s) above what the sampling shows, or a damping that
-/// sets the two poles far apart.
+/// Returns a finding about poles that describe a lag: omega_nm (rad/s) above the Nyquist frequency, or a damping with
+/// which the two poles are far apart.
 pub fn neuromuscular_finding(omega_nm_rad_s: f64, zeta_nm: f64, sample_time: SampleTime) -> Option<Finding> {
     let nyquist = PI / sample_time.s();
     let what = if omega_nm_rad_s > nyquist {
@@ -96,8 +96,8 @@ pub fn neuromuscular_finding(omega_nm_rad_s: f64, zeta_nm: f64, sample_time: Sam
     Some(Finding::doubt(
         "neuromuscular-lag",
         format!(
-            "{what}: the two poles have become a lag and carry no information about the neuromuscular system; take the grey box or the \
-             operator family, or a model of another order"
+            "{what}: the two poles have become a lag and carry no information about the neuromuscular system; use the \
+             grey box or the operator family, or a model of another order"
         ),
     ))
 }
@@ -133,7 +133,7 @@ pub(super) fn search_finding(termination: Termination) -> Option<Finding> {
     match termination.reason {
         Reason::Border => Some(Finding::doubt(
             "border",
-            "a root of C or F lies on the unit circle, and standard errors mean little; lower the orders",
+            "a root of C or F lies on the unit circle, so that standard errors are unreliable; lower the orders",
         )),
         Reason::ExactFit => Some(Finding::note(
             "exact-fit",

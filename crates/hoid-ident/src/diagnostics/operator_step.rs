@@ -6,9 +6,9 @@
 //! `delta = (psi' psi)^-1 psi' eps`
 //!
 //! is the step of Gauss and Newton to the fit of that stretch (L. Le Cam's one-step estimate, *Proc.
-//! Third Berkeley Symp.* 1 (1956) 129-156). Its covariance is that of the scores of blocks of 2 s about
-//! it, `(n/(n-5)) G^-1 sum_c s_c s_c' G^-1` with `s_c = g_c - G_c delta` (K.-Y. Liang and S. L. Zeger,
-//! *Biometrika* 73 (1986) 13-22), no less than that of the model.
+//! Third Berkeley Symp.* 1 (1956) 129-156). Its covariance is computed from the scores of 2 s blocks at this step,
+//! `(n/(n-5)) G^-1 sum_c s_c s_c' G^-1` with `s_c = g_c - G_c delta` (K.-Y. Liang and S. L. Zeger, *Biometrika* 73
+//! (1986) 13-22), and each variance is at least that of the model.
 
 use std::collections::BTreeMap;
 

@@ -7,9 +7,9 @@
 //!
 //! **Sticks with a dead zone.** If only the target excites the loop, the part of e that follows it is larger than the
 //! rest of e. A dead zone passes large and small signals by different gains (the describing function of A. Gelb and
-//! W. E. Vander Velde, *Multiple-Input Describing Functions*, 1968), so that u follows the target by another gain than
-//! e as a whole: this looks like a response to the target. Where u [rests](Rest) as such a stick does, the finding is
-//! a note that names both explanations.
+//! W. E. Vander Velde, *Multiple-Input Describing Functions*, 1968), so that u follows the target with a gain other
+//! than that of e as a whole: this looks like a response to the target. Where u [rests](Rest) like that of such a
+//! stick, the finding is a note with both explanations.
 
 use hoid_model::{Finding, Form, Record};
 
@@ -82,8 +82,8 @@ fn finding(name: &str, chance: f64, nonlinear: bool) -> Finding {
         return Finding::note(
             "other-input",
             format!(
-                "u follows {name} by more than its response to the error (p = {chance:.0e}): a stick with a dead zone \
-                 does that; if the person saw {name}, add --input {name}"
+                "u follows {name} by more than the response to the error explains (p = {chance:.0e}): a stick with a \
+                 dead zone has this effect; if the person saw {name}, add --input {name}"
             ),
         );
     }

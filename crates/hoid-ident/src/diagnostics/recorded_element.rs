@@ -8,10 +8,10 @@
 //! with the hold `h = e^{-s Ts/2} sinc(omega Ts/2)` of u between its samples and a polynomial T for the difference of
 //! the states at both ends (R. Pintelon and J. Schoukens, *System Identification: A Frequency Domain Approach*, 2012,
 //! section 6.3.2). It is linear in the coefficients of A, B, C, `B kappa` and T, which are found by least squares at
-//! the frequencies of manual control; the delay is scanned, for d the same as for u, or none where u alone was
-//! recorded late. Rows are divided by `B h` of the round before, so that a residual is that of a disturbance at u
-//! (C. K. Sanathanan and J. Koerner, IEEE Trans. Automatic Control 8 (1963) 56-58), and weighted by its smoothed
-//! spectrum.
+//! the frequencies of manual control; the delay is scanned, with the same delay for d as for u, or with none for d if
+//! only u was recorded late. Rows are divided by `B h` of the previous iteration, so that a residual has the size of a
+//! disturbance at u (C. K. Sanathanan and J. Koerner, IEEE Trans. Automatic Control 8 (1963) 56-58), and weighted by
+//! its smoothed spectrum.
 //!
 //! | file | contents |
 //! |---|---|
@@ -77,10 +77,10 @@ impl RecordedElement {
         let loop_lost = "crossover and phase margin are not those of the recorded loop";
         let message = match (self.is_given(), beyond.is_empty()) {
             (true, true) => return None,
-            (true, false) => format!("e returns from u by {given}{beyond}: {loop_lost}"),
+            (true, false) => format!("e follows from u through {given}{beyond}: {loop_lost}"),
             (false, _) => format!(
-                "e returns from u by {}{beyond}, not by {given}: at {omega} rad/s {} times its gain and {:+.0} deg; \
-                 {loop_lost}",
+                "e follows from u through {}{beyond}, not through {given}: at {omega} rad/s {} times its gain and \
+                 {:+.0} deg; {loop_lost}",
                 self.element,
                 three_digits(ratio.norm()),
                 ratio.arg().to_degrees()
@@ -90,8 +90,8 @@ impl RecordedElement {
     }
 }
 
-/// Finds the element of the loop of these records. `None` if they do not determine it: signals of the loop are missing,
-/// or the records are too short. `excitation` is the channel of a target or a disturbance.
+/// Identifies the controlled element from these closed-loop records. `None` if they do not determine it: signals of the
+/// loop are missing, or the records are too short. `excitation` is the channel of a target or a disturbance.
 pub fn recorded_element(
     records: &[Record],
     given: &ContinuousTransferFunction,

@@ -1,11 +1,11 @@
 //! Test for a response to the error that a model does not have.
 //!
 //! For a model that is linear in its unknowns, `u = X b + v`, the columns X are known: responses of a basis, their
-//! derivatives by the fixed dynamics, a level. With an autoregression `D v = eps` of order [`NOISE`] the test is
-//! whether further taps on e carry information about eps; they are Z, in place of the impulse response that X cannot
-//! have: means of e over [`TAPS`] consecutive spans of [`TAP_S`]. The statistic is that of the Lagrange multiplier (T.
-//! S. Breusch and A. R. Pagan, *Review of Economic Studies* 47 (1980) 239-253; L. Ljung, *System Identification*, 1999,
-//! section 16.6, for the residuals of a model)
+//! derivatives with respect to the fixed dynamics, a level. With an autoregression `D v = eps` of order [`NOISE`] the
+//! test is whether further taps on e carry information about eps; these taps are Z, which replaces the impulse response
+//! that X cannot represent: means of e over [`TAPS`] consecutive spans of [`TAP_S`]. The statistic is that of the
+//! Lagrange multiplier (T. S. Breusch and A. R. Pagan, *Review of Economic Studies* 47 (1980) 239-253; L. Ljung,
+//! *System Identification*, 1999, section 16.6, for the residuals of a model)
 //!
 //! `s(t) = z(t) eps(t)`, z the remainder of D Z after the projection on D X and the lags of v,
 //!
@@ -13,7 +13,7 @@
 //! correlated. There are two variances: that of the model, with `T = (sum s)' (sigma^2 sum z z')^-1 (sum s)`,
 //! chi-square with [`TAPS`] degrees of freedom, and the scatter of the sums over blocks of 2 s, with Hotelling's `T^2`,
 //! which is valid even if the size of the remnant changes (H. Hotelling, *Annals of Mathematical Statistics* 2 (1931)
-//! 360-378). The larger p-value counts.
+//! 360-378). The larger p-value is used.
 //!
 //! Signals are decimated to [`RATE_HZ`] at most. Residuals are not limited: the pulses of a person who moves a stick in
 //! pulses are the response to e, and the part removed by a limit would look like a missing response.

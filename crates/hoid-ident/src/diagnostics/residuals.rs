@@ -3,8 +3,8 @@
 //! With `S = sum eps^2` over all records,
 //!
 //! - the autocorrelation `sum eps(t) eps(t-k) / S` at lags of 1 to 25: the deficiency of the noise model;
-//! - the correlation `sum eps(t) e(t-k) / sqrt(S sum e^2)` at lags of 0 to 0.6 s: the deficiency of the operator. Only
-//!   past errors are used, as in a closed loop later errors follow the residuals;
+//! - the correlation `sum eps(t) e(t-k) / sqrt(S sum e^2)` at lags of 0 to 0.6 s: this shows a deficiency of the
+//!   operator. Only past errors are used, as in a closed loop later errors follow the residuals;
 //! - the leverage `max eps^2 / S`: the influence of one sample on the fit.
 //!
 //! Limits are effect sizes and not significance levels: with the samples of ten runs every model of a person is
@@ -105,7 +105,7 @@ impl ResidualMeasures {
             Finding::doubt(
                 "residuals-not-white",
                 format!(
-                    "the residuals are correlated by {:.2} with their own past: the noise model is too poor",
+                    "the residuals have a correlation of {:.2} with their own past: the noise model is too simple",
                     self.autocorrelation
                 ),
             )
@@ -118,7 +118,7 @@ impl ResidualMeasures {
             Finding::doubt(
                 "structure",
                 format!(
-                    "the residuals are correlated by {:.2} with past errors: the operator misses something of the \
+                    "the residuals have a correlation of {:.2} with past errors: the operator misses part of the \
                      response",
                     self.cross_correlation
                 ),
@@ -132,7 +132,7 @@ impl ResidualMeasures {
             Finding::doubt(
                 "leverage",
                 format!(
-                    "one sample (record {}, residual {}) makes {:.0} % of the sum of squares: look at it, or leave it out",
+                    "one sample (record {}, residual {}) contributes {:.0} % of the sum of squares: look at it, or leave it out",
                     self.at.0 + 1,
                     self.at.1,
                     100.0 * self.leverage

@@ -70,15 +70,16 @@ impl Without {
             Self::SamplesThatStandOut => Finding::doubt(
                 "leverage",
                 format!(
-                    "few samples carry the fit: with each held to its neighbours it differs in {differ} standard errors; \
-                     look at the recording"
+                    "the fit depends on few samples: with each limited to its neighbours it differs in {differ} \
+                     standard errors; look at the recording"
                 ),
             ),
             Self::WhatIsSlow(period_s) => Finding::doubt(
                 "slow",
                 format!(
-                    "a drift or a step that the person does not follow carries the fit: without what is slower than \
-                     {period_s:.0} s it differs in {differ} standard errors; look at the recording, or take a span without it"
+                    "the fit depends on a drift or a step that the person does not follow: without components slower \
+                     than {period_s:.0} s it differs in {differ} standard errors; look at the recording, or choose a \
+                     span without it"
                 ),
             ),
         })
@@ -170,7 +171,7 @@ pub fn of_family(
     let measures = |of: &FamilyFit| of.loop_measures_in_front(0, element?);
     opinions(asked, records, |others| {
         let other = again.fit_with_response(others, None).ok()?;
-        // The best form alone: the other fit has only this one.
+        // Only the best form: the other fit has no others.
         let (one, two) = (fit.weighed.first()?, other.weighed.first()?);
         let parameters = one.operators.iter().zip(&two.operators).flat_map(|(one, two)| {
             let both = one.parameters.iter().zip(&two.parameters);
@@ -200,12 +201,12 @@ pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record
     if fit.change_found() != other.change_found() {
         return Some(Finding::doubt(
             "leverage",
-            "few samples carry the fit: with each held to its neighbours the records show something else about a change; \
-             look at the recording",
+            "the fit depends on few samples: with each limited to its neighbours the records give another result about \
+             a change; look at the recording",
         ));
     }
     if fit.change_found() {
-        // The noise model alone is not the answer: pulses of a stick are in it.
+        // The noise model alone does not decide: it contains pulses of a stick.
         let named = |of: &SigmoidFit| {
             let operator = of.parameters().len() - of.d().len();
             let parameters = of.parameters().into_iter().take(operator);
@@ -236,7 +237,7 @@ pub fn of_level(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<
         Finding::doubt(
             "level",
             format!(
-                "an offset of e or u moves {} standard errors: take the means out with --detrend mean",
+                "an offset of e or u changes {} standard errors: remove the means with --detrend mean",
                 moved.join(", ")
             ),
         )

@@ -54,12 +54,12 @@ impl SigmoidFit {
         if !self.change_found() {
             all.push(Finding::note(
                 "no-change",
-                "the records show no change (BIC): take the operator without one",
+                "the records show no change (BIC): use the operator without one",
             ));
         } else if self.is_change_point() {
             all.push(Finding::note(
                 "change-point",
-                "the change is too fast for normal errors of t_M and G: take the likelihood intervals",
+                "the change is too fast for the errors of t_M and G to be normal: use the likelihood intervals",
             ));
         }
         for parameter in self.parameters() {
@@ -74,7 +74,7 @@ impl SigmoidFit {
                 // A pure integration, or no lag.
                 Some(Remark::AtBound) if name == "T_I" => all.push(Finding::note(
                     "lag",
-                    format!("T_I and K are not determined, K/T_I is: T_I rests at a bound, {value:.3} s"),
+                    format!("T_I and K are not determined, K/T_I is: T_I is at a bound, {value:.3} s"),
                 )),
                 Some(Remark::PriorAlone) => all.push(Finding::note(
                     "prior",

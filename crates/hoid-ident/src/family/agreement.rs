@@ -2,20 +2,18 @@
 //!
 //! The prediction error fit uses every sample and needs a noise model; the fit at the lines uses only the excited
 //! frequencies and needs none; refined instrumental variables use every sample of the part that follows the excitation.
-//! For each pair the difference d of their coordinates, over those that the data determine, is compared with its
+//! For each pair of methods, the difference d between those coordinates that the data determine is compared with its
 //! covariance V: `T = d' V^-1 d`.
 //!
 //! **V** is a sum of three:
 //!
-//! 1. and 2. The covariances that the two methods have from all residuals or lines together, times
-//!    kappa. A jackknife over n runs has a rank of n - 1 at most: with five runs and four coordinates
-//!    it finds the methods sure of some direction by chance (H. Hotelling, *Annals of Mathematical
-//!    Statistics* 2 (1931) 360-378). Both methods see the same records, so that the sum is on the safe
-//!    side of a false alarm.
+//! 1. and 2. The covariances of the two methods from all residuals or lines together, times kappa. A jackknife over n
+//!    runs has a rank of n - 1 at most: with five runs and four coordinates it gives, by chance, a very small variance
+//!    in some direction (H. Hotelling, *Annals of Mathematical Statistics* 2 (1931) 360-378). Both methods see the same
+//!    records, so that the sum is conservative with respect to false alarms.
 //! 3. In a closed loop the prediction error fit has a bias where its noise model is wrong, which
 //!    no scatter shows: `sum d_k d_k'` over its differences to fits with other noise models
-//!    ([`super::sensitivity`]). It becomes a part of the errors of the result, so that it is no
-//!    reason to doubt them.
+//!    ([`super::sensitivity`]). It becomes part of the errors of the result, and is therefore no reason to doubt them.
 //!
 //! **Coordinates that count** are determined by the data, with a share of the prior below a quarter in each method: a
 //! resonance above the lines is determined by the prior in one method and not in the other.
@@ -24,8 +22,8 @@
 //! compensate each other along a curve, K T_L nearly constant, so that two points far apart on this curve can be
 //! equivalent: a linear test about one of them would report a difference.
 //!
-//! T is chi-square with as many degrees of freedom. For several pairs the smallest probability counts, times their
-//! number (Bonferroni): a test at 1 % doubts one person in a hundred at most whose operator is of the form.
+//! T is chi-square with as many degrees of freedom. For several pairs the smallest probability is used, times their
+//! number (Bonferroni): at a level of 1 %, at most one in a hundred people whose operator has the form is reported.
 
 use hoid_model::{FamilyOperator, operator_family::Coordinate};
 use statrs::distribution::{ChiSquared, ContinuousCDF};

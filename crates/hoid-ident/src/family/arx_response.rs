@@ -49,8 +49,8 @@ impl ArxResponse {
 
     /// The same for almost no noise; `None` if there is more. A u without noise does not determine the coefficients of A
     /// in a model of high order, and B has to cover the delay, which takes many samples at high rates. But an operator
-    /// without noise is a model of its own order, exactly, at the whole part of its own delay: of both kinds, the model
-    /// with the smallest innovations.
+    /// without noise is exactly a model of its own order, with the whole samples of its own delay: of both kinds, the
+    /// model with the smallest innovations.
     pub fn without_noise(records: &[Record], longest_delay_s: f64) -> Option<Self> {
         let high = regressed(records, true, MOST_GAINS).ok()?;
         if high.innovations > PROMISING {

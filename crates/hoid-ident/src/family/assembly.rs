@@ -285,7 +285,6 @@ impl<'a> Chosen<'_, 'a> {
 /// Adds the bias of the fit to its errors: its difference to the fit at the lines, and, for coordinates that the lines
 /// do not determine or without lines, its differences to fits with other noise models ([`super::sensitivity`]).
 /// `unseen` is false with little noise, for which these additional variances do not apply.
-/// false if there is little noise, and little of what no noise model shows.
 fn add_bias(
     errors: &mut Errors,
     fit: &PredictionFit<'_>,

@@ -70,7 +70,7 @@ impl FromStr for SeenChannel {
 
     /// `NAME`, `NAME=ROLE`, `NAME=ROLE:PREVIEW`, each optionally followed by `/FORM`.
     fn from_str(text: &str) -> Result<Self, String> {
-        let expected = || "NAME=ROLE, as r=feedforward, r=feedforward:0.5 or r=feedforward/derivative".to_owned();
+        let expected = || "NAME=ROLE, such as r=feedforward, r=feedforward:0.5 or r=feedforward/derivative".to_owned();
         let (text, form) = match text.split_once('/') {
             Some((head, form)) => (head, Some(form)),
             None => (text, None),

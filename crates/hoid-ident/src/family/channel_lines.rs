@@ -38,7 +38,7 @@ use crate::{
     optimize::{Linearisation, Minimum, Objective, minimise},
 };
 
-/// Starts from which the search runs to its end.
+/// Number of starts from which the search runs to completion.
 const SEARCHES: usize = 4;
 /// Number of neighbouring bins from which the remnant at a line is estimated.
 const NEIGHBOURS: usize = 8;
@@ -407,7 +407,7 @@ impl AtChannelLines<'_> {
     }
 }
 
-/// Places of the coordinates that belong to a channel only.
+/// Indices of the coordinates that only one channel has.
 pub(super) fn own_places(form: Form, neuromuscular: bool) -> Vec<usize> {
     let all = form.coordinates(neuromuscular);
     let own = |i: &usize| !matches!(all[*i], Coordinate::LogOmega | Coordinate::LogZeta);

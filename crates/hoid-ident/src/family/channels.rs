@@ -97,8 +97,8 @@ impl<'s> Seen<'s> {
             let shown = channel.preview_s;
             if !(shown.is_finite() && (0.0..=10.0).contains(&shown)) {
                 return refuse(
-                    format!("{} with {shown} s of its future", channel.name),
-                    "0 to 10 s that are shown",
+                    format!("{} with {shown} s of preview", channel.name),
+                    "0 to 10 s of preview",
                 );
             }
         }
@@ -112,7 +112,7 @@ impl<'s> Seen<'s> {
             if left == 0 {
                 return refuse(
                     format!("{} samples of {}", record.len(), record.label()),
-                    "more than the future that is shown has",
+                    "more samples than the preview",
                 );
             }
             for ((channel, &lead), values) in all.iter().zip(&leads).zip(&mut values) {
@@ -168,7 +168,7 @@ impl<'s> Seen<'s> {
                 return refuse(
                     format!("{} is constant", channel.name),
                     format!(
-                        "inputs that move; drop {}: a response to it leaves no trace",
+                        "inputs that vary; drop {}: a response to it cannot be seen",
                         channel.name
                     ),
                 );
@@ -188,7 +188,7 @@ impl<'s> Seen<'s> {
                 return refuse(
                     format!("{} is a sum of {}", channel.name, names.join(" and ")),
                     format!(
-                        "inputs of which none follows from the others, as r = e + y does; drop one of {}, {}",
+                        "inputs none of which follows from the others, as r = e + y does; drop one of {}, {}",
                         names.join(", "),
                         channel.name
                     ),

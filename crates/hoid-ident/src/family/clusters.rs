@@ -2,11 +2,11 @@
 //!
 //! `g_c = sum psi eps` and `G_c = sum psi psi'` over cluster c.
 //!
-//! **Clusters** are the records if there are five or more. Fewer are cut into blocks of equal length, about eight in
-//! all, none shorter than four seconds: longer than the memory of residuals and of the loop. Single variances of so few
-//! blocks scatter themselves; blocks give one number, the inflation kappa of all variances (`covariances`), at least
-//! one. The variation from one run to the next cannot be determined from one run: the variation of people's gain is
-//! added with the value observed in other data (`covariances`).
+//! **Clusters** are the records if there are five or more. Fewer records are cut into blocks of equal length, about
+//! eight in all, none shorter than four seconds: longer than the memory of residuals and of the loop. Variances
+//! estimated from so few blocks are themselves uncertain; blocks therefore give one number, the inflation kappa of all
+//! variances (`covariances`), at least one. The variation from one run to the next cannot be determined from one run:
+//! the variation of people's gain is added with the value observed in other data (`covariances`).
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 

@@ -1,10 +1,10 @@
 //! Comparison of the forms that were tried: the basis of their weights in [`super::choice`].
 //!
 //! If an excitation was recorded, forms are compared at its lines; otherwise by their prediction errors, all in units
-//! of one inflation kappa, so that a large variance of its own is no advantage for a form. With little noise
-//! ([`super::low_noise`]) there is a true form to be found, and a parameter costs Schwarz's `ln n` (G. Schwarz, *Annals
-//! of Statistics* 6 (1978) 461-464) instead of Akaike's 2. A form with parameters that the data do not determine counts
-//! only if all forms have such parameters.
+//! of one inflation kappa, so that a large variance is no advantage for its form. With little noise
+//! ([`super::low_noise`]) there is a true form to be identified, and a parameter costs Schwarz's `ln n` (G. Schwarz,
+//! *Annals of Statistics* 6 (1978) 461-464) instead of Akaike's 2. A form with parameters that the data do not
+//! determine counts only if all forms have such parameters.
 
 use hoid_model::{FamilyOperator, Form, operator_family::Coordinate};
 use hoid_numerics::statistics::upper_median;
@@ -76,8 +76,8 @@ fn count_once(counting: &mut [Option<f64>], tried: &[Tried<'_>]) {
     }
 }
 
-/// Without noise, a form that is not right leaves a multiple of the residual of one that is: of the forms with an equal
-/// fit, only the simplest ones are kept. Sums of squares below `equal` count as equal.
+/// Without noise, a wrong form leaves a multiple of the residual of a right one: among forms with an equal fit, only
+/// the simplest are kept. Sums of squares below `equal` count as equal.
 fn simplest_alone(counting: &mut [Option<f64>], tried: &[Tried<'_>], equal: f64) {
     let fit = |i: usize| tried[i].fit.as_ref().ok();
     let squares = |i: usize| fit(i).map_or(f64::INFINITY, |fit| (fit.loss * fit.residuals as f64).max(equal));

@@ -56,8 +56,8 @@ impl Covariances {
     ///
     /// The prediction error fit is biased if its noise model is wrong, by an amount that no scatter shows; an estimate
     /// without that noise model shows it. The errors are then computed from the mean squared error, variance plus
-    /// squared bias, with d for the bias: all of it, and not the `d d'/3` of a true value that is anywhere between the
-    /// two, since the bias is on one side. Elements at a bound remain unchanged.
+    /// squared bias, with d for the bias: all of it, and not `d d'/3`, which would hold for a true value anywhere
+    /// between the two, since the bias is on one side. Elements at a bound remain unchanged.
     ///
     /// Errors are to first order, and the other estimate may be far along a ridge of the criterion, as with a gain and
     /// a lag that increase together: `J d`, J the gradient of the response, is then not the difference of the
@@ -269,7 +269,7 @@ fn over_clusters(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
 /// over the band of manual control; at least one. `None` for fewer than two clusters.
 ///
 /// The ratio for single coordinates would depend on the chance of a few clusters, and on coordinates that the data
-/// hardly determine; the response is what they do determine.
+/// hardly determine, whereas they determine the response.
 pub(super) fn inflation(fit: &PredictionFit<'_>) -> Option<f64> {
     let p = fit.parameters();
     let (clustered, inverse) = (over_clusters(fit)?, inverse(fit)?);

@@ -76,7 +76,7 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
     if !judged.has_covariance {
         all.push(Finding::undetermined(
             "singular",
-            "the data leave a combination of parameters open: there are no error bars",
+            "the data do not determine a combination of parameters: there are no error bars",
         ));
     }
     let (tau, (low, high)) = judged.delay;
@@ -91,8 +91,8 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
     if !judged.apart {
         all.push(Finding::doubt(
             "inputs-together",
-            "no excitation on lines of its own separates the error from the other inputs: both responses depend on the assumed forms; \
-             record a target and a disturbance on separate lines, over whole periods",
+            "no excitation with its own lines separates the error from the other inputs: both responses depend on the \
+             assumed forms; record a target and a disturbance with separate lines, over whole periods",
         ));
     }
     determined(judged, &mut all);
@@ -102,8 +102,8 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
         all.push(Finding::note(
             "no-noise",
             format!(
-                "there is no noise: the operator explains u to {:.0e} of its size, as in a simulation and of no person; error bars \
-                 are those of the digits of the data",
+                "there is no noise: the operator explains u to within {:.0e} of its size, as in a simulation and not \
+                 with a person; error bars only reflect the rounding of the data",
                 share.sqrt()
             ),
         ));
@@ -120,8 +120,8 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
         all.push(Finding::note(
             "clustered-errors",
             format!(
-                "error bars are those of the scatter between {what}, up to {ratio:.1} times those of the model, which \
-                 takes residuals for white and the person for constant"
+                "error bars are computed from the scatter between {what}, and are up to {ratio:.1} times those of the \
+                 model, which assumes white residuals and a constant person"
             ),
         ));
     }
@@ -137,7 +137,7 @@ fn unsettled(weighed: &[WeighedForm]) -> Option<Finding> {
     Some(Finding::note(
         "form",
         format!(
-            "the form is not settled: {}; parameters have the names of {}, and what the forms differ by is in all errors",
+            "the form is not determined: {}; parameters are named as in {}, and all errors include the differences between the forms",
             named.join(", "),
             front.form
         ),
@@ -160,7 +160,7 @@ fn pulled(parameter: &Parameter, prior: &OperatorPrior) -> Option<String> {
             format!(" {}", parameter.unit)
         };
         format!(
-            "{} from {:.3} to {:.3}{unit} ({errors:.1} of its standard error)",
+            "{} from {:.3} to {:.3}{unit} ({errors:.1} standard errors)",
             parameter.name,
             parameter.value * (-pull).exp(),
             parameter.value
@@ -179,7 +179,7 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
         all.push(Finding::undetermined(
             "response",
             format!(
-                "the response of the person is not determined: its error is {:.0} % at the frequency at which it is known best",
+                "the response of the person is not determined: its error is {:.0} % even at the frequency at which it is known best",
                 100.0 * error
             ),
         ));
@@ -216,8 +216,8 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
         all.push(Finding::doubt(
             "neuromuscular-lag",
             format!(
-                "zeta_nm = {:.1}: the neuromuscular poles have become lags and carry no information about muscles; take a form with a lag, or \
-                 --neuromuscular no",
+                "zeta_nm = {:.1}: the neuromuscular poles have become lags and carry no information about muscles; \
+                 choose a form with a lag, or --neuromuscular no",
                 zeta.value
             ),
         ));
@@ -247,7 +247,7 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
     if !pulled.is_empty() {
         all.push(Finding::note(
             "prior-pull",
-            format!("the prior moves {}; --prior none leaves it out", pulled.join(" and ")),
+            format!("the prior shifts {}; --prior none omits it", pulled.join(" and ")),
         ));
     }
     if !open.is_empty() {
@@ -265,7 +265,7 @@ fn methods(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
     {
         all.push(Finding::doubt(
             "describing-function",
-            format!("the operator misses the describing function: chi^2 per degree of freedom is {reduced:.1}"),
+            format!("the operator does not fit the describing function: chi^2 per degree of freedom is {reduced:.1}"),
         ));
     }
     if let Some(agreement) = judged.agreement.filter(|a| a.p_value < LEVEL) {
@@ -273,7 +273,7 @@ fn methods(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
             Some(pair) => (
                 format!("{} and {}", pair.methods.0.words(), pair.methods.1.words()),
                 format!(
-                    ", most in {} by {:.1} errors of the difference",
+                    ", most in {} by {:.1} standard errors of the difference",
                     pair.most.0.name(),
                     pair.most.1.abs()
                 ),
@@ -292,7 +292,7 @@ fn methods(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
     if let Some(why) = failed {
         all.push(Finding::note(
             "no-instruments",
-            format!("no RIV-BJ next to the other methods: {why}"),
+            format!("no RIV-BJ estimate for comparison: {why}"),
         ));
     }
     if let Some(free) = judged.free_model
@@ -302,8 +302,8 @@ fn methods(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
         all.push(Finding::doubt(
             "form-refuted",
             format!(
-                "a Box-Jenkins model of the same orders has a loss smaller by {:.1} % (likelihood ratio {:.0} with {} \
-                 degrees of freedom): the form is refuted",
+                "a Box-Jenkins model of the same orders has a loss {:.1} % smaller (likelihood ratio {:.0} with {} \
+                 degrees of freedom): the form is rejected",
                 100.0 * (judged.loss / free.loss - 1.0),
                 free.likelihood_ratio,
                 free.degrees_of_freedom

@@ -221,7 +221,7 @@ impl FamilyEstimator {
         let lines = describing.map(LineData::new);
         let mut begun = Vec::new();
         let mut channel_lines = None;
-        // It is used only for starts: the lines serve as well.
+        // It is used only for starts, for which the lines are sufficient.
         let response = if seen.is_empty() {
             match ArxResponse::of(records) {
                 Err(error) if lines.is_none() => return Err(error),

@@ -1,25 +1,24 @@
 //! The operator by refined instrumental variables, with the recorded excitation as the instrument.
 //!
-//! RIV-BJ ([`crate::iv`]) for `u = Y e + v`, `D v = eps`, with Y an operator of the family in place of
-//! free polynomials. In its nonlinear form (T. Söderström and P. Stoica, *Instrumental Variable
-//! Methods for System Identification*, 1983, ch. 6; P. C. Young, *Automatica* 52 (2015) 35-46) it is
-//! the zero x of
+//! RIV-BJ ([`crate::iv`]) for `u = Y e + v`, `D v = eps`, with Y an operator of the family instead of free polynomials.
+//! In its nonlinear form (T. Söderström and P. Stoica, *Instrumental Variable Methods for System Identification*, 1983,
+//! ch. 6; P. C. Young, *Automatica* 52 (2015) 35-46) it is the zero x of
 //!
 //! `g(x) = Z' eps(x) + sum_i w_i g_i'(x) (m_i - g_i(x))`,  `eps(x) = D (u - Y(x) e)`,  `Z = D dY/dx xi`,
 //!
 //! with xi the part of e that follows the excitation ([`crate::iv`]), D the autoregression of the part of u that Y
 //! leaves unexplained, and the second term the prior. Z and D belong to an auxiliary operator; for given Z and D,
 //! Newton's step is `(Z' Psi + P)^-1 g`, `Psi = D dY/dx e`, halved until `g' (Z'Z + P)^-1 g` falls; a coordinate that
-//! it drives out of the search range goes to its bound.
+//! would leave the search range is set to its bound.
 //!
 //! **The auxiliary operator** is that of the fit at the lines or, if its instruments lead to no zero, that of the
 //! prediction error fit, or the mean of both. The common form of RIV-BJ uses the last estimate: if the lines end below
-//! the neuromuscular resonance, estimates from two sets of instruments alternate without end, each the other's
-//! auxiliary operator (with four in ten virtual people). Any auxiliary operator gives a consistent estimate, and the
-//! instruments of a fixed one are optimal except for its own error.
+//! the neuromuscular resonance, the estimates from two sets of instruments alternate indefinitely, each being the
+//! other's auxiliary operator (for four in ten virtual people). Any auxiliary operator gives a consistent estimate, and
+//! the instruments of a fixed one are optimal except for its own error.
 //!
-//! Free polynomials are less robust: their poles are not known, as the lag is below the lines and the resonance above,
-//! and move to the unit circle. Here the prior keeps them in place.
+//! Free polynomials are less robust: their poles are not determined, since the lag is below the lines and the resonance
+//! above, and move to the unit circle. Here the prior prevents this.
 //!
 //! **Assumptions.** If the excitation does not reach the noise, x is unbiased whatever D is. The method shares the
 //! instrument with the fit at the lines, but neither weights nor periods, and the samples with the prediction error

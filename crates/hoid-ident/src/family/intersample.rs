@@ -8,7 +8,7 @@
 //!
 //! with `x = omega Ts/2` (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, 1997, sections 3.2 and 3.4).
 //! `foh` and `auto` are one model with two names of its delay, so that no data decide between them. `zoh` differs from
-//! both by the factor `sin(x)/x`, 0.5 % at 20 rad/s and 60 Hz, which a recording without noise alone can show
+//! both by the factor `sin(x)/x`, 0.5 % at 20 rad/s and 60 Hz, which only a recording without noise can show
 //! ([`super::low_noise`]).
 
 use hoid_model::{Complex64, FamilyOperator, ModelError, SampleTime, named_choice, operator_family::HeldFamily};

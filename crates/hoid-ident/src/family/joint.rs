@@ -10,7 +10,7 @@
 //! `q = mean of |d|^2/(V_L - V_P)`
 //!
 //! over the band of manual control (E. J. Green and W. E. Strawderman, *J. American Statistical Association* 86 (1991)
-//! 1001-1006: an unbiased estimate that shrinks towards a biased one by as much as they agree).
+//! 1001-1006: an unbiased estimate is shrunk towards a biased one to the extent that they agree).
 //!
 //! A share of the difference of the coordinates is not suitable: a gain, a lead and a lag compensate each other along a
 //! curve. Therefore the lines become a part of the criterion,

@@ -2,7 +2,7 @@
 //!
 //! `eta = [coordinates.., of channels.., c_1 .. c_nc, d_1 .. d_nd]`: the coordinates of the operator, those of further
 //! inputs, and those of the noise `v = (C/D) eps`. A coordinate that is individual to each record occurs once for each
-//! of them; channels and noise are common to all. The neuromuscular part of a channel is that of the operator.
+//! of them; channels and noise are common to all. All channels share the neuromuscular part of the operator.
 
 use std::ops::Range;
 
@@ -113,7 +113,7 @@ impl FamilyLayout {
         self
     }
 
-    /// Returns the place in eta of each coordinate of a channel.
+    /// Returns the index in eta of each coordinate of a channel.
     pub fn places_of(&self, channel: &ChannelInLayout, record: usize) -> Vec<usize> {
         let of_operator = self.form.coordinates(self.neuromuscular);
         let mut own = channel.place..;
@@ -258,7 +258,7 @@ impl Parametrisation for FamilyLayout {
         let mut theta = found.b.clone();
         theta.extend_from_slice(noise);
         theta.extend_from_slice(&found.f);
-        // Each slot: its derivatives, and the place of the first of them in theta.
+        // Each slot: its derivatives, and the index in theta of the first of them.
         let mut slopes: Vec<Vec<(usize, f64)>> = Vec::new();
         let (nb, behind) = (found.b.len(), found.b.len() + noise.len());
         for i in 0..self.coordinates() {

@@ -2,10 +2,9 @@
 //!
 //! The scatter of n runs gives the variance of a line with 2(n - 1) degrees of freedom, and the smallest of few such
 //! variances would dominate the fit. The relative variances `r_j = v_j/|H_j|^2` are shrunk towards those of the remnant
-//! next to the line, which are computed from many bins:
-//! `r_j <- (nu r_j + nu_0 c b_j)/(nu + nu_0)`, `nu = 2(n - 1)`, b_j from the remnant and c the median of `r_j/b_j`, the
-//! difference of runs in excess of their remnant (moderated variances; G. K. Smyth, *Statistical Applications in
-//! Genetics and Molecular Biology* 3 (2004), article 3).
+//! near the line, which are computed from many bins: `r_j <- (nu r_j + nu_0 c b_j)/(nu + nu_0)`, `nu = 2(n - 1)`, b_j
+//! from the remnant and c the median of `r_j/b_j`, the difference of runs in excess of their remnant (moderated
+//! variances; G. K. Smyth, *Statistical Applications in Genetics and Molecular Biology* 3 (2004), article 3).
 
 use hoid_model::Complex64;
 use hoid_numerics::statistics::upper_median;

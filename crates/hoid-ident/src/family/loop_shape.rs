@@ -121,19 +121,19 @@ impl LoopShape {
     /// crossover and a positive phase margin, and the margin of a person is at most 120 deg. `reach_deg` is half of the
     /// 95 % interval of the margin at the lowest crossover. `None` if there is no such evidence.
     pub fn doubt(&self, reach_deg: f64) -> Option<Finding> {
-        let remedy = "check the controlled element, the signs and units of e and u and the time between them";
+        let remedy = "check the controlled element, the signs and units of e and u and the time shift between them";
         let (Some((crossover, _)), Some(margin)) = (self.crossovers.first(), self.followed_deg) else {
             return Some(Finding::doubt(
                 "no-crossover",
-                format!("the gain of the loop with this controlled element does not fall through one: {remedy}"),
+                format!("the gain of the loop with this controlled element does not cross one from above: {remedy}"),
             ));
         };
         if margin + reach_deg <= 0.0 || margin > FARTHEST_MARGIN_DEG {
             return Some(Finding::doubt(
                 "unstable-loop",
                 format!(
-                    "the loop with this controlled element has a phase margin of {margin:.0} deg at {:.1} rad/s, which no \
-                     stable loop of a person has: {remedy}",
+                    "the loop with this controlled element has a phase margin of {margin:.0} deg at {:.1} rad/s, which \
+                     no stable loop with a person has: {remedy}",
                     crossover.value
                 ),
             ));
@@ -146,15 +146,15 @@ impl LoopShape {
             Finding::note(
                 "unstable-loop",
                 format!(
-                    "the loop with this controlled element is not stable by its values ({at}), but within their errors it is"
+                    "the loop with this controlled element is not stable at the estimates ({at}), but may be within their errors"
                 ),
             )
         } else {
             Finding::doubt(
                 "unstable-loop",
                 format!(
-                    "the loop with this controlled element is not stable ({at}), and who holds an unstable loop makes no record \
-                     that stays bounded: {remedy}"
+                    "the loop with this controlled element is not stable ({at}), but the record of an unstable loop \
+                     would not stay bounded: {remedy}"
                 ),
             )
         })

@@ -1,15 +1,15 @@
 //! Recordings with little noise, or none: simulations, and first trials of users.
 //!
 //! The error of the frequency response from which searches start exceeds such noise, so that an autoregression of the
-//! residual part of u would model the operator instead of the noise. If a form leaves little, all of them are fitted
-//! first by output error, `u = c + Y e + v` with v assumed white and without a prior (L. Ljung, *System
+//! residual part of u would model the operator instead of the noise. If a form leaves a small residual, all forms are
+//! first fitted by output error, `u = c + Y e + v` with v assumed white and without a prior (L. Ljung, *System
 //! Identification*, 1999, section 8.4: it is consistent in a closed loop if v vanishes): the result is near the true
 //! operator, and the noise model is fitted from there. Without any noise it is the true operator, to the precision of
 //! the data, including the intersample behaviour of the error ([`Intersample`]).
 //!
-//! **Level.** The means that were removed from e and u are those of a steady state, and a record is none: the effect of
-//! the time before its first sample remains in u as a constant. If a mean was removed, c is an unknown of each record,
-//! eliminated with the initial states ([`crate::criterion::Data::level`]).
+//! **Level.** The means that were removed from e and u are those of a steady state, which a record is not: the effect
+//! of the time before its first sample remains in u as a constant. If a mean was removed, c is an unknown of each
+//! record, eliminated with the initial states ([`crate::criterion::Data::level`]).
 
 use hoid_model::Form;
 
@@ -96,7 +96,8 @@ impl LittleNoise {
             let Some((best, share)) = least_of(&ends).filter(|(_, share)| clean || *share < LITTLE) else {
                 break;
             };
-            // A response without noise is that of a form: if none fits, the best form is not found either.
+            // A response without noise is exactly that of a form: if no form fits, the best form is not reported
+            // either.
             let none_is_found = clean && round > 0 && share >= NONE;
             // If the residual is noise, there is nothing more to find.
             let beside = (starts[best].0, ends[best].clone()?.coordinates);

@@ -3,8 +3,8 @@
 //! `v(t) = -d_1 v(t-1) - ... - d_nd v(t-nd) + eps(t)` by least squares over all records together,
 //! from sample nd on in each (the covariance method), for all orders from the same products. The
 //! order is that of Akaike's criterion `n ln V + 2 nd`: the remnant of people is not an
-//! autoregression of any order, and the order that predicts best is what the operator's bias
-//! depends on (R. Shibata, *Annals of Statistics* 8 (1980) 147-164).
+//! autoregression of any order, and the operator's bias depends on how well the order predicts (R. Shibata, *Annals of
+//! Statistics* 8 (1980) 147-164).
 
 use crate::linalg::{gram::Gram, least_squares::solve_symmetric};
 
@@ -21,7 +21,7 @@ pub(crate) struct Autoregression {
     pub loss: f64,
 }
 
-/// What a coefficient has to gain in `n ln V`: 2 (Akaike), `ln n` (Schwarz).
+/// Decrease of `n ln V` that a coefficient must achieve: 2 (Akaike), `ln n` (Schwarz).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Penalty {
     Akaike,

@@ -134,7 +134,7 @@ pub fn family_of_polynomials(
     let Some((mismatch, found, form, reading)) = best else {
         return Err(NotConvertible::NotOfTheFamily {
             reason: match form {
-                Some(form) => format!("the form {form} has another number of poles than the {poles} found"),
+                Some(form) => format!("the form {form} does not have the {poles} poles found"),
                 None => "no operator with these poles was found".to_owned(),
             },
         });
@@ -505,6 +505,6 @@ mod tests {
         let notch = polynomials(9, &[1.0, -1.98, 0.995], &[-1.7, 0.75]);
         assert!(refused(&notch, None).contains("of the response"));
         let lead_lag = exact(&operators()[3]);
-        assert!(refused(&lead_lag, Some(Form::Lead)).contains("another number of poles"));
+        assert!(refused(&lead_lag, Some(Form::Lead)).contains("does not have the"));
     }
 }

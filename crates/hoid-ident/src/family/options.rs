@@ -94,7 +94,7 @@ impl FamilyEstimator {
             };
             if !matches!(name.as_str(), "nc" | "nd") {
                 return Err(refuse(
-                    "the orders nc and nd of the noise alone: the form states the others".to_owned(),
+                    "only the orders nc and nd of the noise: the form determines the others".to_owned(),
                 ));
             }
             if *range.end() > HIGHEST_NOISE_ORDER {
@@ -209,19 +209,20 @@ impl FamilyEstimator {
 }
 
 fn intersample() -> Setting {
-    let help = "What e does between its samples: zoh is held, foh runs straight (logged from what is faster or continuous; tau_e is \
-                half a sample longer); auto: smooth, with the delay of a held one, and what data without noise show";
+    let help = "Behaviour of e between samples: zoh held; foh linear (logged from a faster or continuous signal; \
+     tau_e is half a sample longer); auto smooth, with the delay for a held e, unless noise-free data show zoh \
+     or foh";
     Setting::new("intersample", Kind::Choice(&Intersample::NAMES), help).default("auto")
 }
 
 fn role() -> Setting {
-    let help = "Inputs except the error, and what they are to the person: r=feedforward (a target that is seen; r=feedforward:0.5 with 0.5 s of its future), motion, output; one form alone as r=feedforward/derivative";
+    let help = "Role of each input other than the error: r=feedforward (displayed target; r=feedforward:0.5 with 0.5 s of preview), motion, output; a single form as r=feedforward/derivative";
     Setting::new("role", Kind::Names, help)
 }
 
 fn run_to_run(default: f64) -> Setting {
     let help =
-        "What a person's gain varies by from run to run, as a part of it: in the error bars of fewer than five records";
+        "Run-to-run variation of a person's gain, relative to it; included in the error bars for fewer than five records";
     Setting::new("run_to_run", Kind::Number, help)
         .default(&default.to_string())
         .bounds(Bounds::AtLeast(0.0))

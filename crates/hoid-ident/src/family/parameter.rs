@@ -2,7 +2,7 @@
 //!
 //! Estimates are nearly normal in the coordinates of the family, not in the parameters: for a long lag, `1/T_I` has a
 //! symmetric error and T_I has none. Intervals are computed in the coordinates and transformed; an interval that
-//! reaches `1/T_I = 0` is open above in T_I and in K.
+//! reaches `1/T_I = 0` has no upper limit in T_I and in K.
 //!
 //! **Determined** means determined by the data: less than half of the variance before the data remains
 //! ([`Parameter::prior_share`]), the parameter is not at a bound of the search range, and its interval excludes zero;

@@ -76,7 +76,7 @@ pub(super) fn readings(f: &[f64], sample_time: SampleTime) -> Result<Vec<Reading
     for z in roots {
         if z.norm() >= 1.0 {
             return Err(other(format!(
-                "the pole at |z| = {:.6} is not a lag and no neuromuscular pole: it is not stable",
+                "the pole at |z| = {:.6} is neither a lag nor a neuromuscular pole: it is not stable",
                 z.norm()
             )));
         }

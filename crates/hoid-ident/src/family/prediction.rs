@@ -202,7 +202,7 @@ impl<'a> Prediction<'a> {
         found.theta.iter().all(|x| x.is_finite()).then_some(found.theta)
     }
 
-    /// Returns the prior for each place in eta, in units of one standard deviation.
+    /// Returns the prior for each element of eta, in units of one standard deviation.
     fn penalties(&self, layout: &FamilyLayout) -> Vec<Penalty> {
         let all = layout.form.coordinates(layout.neuromuscular);
         let unit = self.prior.penalties(layout.form, layout.neuromuscular);

@@ -109,13 +109,13 @@ impl OperatorPrior {
             if !(entry.centre.is_finite() && entry.centre > 0.0) {
                 return refuse(
                     format!("{}={}", entry.parameter, entry.centre),
-                    "a positive centre, as omega_nm=10.5:0.3",
+                    "a positive centre, such as omega_nm=10.5:0.3",
                 );
             }
             if !(entry.spread.is_finite() && entry.spread >= LEAST_SPREAD) {
                 return refuse(
                     format!("{}={}:{}", entry.parameter, entry.centre, entry.spread),
-                    "a spread (standard deviation of the logarithm) of 0.001 or more, as omega_nm=10.5:0.3",
+                    "a spread (standard deviation of the logarithm) of 0.001 or more, such as omega_nm=10.5:0.3",
                 );
             }
         }
@@ -221,7 +221,7 @@ impl FromStr for OperatorPrior {
             let (parameter, centre, spread) = parsed.ok_or_else(|| IdentError::BadOption {
                 option: "the prior".to_owned(),
                 found: part.to_owned(),
-                expected: "population, none, or NAME=CENTRE:SPREAD separated by commas, as omega_nm=10.5:0.3"
+                expected: "population, none, or NAME=CENTRE:SPREAD separated by commas, such as omega_nm=10.5:0.3"
                     .to_owned(),
             })?;
             Ok(ParameterPrior {

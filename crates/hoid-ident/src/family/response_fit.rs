@@ -29,7 +29,7 @@ use crate::{
     optimize::{Linearisation, Minimum, Objective, minimise},
 };
 
-/// Number of starts from which the search runs to its end.
+/// Number of starts from which the search runs to completion.
 const SEARCHES: usize = 6;
 /// The same for a response that is known exactly, which has more minima near zero.
 const SEARCHES_OF_EXACT: usize = 30;

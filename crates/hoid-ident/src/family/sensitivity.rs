@@ -1,8 +1,8 @@
 //! Effect of the choice of a noise model on the estimate.
 //!
 //! In a closed loop an error of the noise model biases the prediction error method (L. Ljung, *System Identification*,
-//! 1999, section 13.4: by the part of the spectrum of e that the remnant makes, times the error of the noise model),
-//! and the scatter between runs does not show it, since all runs share it. The remnant of people is not an
+//! 1999, section 13.4: by the part of the spectrum of e that is due to the remnant, times the error of the noise
+//! model), and the scatter between runs does not show it, since all runs share it. The remnant of people is not an
 //! autoregression of any order. The size of the error of the chosen model is estimated by replacing it: the same form
 //! is fitted with autoregressions of a quarter, half and all of the highest order, and with an ARMA model of the orders
 //! of a sampled sum of a drift, a broad band and a resonance (4, 5). Each difference is taken as a bias and enters the
@@ -11,10 +11,10 @@
 //! are used: for each element by itself, since the response in the band of manual control, and with it crossover and
 //! margin, is known from the lines.
 //!
-//! **Without lines** they do not show all of it: if e is mainly remnant, above the band of the forcing function, all
-//! noise models share most of the bias. Their squares count one and a half times, and the neuromuscular system has an
-//! additional variance. Both numbers, and the largest share of the prior with lines, were set on 160 virtual people and
-//! confirmed on 160 others; the page *Error bars of people* has the coverage on a third set.
+//! **Without lines** the differences do not show the whole bias: if e is mainly remnant, above the band of the forcing
+//! function, all noise models share most of the bias. Their squares count one and a half times, and the neuromuscular
+//! system has an additional variance. Both numbers, and the largest share of the prior with lines, were set on 160
+//! virtual people and confirmed on 160 others; the page *Error bars of people* has the coverage on a third set.
 
 use hoid_model::operator_family::Coordinate;
 

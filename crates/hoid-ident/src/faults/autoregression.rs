@@ -2,10 +2,10 @@
 //!
 //! `x(t) = -a_1 x(t-1) - ... - a_p x(t-p) + eps(t)` by least squares with bounded influence: a row
 //! counts only where neither x(t) nor any of its p past values lies beyond [`FAR`] robust deviations
-//! (the weights of Mallows on the regressors), and, in the rounds that follow, where eps lies within
-//! [`BEYOND`] of its robust scale (R. A. Maronna, R. D. Martin, V. J. Yohai, *Robust Statistics*,
-//! 2006, sections 5.11 and 8.4). A small white part is added to x, of [`FLOOR`] of its deviation: it
-//! keeps the normal equations of a smooth channel regular, and smaller deviations are not faults.
+//! (the weights of Mallows on the regressors), and, in the following rounds, where eps lies within [`BEYOND`] of its
+//! robust scale (R. A. Maronna, R. D. Martin, V. J. Yohai, *Robust Statistics*, 2006, sections 5.11 and 8.4). A small
+//! white part is added to x, of [`FLOOR`] of its deviation: it keeps the normal equations of a smooth channel regular,
+//! and smaller deviations are not faults.
 
 use super::robust::quantile;
 use crate::linalg::{gram::Gram, least_squares::solve_symmetric};

@@ -8,10 +8,10 @@
 //! and e on u likewise; P = [`OWN`], L = [`OTHER`] blocks. In a closed loop such a prediction is consistent whatever
 //! the loop is (L. Ljung, *System Identification*, 1999, section 13.4).
 //!
-//! **Exchanged.** A person responds only after their delay, a tenth of a second or more; a controlled element responds
-//! at once. The significance of a lag j is the growth of the loss without it: for b_1, `R = (V_without - V)/V`. If e
-//! responds to u late and u responds to e at once, with `R` of u above [`AT_ONCE`] and [`TIMES`] times that of e, input
-//! and output are exchanged. If neither responds at once, nothing is reported.
+//! **Exchanged.** A person responds only after a delay of a tenth of a second or more; a controlled element responds
+//! immediately. The significance of a lag j is the growth of the loss without it: for b_1, `R = (V_without - V)/V`. If
+//! e responds to u late and u responds to e at once, with `R` of u above [`AT_ONCE`] and [`TIMES`] times that of e,
+//! input and output are exchanged. If neither responds at once, nothing is reported.
 //!
 //! **Sign.** The response of a person to an error starts in its direction: `sum_j b_j` is positive. The sign is wrong
 //! if the sum is [`WRONG`] standard errors below zero.

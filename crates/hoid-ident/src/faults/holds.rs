@@ -1,11 +1,11 @@
 //! Stretches with a constant channel: frozen, dropped out, idle.
 //!
-//! A *hold* is a run of equal values. A channel in full precision has none, but where it stays at its largest or
-//! smallest value (a rail, which is another matter): [`FROZEN`] equal samples are frozen. A channel in steps, or a hand
-//! that rests, holds by its nature: there a hold is frozen where it is longer than [`LONGER`] times the length that
-//! nine of ten holds do not exceed, [`RESTING_S`] at least, and e moves meanwhile by half of its deviation or more. At
-//! the [rest](super::rest) of a stick that is distinguished from the holds there. A hold that the channel jumps to and
-//! back from, by more than it moves from one sample to the next in 999 of 1000, is a dropout.
+//! A *hold* is a run of equal values. A channel in full precision has none, except at its largest or smallest value (a
+//! rail, which is treated separately): [`FROZEN`] equal samples are frozen. A quantised channel, or a resting hand,
+//! holds by its nature: there a hold is frozen if it is longer than [`LONGER`] times the length that nine of ten holds
+//! do not exceed, [`RESTING_S`] at least, and e moves meanwhile by half of its deviation or more. At the
+//! [rest](super::rest) of a stick, only the holds at the rest are compared. A hold that the channel jumps to and back
+//! from, by more than it moves from one sample to the next in 999 of 1000, is a dropout.
 //!
 //! *Idle* is a stretch of [`IDLE_S`] or more in which e and u stay both within [`QUIET`] of their deviations, in each
 //! half second: before a run starts, or after its end. No one who tracks can do that: e is never at rest.

@@ -4,7 +4,7 @@
 //! changes.
 //!
 //! **Wrap.** A channel that is kept within a range of the modulus M leaves it at one end and re-enters at the other:
-//! large changes that are all M within that quantile, and without which no large change is left. M is 360, 2 pi, 180,
+//! large changes that are all M within that quantile, and without which no large change remains. M is 360, 2 pi, 180,
 //! pi or 65536 (or one less, or 4096), or a common value of four changes or more. For the latter a pair of changes less
 //! than [`BRIDGED_S`](super::limits::BRIDGED_S) apart is a spike; for a known modulus it is a turn there and back, and
 //! unwrapping repairs either.

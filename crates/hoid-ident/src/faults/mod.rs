@@ -1,8 +1,7 @@
 //! Faults of recorded data: found by stated statistics, and bridged or cut out before a fit.
 //!
 //! An estimator by prediction error uses every sample: one sample of e that is off by 20 deviations enters the
-//! criterion through the operator with a weight that a thousand good ones do not have. Faults are searched in this
-//! order:
+//! criterion through the operator with more weight than a thousand good samples. Faults are searched in this order:
 //!
 //! | file | fault | statistic |
 //! |---|---|---|
@@ -17,7 +16,7 @@
 //! | `search`, `repairing`, `limits` | | order of the searches, and repair of the record |
 //! | `autoregression`, `robust` | | fits and scales that faults cannot dominate |
 //!
-//! Each channel is judged by itself, since its own neighbours predict a sample better than any other channel does; only
+//! Each channel is examined by itself, since its own neighbours predict a sample better than any other channel; only
 //! *idle* stretches are determined from e and u together. No model of the person is needed. Normal control activity is
 //! not a fault: the remnant of people comes in pulses and bursts, but through their muscles, and the statistics of the
 //! spikes distinguish pushes from faults.

@@ -85,7 +85,7 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
         nothing.findings.push(Finding::undetermined(
             "faults",
             format!(
-                "no {SHORTEST_S} s of {} are left between its faults: nothing usable",
+                "no {SHORTEST_S} s of {} are left between its faults: nothing is usable",
                 record.label()
             ),
         ));

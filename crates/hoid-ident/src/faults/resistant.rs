@@ -4,10 +4,10 @@
 //! `r(t) = sum_i a_i eps(t+i)/|a|^2`, whose standard deviation is `s = sigma/|a|`, a sample beyond `c s` is moved to
 //! this limit, `x(t) - r + c s sign(r)` (the filter cleaner of R. D. Martin and D. J. Thomson, *Proc. IEEE* 70 (1982)
 //! 1097-1115, with two sides). The sample with the largest error comes first, and the others are examined again: an
-//! outlier enters the interpolation of its neighbours, and they would be moved in its place. The effect of any sample
-//! on the filters after it is then bounded, in e as in u, and so is its leverage on theta. c = [`HELD`]: in a normal
-//! channel one sample in 16 000 is moved. A fit to this record that differs from that to the original record shows that
-//! few samples dominate the fit; if no sample is moved, both are identical.
+//! outlier enters the interpolation of its neighbours, which would otherwise be moved instead of it. The effect of any
+//! sample on the filters after it is then bounded, in e as in u, and so is its leverage on theta. c = [`HELD`]: in a
+//! normal channel one sample in 16 000 is moved. A fit to this record that differs from that to the original record
+//! shows that few samples dominate the fit; if no sample is moved, both are identical.
 
 use std::{cmp::Ordering, collections::BinaryHeap};
 

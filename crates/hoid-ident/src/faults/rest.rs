@@ -2,11 +2,11 @@
 //!
 //! A stick with a dead zone or breakout gives exactly one value as long as the hand force is small; so does a hand that
 //! works in pulses and releases the stick between them. Pilots leave it there in half of the samples and for seconds at
-//! a time. This is normal control, and no fault of the recording.
+//! a time. This is normal control and not a fault of the recording.
 //!
 //! The rest is the most frequent value, if it makes up [`SHARE`] of the samples or more, is reached [`VISITS`] times or
-//! more, and is [`ALONE`] times as frequent as any other: levels of a channel in steps have similar frequencies, and a
-//! channel that has stopped once has stopped once. The ends of the range are excluded.
+//! more, and is [`ALONE`] times as frequent as any other: the levels of a quantised channel have similar frequencies,
+//! and a channel that stops does so only once. The ends of the range are excluded.
 
 use std::ops::Range;
 

@@ -2,8 +2,8 @@
 //!
 //! The deviation of a channel is the largest of its median absolute deviation from the median over
 //! 0.6745 and its 90 % quantile over 1.6449, which agree for a normal channel; the second holds where
-//! a hand rests more than half of the time. Where both vanish it is the root mean square of all but
-//! one half of a per cent (P. J. Huber, *Robust Statistics*, 1981, ch. 5).
+//! a hand rests more than half of the time. If both vanish it is the root mean square of all samples except one half of
+//! a per cent (P. J. Huber, *Robust Statistics*, 1981, ch. 5).
 
 use hoid_numerics::statistics::{nearest_quantile, upper_median};
 

@@ -20,8 +20,8 @@
 //! 3. leaves nothing beyond [`CLEAN`] sigma (or a twentieth of S);
 //! 4. moves a sample by more than [`SMALLEST`] of the deviation of the channel, and by two of its steps.
 //!
-//! The first samples of a record are examined backwards, so that they are last: a normal autoregression is the same in
-//! both directions.
+//! The first samples of a record are searched in reversed time, in which they come last: a Gaussian autoregression is
+//! the same in both directions.
 //!
 //! In a channel without memory, and at the last sample of a record, the two explanations do not differ: there a sample
 //! beyond [`WILD`] deviations is a fault. sigma is the median absolute innovation over 0.6745, of the record or of the
@@ -55,7 +55,7 @@ const SMALLEST: f64 = 1.5;
 const WILD: f64 = 20.0;
 const ROUNDS: usize = 4;
 
-/// Samples that do not belong to the signal.
+/// Samples that are not part of the signal.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Spike {
     pub samples: Range<usize>,

@@ -32,7 +32,7 @@ pub struct Line {
     /// Standard deviation of the ratios of single runs, as the root of the mean square modulus;
     /// `None` for one run.
     pub spread: Option<f64>,
-    /// sigma from the remnant next to the line: from `N = U - H E` at the nearest non-excited bins, which contain only
+    /// sigma from the remnant near the line: from `N = U - H E` at the nearest non-excited bins, which contain only
     /// remnant. It does not include differences between runs, and is defined for a single run as well.
     pub neighbour_error: f64,
     /// Squared coherence, 0 to 1; `None` for one run, where it is always 1.
@@ -368,9 +368,8 @@ fn line(runs: &[Run], harmonic: usize, omega_rad_s: f64, options: &DescribingOpt
     })
 }
 
-/// sigma of a line from the bins next to it: `sigma^2 = sum_i |D_i|^2 S_i / |sum_i b_i|^2` with S_i
-/// the mean of `|U - H E|^2` over the nearest bins of run i at non-excited frequencies,
-/// `b_i = E_i D_i*`.
+/// sigma of a line from the neighbouring bins: `sigma^2 = sum_i |D_i|^2 S_i / |sum_i b_i|^2` with S_i the mean of
+/// `|U - H E|^2` over the nearest bins of run i at non-excited frequencies, `b_i = E_i D_i*`.
 fn neighbour_error(runs: &[Run], line: &Line, harmonics: &[usize]) -> f64 {
     let mut squares = 0.0;
     for (run, (_, b)) in runs.iter().zip(&line.ratio.0) {

@@ -181,7 +181,7 @@ fn excitation_of(record: &Record, options: &DescriptionOptions) -> Result<(Excit
         (Some(_), None) => {
             return refuse(
                 "the lines of the excitation",
-                "no period next to them",
+                "no period with them",
                 "the period in s, of which they are harmonics",
             );
         }

@@ -55,7 +55,7 @@ fn noise(stream: u64, n: usize) -> Vec<f64> {
         .collect()
 }
 
-/// A record over `samples` with the excitation d, an e that follows it and a u of its own.
+/// A record over `samples` with the excitation d, an e that follows it and its own u.
 fn record(samples: usize, e: impl Fn(usize) -> f64, u: impl Fn(usize) -> f64) -> Record {
     let ts = SampleTime::new(0.1).unwrap();
     let channel = |name: &str, of: &dyn Fn(usize) -> f64| Channel::new(name, "", (0..samples).map(of).collect());
@@ -156,7 +156,7 @@ fn a_person_who_does_not_follow_is_not_described() {
         }
     }
     assert!((7..=33).contains(&followed), "{followed}");
-    // Lines that are lost in noise next to others that are not.
+    // Lines that are lost in noise, together with others that are not.
     let slow = |k: usize| (TAU * (2 * k) as f64 / PERIOD as f64).sin() + (TAU * (5 * k) as f64 / PERIOD as f64).sin();
     let runs: Vec<Record> = (0..6)
         .map(|i| {

@@ -80,8 +80,8 @@ pub(super) fn doubts(found: &DiagnosticInputs<'_>, records: &[Record]) -> Result
     if found.channel.is_none() {
         findings.push(Finding::note(
             "no-reference",
-            "the channel of the excitation is not known: the ratios of u and e are averaged, which the remnant biases where \
-             it is large against e",
+            "the channel of the excitation is not known: the ratios of u and e are averaged, which the remnant biases \
+             where it is large compared with e",
         ));
     }
     findings.extend(leakage(found, records)?);
@@ -109,18 +109,19 @@ fn of_runs(found: &DiagnosticInputs<'_>, records: usize) -> Option<Finding> {
     match n {
         1 => Some(Finding::doubt(
             "few-runs",
-            "one period of one run has neither errors nor coherence: record more runs, or longer ones",
+            "one period of one run gives neither errors nor coherence: record more runs, or longer ones",
         )),
         2 => Some(Finding::doubt(
             "few-runs",
             format!(
-                "the errors come from two {what} and are wrong by up to a factor of six at single lines: record more runs"
+                "the errors come from only two {what} and may be wrong by up to a factor of six at single lines: record more runs"
             ),
         )),
         _ if periods => Some(Finding::note(
             "periods-as-runs",
             format!(
-                "the errors are those between {n} {what}, which differ less than runs do; three runs give their own"
+                "the errors are computed from {n} {what}, which differ less than runs do; three runs give errors \
+                 between runs"
             ),
         )),
         _ => None,
@@ -139,8 +140,8 @@ fn of_coherence(found: &DiagnosticInputs<'_>) -> Option<Finding> {
         return Some(Finding::undetermined(
             "unrelated",
             format!(
-                "u does not follow the excitation: {n} runs that have nothing to do with it would have coherences like these \
-                 with a probability of {by_chance:.2}"
+                "u does not follow the excitation: {n} unrelated runs would have coherences like these with a \
+                 probability of {by_chance:.2}"
             ),
         ));
     }
@@ -153,7 +154,7 @@ fn of_coherence(found: &DiagnosticInputs<'_>) -> Option<Finding> {
     }
     let at: Vec<String> = low.iter().map(|k| format!("{:.2}", lines[*k].omega_rad_s)).collect();
     let words = format!(
-        "at {} rad/s u may have nothing to do with the excitation: the coherence is below {least:.2}, which one of twenty sets \
+        "at {} rad/s u may be unrelated to the excitation: the coherence is below {least:.2}, which one in twenty sets \
          of {n} unrelated runs exceeds",
         at.join(", ")
     );
@@ -184,11 +185,11 @@ fn of_loop(open_loop: &OpenLoop, margins: &DescribingMargins) -> Vec<Finding> {
         } else if sizes.iter().all(|l| *l >= 1.0) {
             format!("the gain of the open loop is above 1 at all lines: the crossover lies above {high:.3} rad/s")
         } else {
-            "the gain of the open loop does not fall through 1 between the lines".to_owned()
+            "the gain of the open loop does not cross 1 from above between the lines".to_owned()
         };
         return vec![Finding::doubt(
             "no-crossover",
-            format!("{where_}; is the controlled element the right one, in the units of the record?"),
+            format!("{where_}; is the controlled element correct, in the units of the record?"),
         )];
     };
     let mut findings = Vec::new();
@@ -196,7 +197,7 @@ fn of_loop(open_loop: &OpenLoop, margins: &DescribingMargins) -> Vec<Finding> {
     if again > 1 {
         findings.push(Finding::note(
             "several-crossovers",
-            format!("the gain of the open loop falls through 1 {again} times between the lines; the lowest crossover is given"),
+            format!("the gain of the open loop crosses 1 from above {again} times between the lines; the lowest crossover is given"),
         ));
     }
     let large = |name: &str, unit: &str, e: hoid_model::uncertainty::Estimate, part: f64| {
@@ -218,8 +219,8 @@ fn of_loop(open_loop: &OpenLoop, margins: &DescribingMargins) -> Vec<Finding> {
     findings
 }
 
-/// Returns the power of the excitation at frequencies other than its lines: caused by a span of no whole number of
-/// periods, a damaged file, or noise in the measured channel.
+/// Returns the power of the excitation at frequencies other than its lines: caused by a span that is not a whole number
+/// of periods, a damaged file, or noise in the measured channel.
 fn leakage(found: &DiagnosticInputs<'_>, records: &[Record]) -> Result<Option<Finding>, IdentError> {
     let Some(channel) = found.channel else {
         return Ok(None);

@@ -119,13 +119,13 @@ impl Excitation {
         Self::new(&omega, period_s)
     }
 
-    /// Finds the lines of a channel of a record that spans whole periods: the bins with at least the amplitude of
-    /// `search`. The leakage of a span that is wrong by about a sample is too small to be detected; with a given period
-    /// it is refused.
+    /// Finds the lines of a channel in a record of whole periods: the bins with at least the amplitude of `search`. The
+    /// leakage of a span that is wrong by about a sample is too small to be detected; with a given period it is
+    /// refused.
     ///
     /// # Errors
     /// [`IdentError::BadOption`] for a channel that does not exist, or whose power is not in such lines: noise, or a
-    /// span of no whole number of periods; [`IdentError::NoExcitation`] for a constant channel;
+    /// span that is not a whole number of periods; [`IdentError::NoExcitation`] for a constant channel;
     /// [`IdentError::NotWholePeriods`].
     pub fn found_in(record: &Record, channel: &str, search: &LineSearch) -> Result<Self, IdentError> {
         let values = channel_of(record, channel, "the channel to find lines in")?;
@@ -161,11 +161,11 @@ impl Excitation {
             return refuse(
                 &format!("the lines of channel {channel} of record {}", record.label()),
                 format!(
-                    "{} bins, many side by side, with {:.1} % of the power",
+                    "{} bins, many of them adjacent, with {:.1} % of the power",
                     bins.len(),
                     100.0 * held
                 ),
-                "single lines with nearly all of it; take a span of whole periods, or give the lines",
+                "single lines with nearly all of it; choose a span of whole periods, or give the lines",
             );
         }
         let common = match periods {

@@ -2,7 +2,7 @@
 //!
 //! The criterion is `sum_k w_k |M(j omega_k)/H_k - 1|^2`: errors relative to the describing function, as otherwise its
 //! largest values would dominate. For a given tau the model is linear in K and K T_L, so that the criterion is a
-//! function of tau alone (G. H. Golub and V. Pereyra, SIAM J. Numerical Analysis 10 (1973) 413-432); it is scanned over
+//! function of tau only (G. H. Golub and V. Pereyra, SIAM J. Numerical Analysis 10 (1973) 413-432); it is scanned over
 //! the range of delays, and its lowest point is refined. Without lead this is the crossover model of McRuer and Jex
 //! (1967) for a single integrator. The delay includes all phase lag for which the model has no other term, also that of
 //! the neuromuscular system.
@@ -102,7 +102,7 @@ impl DescribingFunction {
                 "the range of delays in s",
                 format!("{shortest} to {longest}"),
                 format!(
-                    "two finite numbers that rise, at most {:.0} s apart",
+                    "two finite numbers in ascending order, at most {:.0} s apart",
                     MOST_STEPS * TAU / (STEPS_PER_TURN * highest)
                 ),
             );

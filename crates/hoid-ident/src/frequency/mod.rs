@@ -14,8 +14,8 @@
 //!   `sigma^2 = n/(n-1) sum |N_i D_i*|^2 / |sum E_i D_i*|^2` is the expectation of `|dH|^2`. The
 //!   coefficients of a stationary remnant are circular, real and imaginary part with half of it
 //!   each, so that `20 log10 |H|` has the standard error `(20/ln 10) sigma/(sqrt(2) |H|)` and the
-//!   phase `sigma/(sqrt(2) |H|)` rad. It holds where the remnant in e is small against e;
-//!   [`Line::confidence_circle`] holds where it is not.
+//!   phase `sigma/(sqrt(2) |H|)` rad. This holds if the remnant in e is small compared with e;
+//!   [`Line::confidence_circle`] also holds if it is not.
 //! - **Coherence** between excitation and u over runs:
 //!   `|sum U_i D_i*|^2 / (sum |U_i|^2 sum |D_i|^2)`. Of n unrelated runs it is 1/n in the mean.
 //! - **Remnant**: the part of u at non-excited frequencies, which is the remnant after the loop, `N/(1 + L)`.

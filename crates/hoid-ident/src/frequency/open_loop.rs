@@ -3,12 +3,12 @@
 //! Magnitude in dB and phase are interpolated linearly over log omega between neighbouring lines. The crossover is the
 //! frequency at which the magnitude passes 0 dB; the phase margin is 180 deg plus the phase there. If there are
 //! several, the lowest one with a falling magnitude is returned: the describing function of one run scatters above the
-//! crossover, where coherence is low, and may pass 0 dB there again. The phase is followed from one line to the next
-//! along the shorter way. A delay makes the phase curved over log omega, so that between lines half an octave apart the
-//! linear interpolation is about a degree too low; if the delay is removed before and added after the interpolation, it
-//! is not. The gain margin is the negative magnitude where the phase falls through -180 deg, in the same way; of
-//! several the one nearest to 0 dB. Standard errors are those of the jackknife over runs (`ratio.rs`); the spread is
-//! that of single runs.
+//! crossover, where coherence is low, and may pass 0 dB there again. The phase is unwrapped from one line to the next
+//! by the smaller change. A delay makes the phase curved over log omega, so that between lines half an octave apart the
+//! linear interpolation is about a degree too low; removing the delay before the interpolation and adding it afterwards
+//! avoids this error. The gain margin is the negative magnitude where the phase falls through -180 deg, in the same
+//! way; of several the one nearest to 0 dB. Standard errors are those of the jackknife over runs (`ratio.rs`); the
+//! spread is that of single runs.
 
 use hoid_model::{Complex64, ContinuousTransferFunction, uncertainty::Estimate};
 

@@ -6,9 +6,9 @@
 //! sample variance there has the F distribution with 2 and 2(n - 1) degrees of freedom for circular
 //! normal errors. The values of H that a level of F does not exclude are a disc, as long as the
 //! denominator differs from zero at this level (E. C. Fieller, J. Royal Statistical Society B 16
-//! (1954) 175-185, for complex ratios). What is computed from several ratios has its standard error
-//! by the jackknife over runs, `sigma^2 = (n-1)/n sum (y_(i) - mean)^2`, y_(i) without run i (B.
-//! Efron, *The Jackknife, the Bootstrap and Other Resampling Plans*, 1982, chapter 3).
+//! (1954) 175-185, for complex ratios). A quantity computed from several ratios has its standard error from the
+//! jackknife over runs, `sigma^2 = (n-1)/n sum (y_(i) - mean)^2`, y_(i) without run i (B. Efron, *The Jackknife, the
+//! Bootstrap and Other Resampling Plans*, 1982, chapter 3).
 
 use hoid_model::{Complex64, uncertainty::Estimate};
 use hoid_numerics::statistics::{self, sample_variance, squared_deviations};

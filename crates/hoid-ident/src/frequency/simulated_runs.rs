@@ -97,7 +97,7 @@ fn without_remnant_the_lines_are_those_of_the_held_operator() {
 #[test]
 fn margins_between_the_lines_are_near_those_of_the_loop() {
     // The lines around the crossover of s1 are 1.00 and 1.69 rad/s, those around that of s2 2.61
-    // and 4.07: far apart, and what is straight between them is not the loop.
+    // and 4.07: far apart, and a straight line between them does not describe the loop.
     for (condition, crossover, margin) in [(Condition::C1, 1.5635, 76.67), (Condition::C2, 2.7480, 22.90)] {
         let scenario = scenario(condition, false);
         let found = describe(&runs(&scenario, 0, 1), &lines(), &DescribingOptions::default()).unwrap();

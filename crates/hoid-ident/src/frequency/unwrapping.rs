@@ -1,8 +1,8 @@
 //! Phase without jumps of whole turns.
 //!
-//! Between two lines the phase is known up to whole turns. The shorter way is taken after the phase of a delay, which
-//! turns fastest, is removed: `phi + omega tau` changes by less than half a turn from line to line if tau is right
-//! within `pi/(omega_{k+1} - omega_k)`.
+//! Between two lines the phase is known up to whole turns. The smaller change is chosen after the phase of a delay,
+//! which changes fastest, has been removed: `phi + omega tau` changes by less than half a turn from line to line if tau
+//! is right within `pi/(omega_{k+1} - omega_k)`.
 
 use std::f64::consts::PI;
 

@@ -1,8 +1,8 @@
 //! Spans of whole periods, and the Fourier coefficients of two channels that are recorded with an offset.
 //!
-//! If `e[k]` belongs to `u[k + s]`, s of any size, `U(omega) e^{j omega s Ts}` is the coefficient of u at the time of
-//! e: exact for periodic components. The whole samples of s are taken from the record as far as possible, which is
-//! exact for the remainder as well.
+//! If `e[k]` corresponds to `u[k + s]`, with s of any size, `U(omega) e^{j omega s Ts}` is the coefficient of u at the
+//! time of e: exact for periodic components. The whole samples of s are taken from the record as far as possible, which
+//! is exact for the remainder as well.
 
 use std::f64::consts::TAU;
 

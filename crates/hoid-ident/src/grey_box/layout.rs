@@ -1,8 +1,9 @@
 //! Places of the physical parameters of each record in eta, and their polynomials.
 //!
 //! Slots of one record: `[K_e, K_e_dot (or T_L), omega_nm, zeta_nm, tau_e, T_n]`, the last only for m > 0. A parameter
-//! common to the records has one place in eta, an individual one has a place for each record. K_e_dot is the coordinate
-//! of the lead unless the user constrains T_L itself: `K_e_dot = K_e T_L` is well determined even if K_e is small.
+//! common to the records has one element in eta, an individual one has an element for each record. K_e_dot is the
+//! coordinate of the lead unless the user constrains T_L itself: `K_e_dot = K_e T_L` is well determined even if K_e is
+//! small.
 
 use std::{collections::BTreeMap, ops::Range};
 

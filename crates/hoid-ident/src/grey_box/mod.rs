@@ -5,9 +5,9 @@
 //! `K_n/(T_n s + 1)^m` with its zeros ([`hoid_model::remnant_noise`]). The predictor is the one of
 //! `u = (B/F) q^-nk e + (C/D) eps` with the polynomials `theta(eta)`; the criterion is that of the
 //! general model, so that initial states are eliminated exactly, and `psi_eta = psi d theta/d eta`.
-//! Where Box-Jenkins with nc = 0 has a free D of order m, this has T_n alone, and neither D nor nk
-//! has to replace what the structure leaves out: T_n, K_n and tau_e are consistent. K_n follows
-//! from the innovation: `K_n = sigma/g(T_n)`.
+//! Where Box-Jenkins with nc = 0 has a free D of order m, this model has only T_n, and neither D nor nk has to
+//! compensate for missing structure: T_n, K_n and tau_e are consistent. K_n follows from the innovation:
+//! `K_n = sigma/g(T_n)`.
 //!
 //! The order m is given or chosen by BIC over a range; for m of 1 and more the number of parameters is the same, so
 //! that the loss is decisive.

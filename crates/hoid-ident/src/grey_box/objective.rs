@@ -2,8 +2,8 @@
 //!
 //! For each record the polynomials follow from eta, `theta = theta(eta)` with `J = d theta/d eta`;
 //! then `psi_eta = psi J`, so that `psi_eta' eps = J' psi' eps` and
-//! `psi_eta' psi_eta = J' psi' psi J`, both summed over the records. nk moves with tau_e, the first
-//! residual that counts does not: the loss is a function of eta alone.
+//! `psi_eta' psi_eta = J' psi' psi J`, both summed over the records. nk changes with tau_e, but the first residual that
+//! counts does not: the loss is a function of eta only.
 
 use std::{fmt, sync::Arc};
 
@@ -297,8 +297,8 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         best
     }
 
-    /// Returns the elements of eta with a variance: not fixed, and not at a bound of the user. A kink of the loss is no
-    /// bound.
+    /// Returns the elements of eta with a variance: not fixed, and not at a bound of the user. A kink of the loss is
+    /// not a bound.
     pub fn free(&self, eta: &[f64], descent: &[f64]) -> Vec<usize> {
         crate::optimize::free_parameters(self, eta, descent)
     }

@@ -28,7 +28,7 @@ pub struct GreyBox {
     pub initial_state: InitialState,
     /// Limits of the search.
     pub search: SearchOptions,
-    /// Number of points of the grid from which the search runs to its end. Default 2.
+    /// Number of points of the grid from which the search runs to completion. Default 2.
     pub starts: usize,
 }
 

@@ -25,7 +25,7 @@ pub(crate) struct HeldSamples<'s> {
 }
 
 impl HeldSamples<'_> {
-    /// Returns the sample of the delay at this place.
+    /// Returns the sample of the delay at this index.
     pub fn of(&self, place: usize) -> Option<usize> {
         let index = self.delays.iter().position(|&delay| delay == place)?;
         self.samples.get(index).copied()
@@ -33,8 +33,8 @@ impl HeldSamples<'_> {
 }
 
 impl Mapped {
-    /// Returns the covariance of theta by rows, `J C J'`, from that of eta; the slots of the record are at these places
-    /// of eta.
+    /// Returns the covariance of theta by rows, `J C J'`, from that of eta; the slots of the record have these indices
+    /// in eta.
     pub fn covariance_of_theta(&self, of_eta: &[f64], p: usize, places: &[usize]) -> Vec<f64> {
         let columns = &self.columns;
         let of = |row: usize, other: usize| -> f64 {
@@ -56,13 +56,13 @@ impl Mapped {
 
 /// Physical parameters eta of one or several records.
 pub(crate) trait Parametrisation: Clone {
-    /// Returns the place in eta of each slot of a record.
+    /// Returns the index in eta of each slot of a record.
     fn positions(&self, record: usize) -> &[usize];
     /// Returns lower and upper bound of each element of eta.
     fn limits(&self) -> &[(f64, f64)];
-    /// Returns the places of the delays in eta.
+    /// Returns the indices of the delays in eta.
     fn delays(&self) -> Vec<usize>;
-    /// Returns the place in eta of the delay of a record.
+    /// Returns the index in eta of the delay of a record.
     fn delay_of(&self, record: usize) -> usize;
     /// Returns the time between two samples.
     fn sample_time(&self) -> SampleTime;
@@ -72,7 +72,7 @@ pub(crate) trait Parametrisation: Clone {
     }
     /// Returns the orders of the polynomials at this delay of the first coefficient of B.
     fn orders(&self, nk: usize) -> Orders;
-    /// Returns the places in eta of the polynomials C that must be stable and have no limits of their own.
+    /// Returns the indices in eta of the polynomials C that must be stable and have no limits of their own.
     fn stable_blocks(&self) -> Vec<Range<usize>>;
     /// Returns the orders of the further inputs, at the shortest delay; none by default.
     fn further(&self) -> Vec<InputOrders> {

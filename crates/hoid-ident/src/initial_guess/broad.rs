@@ -1,12 +1,12 @@
 //! Starts from the whole region of stability, for records with many minima: short ones, and models with more
 //! coefficients than the operator's.
 //!
-//! Given F, C and D the residual is affine in B; given F, C and B it is affine in D. So two grids that do not depend on
-//! the data, one of F and one of C, and least squares for the rest reach every kind of minimum: adjacent slow real
-//! poles, a resonance, C and D that nearly cancel at any frequency.
+//! Given F, C and D the residual is affine in B; given F, C and B it is affine in D. Therefore two grids that do not
+//! depend on the data, one of F and one of C, with least squares for the rest, reach every kind of minimum: adjacent
+//! slow real poles, a resonance, C and D that nearly cancel at any frequency.
 //!
 //! **Systems**, B and F: that of the known minimum; those of refined instrumental variables with autoregressive noise
-//! of two orders ([`crate::iv::refined_system`]); and the best places of a grid of poles
+//! of two orders ([`crate::iv::refined_system`]); and the best points of a grid of poles
 //! ([`super::pole_grid::anywhere`]), ranked with an autoregression for their noise.
 //!
 //! **Noise models** of each system: C from a grid of its roots, D by least squares, and B once more
@@ -23,7 +23,7 @@ use crate::{
     optimize::Objective,
 };
 
-/// Number of places of the grid of poles that are used.
+/// Number of points of the pole grid that are used.
 const PLACES: usize = 8;
 /// Number of noise models for a fitted system, and for one of the grid.
 const NOISE_MODELS: (usize, usize) = (4, 1);
@@ -63,7 +63,7 @@ pub(crate) fn broad_starts(criterion: &Criterion<'_>, known: &[f64], workspace: 
     starts
 }
 
-/// Returns the places of the grid of poles with the smallest loss, each with its own autoregression.
+/// Returns the points of the pole grid with the smallest loss, each with its own autoregression.
 fn best_places(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<System> {
     let o = criterion.orders;
     let coloured = o.nc + o.nd > 0;

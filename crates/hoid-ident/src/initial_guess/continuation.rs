@@ -1,9 +1,9 @@
 //! A start from the low-pass filtered record, which has few samples and a loss with few minima.
 //!
 //! Input and output are filtered by the same moving average over K samples and decimated by K; at low frequencies the
-//! system between them is the same with its poles raised to the power K. There the search runs to its end from each of
-//! a few poles of the grid for about 1/K of the cost, and the K-th roots of the poles of the resulting minimum are the
-//! start of the search on the record itself. The delay becomes a fraction of a sample, so that B has one additional
+//! system between them is the same with its poles raised to the power K. There the search runs to completion from each
+//! of a few poles of the grid at about 1/K of the cost, and the K-th roots of the poles of the resulting minimum are
+//! the start of the search on the record itself. The delay becomes a fraction of a sample, so that B has one additional
 //! coefficient.
 //!
 //! It is only a start: for a system that is fast compared with K samples it is a bad one, and others are tried as well.
@@ -40,7 +40,7 @@ const SLOW: f64 = 1.3;
 /// The poles from the averaged record.
 #[derive(Debug, Default)]
 pub(crate) struct SlowPoles {
-    /// Polynomials F, best first; empty if the records are short or the model does not have its poles in F alone.
+    /// Polynomials F, best first; empty if the records are short or the model does not have its poles only in F.
     pub f: Vec<Vec<f64>>,
     /// True if all poles of the best one are slow compared with the average, so that it determines nearly as much as
     /// the record does.
@@ -73,7 +73,7 @@ pub(crate) struct AveragedRecords {
 }
 
 impl AveragedRecords {
-    /// Returns `None` if the records are too short, or the model does not have its poles in F alone.
+    /// Returns `None` if the records are too short, or the model does not have its poles only in F.
     pub fn of(criterion: &Criterion<'_>, sample_time: SampleTime) -> Option<Self> {
         let shortest = criterion.data.iter().map(|d| d.u.len()).min().unwrap_or(0);
         let factor = (shortest / SAMPLES_LEFT).min(LARGEST_FACTOR);
@@ -113,15 +113,15 @@ impl AveragedRecords {
     }
 }
 
-/// The search on the averaged records: the places of the pole grid are ranked with one noise model, that of the first
-/// of them, and searches start from the best.
+/// The search on the averaged records: the points of the pole grid are ranked with one noise model, estimated at the
+/// first point, and searches start from the best points.
 pub(crate) struct Continuation<'c> {
     low: &'c Criterion<'c>,
     factor: usize,
     grid: Vec<Vec<f64>>,
     /// The noise model of the ranking, when it is known.
     noise: Option<Vec<f64>>,
-    /// The current place of the grid, and its number.
+    /// The current point of the grid, and its number.
     trial: Option<Start>,
     tried: usize,
     ranked: Vec<Start>,
@@ -129,7 +129,7 @@ pub(crate) struct Continuation<'c> {
 }
 
 impl<'c> Continuation<'c> {
-    /// Creates the search on these records, of which `low` is the criterion.
+    /// Creates the search on these records; `low` is their criterion.
     pub fn new(averaged: &AveragedRecords, low: &'c Criterion<'c>) -> Self {
         let grid = pole_grid(low.orders.nf, averaged.sample_time);
         let mut continuation = Self {
@@ -146,7 +146,7 @@ impl<'c> Continuation<'c> {
         continuation
     }
 
-    /// Continues with the next place of the grid, and after the last with the searches.
+    /// Continues with the next point of the grid, and after the last point with the searches.
     fn go_on(&mut self) {
         let o = &self.low.orders;
         let start = |noise: &[f64], f: &[f64], left| {
@@ -222,7 +222,7 @@ impl LinearisationClient for Continuation<'_> {
         }
         let known = trial.value.is_finite();
         if self.noise.is_none() && known {
-            // From the first place again, now with the noise model.
+            // From the first point again, now with the noise model.
             self.noise = Some(trial.theta[Block::D.place(o)].to_vec());
             self.tried = 0;
         } else {

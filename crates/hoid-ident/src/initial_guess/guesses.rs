@@ -1,16 +1,16 @@
 //! Automatic starts of the Box-Jenkins search.
 //!
 //! The poles are decisive: given F, the model is linear in B, and given B and F the noise model is a linear
-//! autoregression. So each start is a proposal for F that is completed by linear least squares:
+//! autoregression. Each start is therefore a proposal for F that is completed by linear least squares:
 //!
 //! 1. `low-pass continuation`: the minimum on the averaged record
 //!    ([`crate::initial_guess::continuation`]), searched from the pole grid.
 //! 2. `pole grid`, if the record is too short for that: for two poles and more, neuromuscular frequencies from 3 to 24
 //!    rad/s with damping 0.25 and 0.7, the range of human operators, through the exact zero-order hold.
-//! 3. `steiglitz-mcbride`: ARX, and again on input and output filtered by 1/F of the step before, a
-//!    few times (K. Steiglitz and L. E. McBride, *IEEE Trans. Automatic Control* 10 (1965)
-//!    461-464). The `arx` poles themselves, badly biased where the noise poles are not those of the
-//!    system (m0 = 1: a2 near 0), only where that fails.
+//! 3. `steiglitz-mcbride`: ARX, repeated a few times on input and output filtered by 1/F of the previous step (K.
+//!    Steiglitz and L. E. McBride, *IEEE Trans. Automatic Control* 10 (1965) 461-464). The `arx` poles themselves,
+//!    which are badly biased if the noise poles are not those of the system (m0 = 1: a2 near 0), are used only if this
+//!    fails.
 //! 4. `high-order arx`: an ARX model with additional poles for the noise, and the poles of its noise-free response by
 //!    Steiglitz and McBride (B. Wahlberg, *Automatica* 25 (1989) 829-841, in its simplest form).
 //! 5. `instruments`: ARX, instrumental variables twice, the residual, C and D from it
@@ -19,7 +19,8 @@
 //! The last three are used only if the poles of the first are not all slow compared with its average: otherwise it
 //! determines nearly as much as the record does. The proposals are ranked by their loss with the initial states
 //! eliminated; the search runs from the best of them, and the best minimum is used. Short records and larger models
-//! have more minima than these find: for them others are tried afterwards ([`crate::initial_guess::broad`]).
+//! have more minima than these starts find; for them, other starts are tried afterwards
+//! ([`crate::initial_guess::broad`]).
 
 use hoid_model::{Orders, SampleTime, polynomial::reflected_inside};
 

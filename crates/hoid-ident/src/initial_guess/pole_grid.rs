@@ -11,7 +11,7 @@ const GRID_ZETA: [f64; 2] = [0.25, 0.7];
 /// Further poles of the grid for nf > 2: fast ones, which matter least.
 const EXTRA_POLE: f64 = 0.3;
 
-/// Returns F of each place of the grid, with its name.
+/// Returns F of each point of the grid, with its name.
 pub(crate) fn pole_grid(nf: usize, sample_time: SampleTime) -> Vec<(String, Vec<f64>)> {
     GRID_OMEGA
         .into_iter()

@@ -2,11 +2,11 @@
 //!
 //! A belongs to the system and to the noise, F to the system and D to the noise only, and the loss has a minimum for
 //! many wrong assignments: ARARX with a1 = -0.65, a2 = 0.11, d1 = -0.93 ends 40 % too high from least squares, with the
-//! pole of D in A. So the poles come from fits that do not depend on the assignment, and every assignment is a start:
+//! pole of D in A. The poles are therefore taken from fits that do not depend on the assignment, and every assignment
+//! is a start:
 //!
 //! - the poles of the system, A F, from instruments, which no coloured noise biases in an open loop
-//!   ([`crate::iv`]): any na of them are A, the rest F, and the noise model follows from what is
-//!   left;
+//!   ([`crate::iv`]): any na of them are A, the rest F, and the noise model follows from the remainder;
 //! - all poles, A D F, from an ARX model with nd more coefficients in A and in B, which is ARARX
 //!   without its common factor: any nd of them are D, any nf of the rest F, and A and B follow by
 //!   least squares.

@@ -187,7 +187,7 @@ impl<'a> IvProblem<'a> {
                 z = columns;
                 continue;
             }
-            // Each source serves only the rows whose noise did not enter its weights (split-sample instruments).
+            // Each source is used only in the rows whose noise did not enter its weights (split-sample instruments).
             for rows in self.rows_of(&source.samples, filter.d.len()) {
                 for (to, from) in z.iter_mut().zip(&columns) {
                     to[rows.clone()].copy_from_slice(&from[rows.clone()]);

@@ -9,8 +9,8 @@
 //! dozen of them cover the memory of a loop of some seconds, for which a finite impulse response would need hundreds of
 //! lags; the expansion is always stable; and for a sum of sinusoids it is the projection on their lines.
 //!
-//! The sum depends on f_t alone, so that the noise can affect it only through the weights: by the noise of the record
-//! at the lines of f_t, which is a considerable part of it if noise and f_t are both slow. Therefore the record is cut
+//! The sum depends only on f_t, so that the noise can affect it only through the weights: by the noise of the record at
+//! the lines of f_t, which is a considerable part of it if noise and f_t are both slow. Therefore the record is cut
 //! into blocks, and the instruments of a block are computed with weights from the other blocks (split-sample
 //! instruments, J. D. Angrist and A. B. Krueger, *J. Business Econ. Stat.* 13 (1995) 225-235), whose noise is
 //! independent of that in the block. Poor weights then cost variance, not bias.

@@ -21,7 +21,7 @@
 //! is inside the record. The remaining unknown, the free response of 1/(C F), is projected out of every column, record
 //! by record. Signals that are simulated for the instruments get an artificial past (the record reflected at its first
 //! sample, faded in); it has no effect on consistency, only on how well the instruments follow the regressors: a jump
-//! at the start, amplified by D, would outweigh the rest. Several records add up, row by row, with a common theta.
+//! at the start, amplified by D, would outweigh the rest. The rows of several records are stacked, with a common theta.
 //!
 //! | module | contents |
 //! |---|---|

@@ -8,11 +8,11 @@
 //!
 //! `g(theta) = Z' eps(theta)`,  `eps = (D/C) (u - (B/F) q^-nk e)`,
 //!
-//! which is the same at a fixed point, but has a stable F. So with Z, C and D of a system fixed, `|Q' eps(theta)|^2`, Q
-//! an orthonormal basis of Z, is minimised over B and stable F (damped Gauss-Newton, along the border of stability if
-//! necessary: [`crate::optimize`]). Then Z, C and D are computed again, until theta no longer changes
-//! ([`Extrapolation`] helps if the convergence is slow or oscillates). If g has no zero in the region of stability, the
-//! smallest value is on its border, and the termination reports it.
+//! which is the same at a fixed point, but has a stable F. Therefore, with Z, C and D of a system fixed,
+//! `|Q' eps(theta)|^2`, Q an orthonormal basis of Z, is minimised over B and stable F (damped Gauss-Newton, along the
+//! border of stability if necessary: [`crate::optimize`]). Then Z, C and D are computed again, until theta no longer
+//! changes ([`Extrapolation`] helps if the convergence is slow or oscillates). If g has no zero in the region of
+//! stability, the smallest value is on its border, and the termination reports it.
 //!
 //! **Without convergence.** For a model that is smaller than the operator, eps is correlated with some of the
 //! instruments that other systems give, and theta may follow its own instruments without ever reaching them.

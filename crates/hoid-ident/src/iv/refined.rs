@@ -7,8 +7,8 @@
 //!
 //! **Start.** Input and output are replaced by the parts of them that follow the noise-free input (Laguerre expansion),
 //! and a few iterations of K. Steiglitz and L. E. McBride (*IEEE Trans. Automatic Control* 10 (1965) 461-464) on these
-//! give a system that is close in both open and closed loop. If this fails, least squares on the data themselves is
-//! used.
+//! signals give a system close to the true one, in open and in closed loop. If this fails, least squares on the data
+//! themselves is used.
 
 use crate::{
     IdentError, Reason, Termination,

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-/// Sum `sum x x'` over rows x, of which the lower triangle is stored.
+/// Sum `sum x x'` over rows x; its lower triangle is stored.
 pub(crate) struct Gram {
     size: usize,
     sums: Vec<f64>,

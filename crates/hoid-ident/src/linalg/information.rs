@@ -1,8 +1,8 @@
 //! The inverse of an information matrix, and the parameters that it does not determine.
 //!
 //! `psi' psi` is scaled to a unit diagonal, so that units do not matter, and inverted by its
-//! eigenvalues: one that is zero up to rounding belongs to a combination of parameters that the
-//! data do not determine, and its eigenvector names them.
+//! eigenvalues: an eigenvalue that is zero up to rounding indicates a combination of parameters that the data do not
+//! determine, and its eigenvector identifies them.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 

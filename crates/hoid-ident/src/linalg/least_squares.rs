@@ -1,9 +1,9 @@
 //! Linear least squares by Householder QR with column pivoting.
 //!
 //! `min |y - X theta|^2` for a tall X stored by columns. Columns are scaled to unit length first,
-//! so that the decision about the rank does not depend on units; at each step the column with the
-//! largest rest is taken. The rank is the number of diagonal elements of R above
-//! `tolerance |R_11|`. Source: P. Businger and G. H. Golub, *Numer. Math.* 7 (1965) 269-276.
+//! so that the decision about the rank does not depend on units; at each step the column with the largest remainder is
+//! chosen. The rank is the number of diagonal elements of R above `tolerance |R_11|`. Source: P. Businger and G. H.
+//! Golub, *Numer. Math.* 7 (1965) 269-276.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -1,5 +1,5 @@
 //! A search by reverse communication: it returns the theta at which it needs the linearisation of the criterion, and is
-//! updated with it. The caller decides how to linearise: alone, or for several records in parallel lanes.
+//! updated with it. The caller decides how to linearise: for one record, or for several records in parallel lanes.
 
 use crate::{
     criterion::{Block, Criterion, Workspace},

@@ -1,8 +1,8 @@
 //! Searches from several starts of one criterion, one linearisation after the other.
 //!
-//! First the unknown polynomials of each start, then the search from the best of them, and from the next ones. A start
-//! in the basin of a known minimum is left out, and a search that comes close to one without a predicted lower end is
-//! stopped.
+//! The unknown polynomials of each start are computed first; searches then run from the best start and from the next
+//! ones. A start in the basin of a known minimum is omitted, and a search that comes close to such a minimum without a
+//! predicted lower end is stopped.
 //!
 //! The searches do not evaluate the criterion themselves: they return the theta at which they need its linearisation
 //! and are updated with it (reverse communication), so that those of several records can run in parallel lanes

@@ -98,7 +98,7 @@ impl<'s> GaussNewton<'s> {
         matches!(self.trial, Trial::Start)
     }
 
-    /// Runs the search to its end.
+    /// Runs the search to completion.
     pub(super) fn run(&mut self, workspace: &mut Workspace) -> Option<Reason> {
         loop {
             let there = self.objective.linearise(&self.evaluation_point, workspace);

@@ -72,7 +72,7 @@ pub(crate) trait Objective {
     fn limits(&self) -> Option<&[(f64, f64)]> {
         None
     }
-    /// Returns the places of the polynomials in theta that must be stable and have no limits of their own.
+    /// Returns the indices in theta of the polynomials that must be stable and have no limits of their own.
     fn stable_blocks(&self) -> Vec<Range<usize>> {
         Vec::new()
     }

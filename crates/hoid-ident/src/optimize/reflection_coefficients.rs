@@ -6,9 +6,9 @@
 //! `p^(m)_i = p^(m-1)_i + k_m p^(m-1)_{m-i}` for i < m,  `p^(m)_m = k_m`
 //!
 //! (O. Barndorff-Nielsen and G. Schou, *J. Multivariate Analysis* 3 (1973) 408-419; J. F. Monahan,
-//! *Biometrika* 71 (1984) 403-404). In theta the border of stability is curved, and a search that
-//! meets it stops although the loss falls along it; in k it is a bound, which the search knows how
-//! to follow. With `J = dp/dk` the derivatives are `J' psi' eps` and `J' psi' psi J`.
+//! *Biometrika* 71 (1984) 403-404). In theta the border of stability is curved, and a search that reaches it stops
+//! although the loss decreases along it; in k it is a bound, along which the search can move. With `J = dp/dk` the
+//! derivatives are `J' psi' eps` and `J' psi' psi J`.
 
 use std::ops::Range;
 
@@ -138,7 +138,7 @@ fn polynomial_jacobian(k: &[f64]) -> Vec<f64> {
     let n = k.len();
     let mut jacobian = vec![0.0; n * n];
     for j in 0..n {
-        // The recursion is linear in k_j alone, whose own derivative enters at step j.
+        // The recursion is linear in each single k_j, whose own derivative enters at step j.
         let (mut p, mut slope): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
         for (m, &km) in k.iter().enumerate() {
             let (before, slope_before) = (p.clone(), slope.clone());

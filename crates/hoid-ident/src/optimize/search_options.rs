@@ -25,7 +25,7 @@ pub struct SearchOptions {
     pub method: SearchMethod,
     /// Largest number of steps from each start. Default 100.
     pub max_iterations: usize,
-    /// Relative decrease of the loss below which the search has converged. Default 1e-12.
+    /// Relative decrease of the loss for convergence. Default 1e-12.
     pub tolerance: f64,
 }
 

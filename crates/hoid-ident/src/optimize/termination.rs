@@ -34,14 +34,14 @@ impl fmt::Display for Reason {
             Self::Direct => "solved directly (linear least squares)",
             Self::SmallDecrease => "converged: the next step promises no decrease of the loss",
             Self::Border => {
-                "converged at the border of stability: a root of C or F lies on the unit circle, and standard errors mean little"
+                "converged at the border of stability: a root of C or F lies on the unit circle, so that standard errors are unreliable"
             }
             Self::ExactFit => "converged: the residuals are zero up to rounding",
             Self::IterationLimit => "not converged: iteration limit reached",
             Self::NoDescent => "not converged: no step inside the region of stable C and F lowers the loss",
-            Self::Settled => "converged: a further iteration does not move the parameters",
+            Self::Settled => "converged: a further iteration does not change the parameters",
             Self::InstrumentsHeld => {
-                "converged with the instruments held: made again they go on to move the parameters, by less than half a standard error"
+                "converged with the instruments held: new instruments still change the parameters, by less than half a standard error"
             }
             Self::UnstableEstimate => {
                 "not converged: the estimate had a pole outside the unit circle, reflected into it"

@@ -6,9 +6,9 @@
 //! **How it is solved.** The columns are shifts of two signals, so that `Phi' Phi` costs a few passes over the record,
 //! a tenth of an orthogonal factorisation. A solution of the normal equations has an error of `cond(Phi' Phi) eps`; one
 //! step of refinement from the residuals themselves, `theta + (Phi' Phi)^-1 Phi' (y - Phi theta)`, squares that factor
-//! (A. Bjorck, *Numerical Methods for Least Squares Problems*, 1996, sec. 2.9.3). Where the regressors are too close to
-//! dependence for it, where the fit is exact, where u has a level, and where zeros are before the record, QR with
-//! column pivoting decides and solves.
+//! (A. Bjorck, *Numerical Methods for Least Squares Problems*, 1996, sec. 2.9.3). If the regressors are too nearly
+//! dependent for this, the fit is exact, u has a level, or zeros precede the record, QR with column pivoting determines
+//! the rank and the solution.
 
 use hoid_model::{Orders, SampleTime, Structure};
 use nalgebra::{DMatrix, DVector};

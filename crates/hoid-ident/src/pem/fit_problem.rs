@@ -122,7 +122,7 @@ fn checked_start(theta: &[f64], constrained: &ConstrainedCriterion<'_, '_>) -> R
     };
     if theta.len() != orders.parameters() {
         return Err(bad(&format!(
-            "it has {} coefficients, the orders {} need {}",
+            "it has {} coefficients, but the orders {} need {}",
             theta.len(),
             orders,
             orders.parameters()
@@ -130,7 +130,7 @@ fn checked_start(theta: &[f64], constrained: &ConstrainedCriterion<'_, '_>) -> R
     }
     if !constrained.is_feasible(theta) {
         return Err(bad(
-            "C or F (or a polynomial that was asked to be stable) has a root on or outside the unit circle; give a stable \
+            "C or F (or a polynomial required to be stable) has a root on or outside the unit circle; give a stable \
              start or none",
         ));
     }

@@ -18,7 +18,7 @@ pub(crate) struct FitSettings {
     pub orders: Orders,
     pub initial_state: InitialState,
     pub search: SearchOptions,
-    /// Number of own starts from which the search runs to its end.
+    /// Number of own starts from which the search runs to completion.
     pub starts: usize,
     /// Start of the search, instead of the estimator's own starts.
     pub start: Option<Vec<f64>>,

@@ -24,7 +24,7 @@ const LARGEST_ND: usize = 4;
 const TRIED: usize = 24;
 /// Number of steps from each of them.
 const STEPS: usize = 8;
-/// Number of starts whose search runs to its end, on the whole record.
+/// Number of starts whose search runs to completion, on the whole record.
 const FINISHED: usize = 8;
 /// The same two numbers for a record that is longer than the span.
 const OF_LONG: [usize; 2] = [12, 3];
@@ -82,8 +82,8 @@ fn may_have_more_minima(criterion: &Criterion<'_>) -> bool {
     o.na == 0 && o.nb > 0 && o.nf > 0 && (larger || criterion.residuals() <= SPAN)
 }
 
-/// Returns the criterion over the first samples, as many as [`SPAN`] residuals need: records from the first one on, the
-/// last of them truncated.
+/// Returns the criterion over the first samples, enough for [`SPAN`] residuals: the records in order, the last one
+/// truncated.
 fn first_span<'a>(criterion: &Criterion<'a>) -> Criterion<'a> {
     let mut left = SPAN;
     let mut data = Vec::new();

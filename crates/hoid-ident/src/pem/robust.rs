@@ -2,17 +2,16 @@
 //!
 //! Huber's loss ([`Loss`](crate::Loss)) with the threshold k is minimised by iteratively reweighted
 //! least squares (P. J. Huber, *Robust Statistics*, 1981, section 7.8): the weights
-//! `w = min(1, k/|r|)` of one search are those of the residuals that the search before left, in
-//! units of the scale s. Each round lowers the loss. The scale is the median absolute residual over
-//! 0.6745, from the residuals of the round before; it is held after [`SCALES`] rounds, so that the
-//! rounds settle.
+//! `w = min(1, k/|r|)` of one search are computed from the residuals of the previous search, in units of the scale s.
+//! Each round lowers the loss. The scale is the median absolute residual divided by 0.6745, from the residuals of the
+//! previous round; it is kept constant after [`SCALES`] rounds, so that the rounds converge.
 //!
 //! A bounded loss bounds the weight of a residual, and not the effect of a sample on the regressors: one wrong sample
 //! of e is in the response of the operator for seconds, with residuals that are large because theta is right, and theta
 //! is biased (F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw and W. A. Stahel, *Robust Statistics*, 1986, section 6.3:
-//! the influence is that of the residual times that of the position). To bound the position too, the estimator first
-//! limits each sample of e and u by its neighbours ([`crate::faults::resistant`]); in a normal channel one sample in 16
-//! 000 is moved, and the efficiency is that of the loss.
+//! the influence is the product of those of the residual and of the position). To bound the influence of the position
+//! too, the estimator first limits each sample of e and u by its neighbours ([`crate::faults::resistant`]); in a normal
+//! channel one sample in 16 000 is changed, and the efficiency remains that of the loss.
 //!
 //! Covariance (Huber, eq. 7.6.8, for residuals that are independent of the gradient):
 //! `s^2 kappa (psi' psi)^-1`, `kappa = mean(rho'^2) / mean(rho'')^2`, with the unweighted psi.

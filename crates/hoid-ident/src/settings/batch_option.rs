@@ -7,7 +7,7 @@ use crate::IdentError;
 
 /// Sets an option of an estimator from a text.
 type Set<E, X> = Box<dyn Fn(&mut E, &Setting, &str) -> Result<(), X>>;
-/// The value as text at a sample time; `None` for one that is not printed.
+/// Writes the value as text for a given sample time; `None` if the value is not printed.
 type Words<E> = Box<dyn Fn(&E, SampleTime) -> Option<String>>;
 
 /// An option of an estimator `E`, with errors of type `X` for invalid texts.

@@ -1,11 +1,11 @@
 //! The declaration of options.
 
 /// Declares a struct of options: of each field documentation, unit, bounds and default. It
-/// implements `Default` and [`Settings`](crate::settings::Settings). Options that several methods
-/// share are a struct of their own, named under `groups`.
+/// implements `Default` and [`Settings`](crate::settings::Settings). Options that several methods share are in a
+/// separate struct, named under `groups`.
 ///
-/// In `#[setting(..)]` stand methods of [`Setting`](crate::settings::Setting): `unit`, `bounds`,
-/// `default` (as text), `name` (where it is not that of the field).
+/// `#[setting(..)]` contains methods of [`Setting`](crate::settings::Setting): `unit`, `bounds`, `default` (as text),
+/// `name` (where it is not that of the field).
 #[macro_export]
 macro_rules! settings {
     (

@@ -2,8 +2,7 @@
 //!
 //! An estimator or a recursive method declares its options once, by
 //! [`settings!`](crate::settings!): name, type, unit, default, bounds and a line of help. The
-//! command line, plans of studies, Python and the pages of the book read that declaration and have
-//! no list of their own.
+//! command line, plans of studies, Python and the pages of the book read that declaration and have no separate list.
 //!
 //! ```
 //! use hoid_ident::{settings, settings::{Bounds, Settings}};
@@ -11,7 +10,7 @@
 //! settings! {
 //!     /// Options of a method.
 //!     pub struct WindowOptions {
-//!         /// Samples between two fits
+//!         /// Samples between fits
 //!         #[setting(unit("samples"), bounds(Bounds::AtLeast(1.0)))]
 //!         pub refit: usize = 25,
 //!     }
@@ -20,16 +19,15 @@
 //! let mut options = WindowOptions::default();
 //! assert!(options.set("refit", "50")?);
 //! assert_eq!(options.refit, 50);
-//! assert_eq!(options.list()[0].help, "Samples between two fits");
+//! assert_eq!(options.list()[0].help, "Samples between fits");
 //! assert!(options.set("refit", "0").is_err());
 //! // A name that is not among them is nobody's.
 //! assert!(!options.set("memory", "256")?);
 //! # Ok::<(), hoid_ident::IdentError>(())
 //! ```
 //!
-//! A value is written as on the command line: `256`, `true`, `0.2..0.4`, `b0=256,f=inf`. What a
-//! plan or Python has in its own types is brought into that form first, so that there is one reader
-//! of each type ([`Value`]).
+//! A value is written as on the command line: `256`, `true`, `0.2..0.4`, `b0=256,f=inf`. Values that a plan or Python
+//! has in its own types are first converted to that form, so that there is one reader of each type ([`Value`]).
 
 mod batch_option;
 mod declare;

@@ -47,7 +47,7 @@ impl Value for OneOrSpan {
         let (low, high) = text.split_once("..").unwrap_or((text, text));
         match number(low).zip(number(high)) {
             Some((low, high)) if low <= high => Ok(Self(low, high)),
-            _ => Err("a number, as .28, or LO..HI with LO <= HI, as 0.1..0.4".to_owned()),
+            _ => Err("a number, such as .28, or LO..HI with LO <= HI, such as 0.1..0.4".to_owned()),
         }
     }
 

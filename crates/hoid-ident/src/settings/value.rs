@@ -113,7 +113,7 @@ impl Value for (f64, f64) {
         let number = |part: &str| part.trim().parse::<f64>().ok().filter(|x| x.is_finite());
         let ends = text.split_once("..").and_then(|(a, b)| Some((number(a)?, number(b)?)));
         ends.filter(|(low, high)| low <= high)
-            .ok_or_else(|| "LO..HI with LO <= HI, as 0.05..0.6".to_owned())
+            .ok_or_else(|| "LO..HI with LO <= HI, such as 0.05..0.6".to_owned())
     }
 
     fn text(&self) -> Option<String> {
@@ -138,7 +138,7 @@ impl Value for Constraint {
         ends.and_then(|(low, high)| Some((end(low, f64::NEG_INFINITY)?, end(high, f64::INFINITY)?)))
             .filter(|(low, high)| low <= high)
             .map(|(low, high)| Self::Between(low, high))
-            .ok_or_else(|| "LO..HI, of which either end may be left out".to_owned())
+            .ok_or_else(|| "LO..HI; either end may be omitted".to_owned())
     }
 
     fn text(&self) -> Option<String> {

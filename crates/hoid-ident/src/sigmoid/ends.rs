@@ -17,7 +17,7 @@ pub struct NamedEstimate {
     /// K, T_L, T_I ..., with the names of [`FamilyOperator::named`].
     #[serde(deserialize_with = "hoid_model::interned::name")]
     pub name: hoid_model::interned::Name,
-    /// Unit; empty for none.
+    /// Unit; empty if there is none.
     #[serde(deserialize_with = "hoid_model::interned::name")]
     pub unit: hoid_model::interned::Name,
     /// Estimate.

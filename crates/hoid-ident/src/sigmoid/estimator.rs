@@ -59,7 +59,7 @@ impl SigmoidChange {
         chosen.map_or_else(|| with_noise(self.nd.unwrap_or(DEFAULT_NOISE)), Ok)
     }
 
-    /// The operator without a change, of which starts are made.
+    /// The operator without a change, from which starts are derived.
     fn of_one_operator(&self) -> FamilyEstimator {
         FamilyEstimator {
             forms: vec![self.form],

@@ -16,7 +16,7 @@ use crate::{IdentError, Series, Termination, informative_data::check_record, opt
 pub struct ChangeParameter {
     /// Name.
     pub name: String,
-    /// Unit; empty for none.
+    /// Unit; empty if there is none.
     pub unit: &'static str,
     /// Estimate.
     pub estimate: Estimate,
@@ -261,9 +261,9 @@ impl SigmoidFit {
     /// Returns the gains at a time on the axis of the record, with standard errors: those of the sigmoid if the records
     /// show a change, otherwise those of the fit without one.
     ///
-    /// The errors are those of the delta method, t_M and G included. Near a change point, where the sigmoid is not
-    /// linear over the interval of t_M, its contribution is `step^2 p (1 - p)`, with p the probability that the change
-    /// has happened.
+    /// The errors are computed by the delta method and include those of t_M and G. Near a change point, where the
+    /// sigmoid is not linear over the interval of t_M, its contribution is `step^2 p (1 - p)`, with p the probability
+    /// that the change has happened.
     pub fn gains_at(&self, time_s: f64) -> GainsAt {
         let known = ThetaEstimate {
             layout: &self.layout,

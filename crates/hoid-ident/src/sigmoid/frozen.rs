@@ -1,8 +1,8 @@
 //! Poles, delay and noise model from which searches start.
 //!
-//! All forms have those of one operator at the response of an ARX model of high order for all records. For a gain and a
-//! lead others come from Box-Jenkins fits to the first and the last third of the records; if there are none, from a
-//! small grid of poles. Another form always uses a grid too.
+//! For all forms they are those of one operator fitted to the response of an ARX model of high order for all records.
+//! For a gain and a lead, others are obtained from Box-Jenkins fits to the first and the last third of the records or,
+//! if there are none, from a small grid of poles. Other forms always use a grid too.
 
 use hoid_model::{OperatorParameters, Orders, Record, Structure, operator_family::Coordinate};
 

@@ -57,10 +57,10 @@ impl fmt::Display for Remark {
             Self::Fixed => "fixed",
             Self::AtBound => "rests at a bound",
             Self::Abrupt => {
-                "at its upper bound: the change takes no longer than two samples, its rate cannot be determined"
+                "at its upper bound: the change takes no longer than two samples, so that its rate cannot be determined"
             }
-            Self::NoChange => "the records show no change: take the fit without one",
-            Self::ChangePoint => "the change is too fast for a normal error: take the likelihood interval",
+            Self::NoChange => "the records show no change: use the fit without one",
+            Self::ChangePoint => "the change is too fast for its error to be normal: use the likelihood interval",
             Self::Undetermined => "not determined by the data",
             Self::PriorAlone => "determined by the prior alone",
         })

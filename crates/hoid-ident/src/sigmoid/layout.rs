@@ -1,14 +1,14 @@
 //! Order and meaning of the parameters.
 //!
-//! A parameter that changes has two places in theta, before and after the change; a constant one has one place:
+//! A parameter that changes has two elements in theta, before and after the change; a constant one has one element:
 //!
 //! `theta = [v1 v2 of each of the numerator, t_M, ln G, 1/T_I, omega_nm, zeta_nm, tau_e, d1 .. d_nd]`
 //!
-//! where the numerator has the gain (K, with a lag K/T_I), and next to it T_L, or c_1 and c_2, or T_L and alpha
-//! ([`Form::shape`]); what a form does not have has no place. For the operator of a gain and a lead that is
-//! `[K_e1, K_e2, T_L1, T_L2, t_M, ln G, omega_nm, zeta_nm, tau_e, d1 .. d_nd]`. The rate enters by its logarithm: it is
-//! positive, and its likelihood is far more nearly a parabola in ln G than in G. A lag enters by `1/T_I`, for the same
-//! reason.
+//! where the numerator has the gain (K, with a lag K/T_I), followed by T_L, or c_1 and c_2, or T_L and alpha
+//! ([`Form::shape`]); a parameter that the form does not have has no element. For the operator of a gain and a lead
+//! that is `[K_e1, K_e2, T_L1, T_L2, t_M, ln G, omega_nm, zeta_nm, tau_e, d1 .. d_nd]`. The rate enters by its
+//! logarithm: it is positive, and its likelihood is far more nearly a parabola in ln G than in G. A lag enters by
+//! `1/T_I`, for the same reason.
 
 use hoid_model::{
     FamilyOperator, Form, ModelError, Orders,
@@ -96,18 +96,18 @@ impl Layout {
         self.noise + self.nd
     }
 
-    /// Returns the places of the i-th parameter of the numerator before and after the change.
+    /// Returns the indices of the i-th parameter of the numerator before and after the change.
     pub fn ends(i: usize) -> [usize; 2] {
         [2 * i, 2 * i + 1]
     }
 
-    /// Returns the places of the parameters that a model without a change does not have.
+    /// Returns the indices of the parameters that a model without a change does not have.
     pub fn of_the_change(&self) -> Vec<usize> {
         let last = (0..self.varying).map(|i| Self::ends(i)[1]);
         last.chain([self.midpoint, self.log_rate]).collect()
     }
 
-    /// Returns the places of the poles and the delay, on which the responses depend.
+    /// Returns the indices of the poles and the delay, on which the responses depend.
     pub fn poles(&self) -> Vec<usize> {
         let muscles = self.muscles.into_iter().flatten();
         self.lag.into_iter().chain(muscles).chain([self.delay]).collect()

@@ -1,6 +1,6 @@
 //! Noise whose level changes with the operator.
 //!
-//! A remnant with another gain after the change gives innovations with another standard deviation:
+//! If the gain of the remnant changes, so does the standard deviation of the innovations:
 //! `sigma(t) = sigma_1 + (sigma_2 - sigma_1) s(t)` with the sigmoid s of the gains, without their delay. Given the
 //! residuals, sigma_1 and sigma_2 minimise `sum of ln sigma(t) + eps(t)^2/(2 sigma(t)^2)` (Fisher scoring); the
 //! residuals are then weighted by 1/sigma(t), and the fit and the levels are estimated in turn. Source: R. J. Carroll
@@ -73,7 +73,7 @@ pub(crate) fn levels(residuals: &[Vec<f64>], shares: &[Vec<f64>]) -> Option<[f64
 }
 
 /// Returns weights `1/sigma(t)`, scaled to the geometric mean 1 over all residuals: the sum of weighted squares then
-/// takes the place of the sum of squares in the likelihood.
+/// replaces the sum of squares in the likelihood.
 pub(crate) fn weights(sigma: [f64; 2], shares: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let level = |share: f64| sigma[0] + (sigma[1] - sigma[0]) * share;
     let count: usize = shares.iter().map(Vec::len).sum();

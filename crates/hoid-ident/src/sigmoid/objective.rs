@@ -7,19 +7,19 @@
 //!
 //! because the delay is after the gains. For a gain and a lead that is `K_e(t - tau) y_0(t) + K_e_dot(t - tau) y_1(t)`,
 //! with y_0 of `omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}`. The y_i have one F and one state in common, which
-//! the numerator does not touch, so that y_i = (B_i/F) q^-nk e holds throughout ([`super::unit_operator`]). With the
+//! the numerator does not affect, so that y_i = (B_i/F) q^-nk e holds throughout ([`super::unit_operator`]). With the
 //! gain k and the shape m of the numerator, `n = k m(x)` ([`hoid_model::Form::shape`]),
 //!
 //! `dw/dk = sum_i m_i y_i`,  `dw/dx_j = k sum_i (dm_i/dx_j) y_i`.
 //!
-//! **Initial states.** The state of the operator where a record starts is unknown, as many numbers as they have poles.
-//! Any state is reached from rest by as many held errors before it; those are the unknowns, so that the same filters
-//! give the responses to them and all derivatives. For a gain and a lead they are before the record, of other forms
-//! right before the first residual: there nothing of a fast pole has died away, and none of the responses is lost next
-//! to the others. They enter eps linearly and are eliminated exactly for each theta, as in
-//! [`crate::criterion::initial_state_responses`]: `eps = (I - Q Q') eps_0`, psi with the best
-//! states, `psi' (I - Q Q') psi` (G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973)
-//! 413-432; L. Kaufman, *BIT* 15 (1975) 49-57).
+//! **Initial states.** The state of the operator at the start of a record is unknown: as many numbers as there are
+//! poles. Any state is reached from rest by as many held errors before it; those are the unknowns, so that the same
+//! filters give the responses to them and all derivatives. For a gain and a lead these errors precede the record; for
+//! other forms they immediately precede the first residual: there the response of a fast pole has not yet decayed, and
+//! none of the responses is lost among the others. They enter eps linearly and are eliminated exactly for each theta,
+//! as in [`crate::criterion::initial_state_responses`]: `eps = (I - Q Q') eps_0`, psi with the best states,
+//! `psi' (I - Q Q') psi` (G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432; L. Kaufman, *BIT* 15
+//! (1975) 49-57).
 //!
 //! **Level.** In recorded data u may have a level c that is not a response to e ([`crate::Fit::level`]). It is an
 //! additional linear unknown of each record, with a response of ones, eliminated in the same way. The means cannot be
@@ -225,8 +225,8 @@ impl ChangeCriterion<'_> {
     }
 
     /// The level of u in one record at a minimum, and its variance for this variance of the innovations and covariance
-    /// of theta: `sigma^2/r^2` for given theta, with r the length of its column q r off those of the states, and the
-    /// uncertainty of theta, along `dc/dtheta = -q' psi/r`.
+    /// of theta: `sigma^2/r^2` for given theta, with r the length of the component q r of its column orthogonal to
+    /// those of the states, and the uncertainty of theta, along `dc/dtheta = -q' psi/r`.
     pub fn level_of(&self, theta: &[f64], record: usize, variance: f64, covariance: &[f64]) -> Option<(f64, f64)> {
         let pass = self.pass(theta, record)?;
         let (value, length) = pass.level.filter(|(_, length)| *length > 0.0)?;

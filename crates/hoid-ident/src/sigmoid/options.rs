@@ -47,9 +47,9 @@ pub struct SigmoidChange {
 }
 
 impl Default for SigmoidChange {
-    /// Noise of the order that the records show, delay between 0.05 and 0.6 s, a noise level that changes, own starts; searches of up to 200
-    /// steps to a relative decrease of 1e-10 (a thousandth of a standard error): with a small change the loss has many
-    /// ripples in t_M.
+    /// Noise of the order that the records show, delay between 0.05 and 0.6 s, a noise level that changes, and the
+    /// default starts; searches of up to 200 steps to a relative decrease of 1e-10 (a thousandth of a standard error):
+    /// with a small change the loss has many ripples in t_M.
     fn default() -> Self {
         Self {
             form: Form::Lead,
@@ -82,7 +82,7 @@ impl SigmoidChange {
                 return Err(IdentError::BadOption {
                     option: format!("order {name}"),
                     found: written(range),
-                    expected: "a single number nd of an operator that changes, as nd=2".to_owned(),
+                    expected: "a single number nd of an operator that changes, such as nd=2".to_owned(),
                 });
             }
         }

@@ -1,8 +1,8 @@
 //! Prior knowledge of the person in the criterion of a change.
 //!
 //! A prior of a positive parameter x, `ln x ~ N(m, s)`, is added to the squared residuals as `sigma^2 (ln x - m)^2/s^2`
-//! ([`crate::family::OperatorPrior`]); that of T_L is used before and after the change. sigma^2, the variance of the
-//! innovations, is that of the fit: both are computed in turn.
+//! ([`crate::family::OperatorPrior`]); that of T_L is used before and after the change. The innovation variance sigma^2
+//! is that of the fit; both are computed in turn.
 
 use super::{
     layout::{Element, Layout},
@@ -22,7 +22,7 @@ const ROUNDS: usize = 3;
 /// Relative change of sigma^2 below which no further round is necessary.
 const SETTLED: f64 = 0.05;
 
-/// Returns the prior for each place in theta, in units of one standard deviation.
+/// Returns the prior for each element of theta, in units of one standard deviation.
 pub(super) fn penalties(layout: &Layout, prior: &OperatorPrior) -> Vec<Penalty> {
     let all = layout.coordinates();
     let elements = layout.elements();

@@ -1,12 +1,11 @@
 //! Profile likelihood intervals of t_M and G.
 //!
-//! An interval holds the values at which the other parameters, searched again, lose little:
-//! `n ln(V(x)/V) <= q`. It needs no parabola. For G, and for t_M where the change is resolved (two
-//! standard errors are less than the width 1/G of the change), the loss is chi-square with one
-//! degree of freedom: q = 3.84 for 95 %. An abrupt change is a change point instead: the loss at
-//! the true t_M is distributed as the larger of two exponential variables,
-//! `P(loss <= q) = (1 - e^{-q/2})^2`, q = 7.35 for 95 % (B. E. Hansen, *Econometrica* 68 (2000)
-//! 575-603, theorem 2).
+//! An interval contains the values at which the loss, minimised over the other parameters, is only slightly larger:
+//! `n ln(V(x)/V) <= q`. The loss need not be a parabola. For G, and for t_M where the change is resolved (two standard
+//! errors are less than the width 1/G of the change), this increase is chi-square with one degree of freedom: q = 3.84
+//! for 95 %. An abrupt change is a change point instead: the increase at the true t_M is distributed as the larger of
+//! two exponential variables, `P(loss <= q) = (1 - e^{-q/2})^2`, q = 7.35 for 95 % (B. E. Hansen, *Econometrica* 68
+//! (2000) 575-603, theorem 2).
 
 use super::{layout::Layout, objective::ChangeCriterion, search::search};
 use crate::optimize::{Minimum, SearchMethod, SearchOptions};

@@ -8,13 +8,13 @@ use crate::{
     optimize::{Minimum, minimise},
 };
 
-/// Number of steps from each start before the best of them is continued to its end.
+/// Number of steps from each start before the best search is continued to completion.
 const LOOK: usize = 30;
 /// Distance to the border of a piece, in pieces, below which the next piece is tried.
 const NEAR_BORDER: f64 = 1e-6;
 
 /// Returns the lowest of the minima from these starts, with the name of its start: a few steps from each, then the best
-/// to its end.
+/// to completion.
 ///
 /// # Errors
 /// [`IdentError::NoFiniteLoss`].

@@ -1,10 +1,9 @@
 //! Starts of the search if none is given.
 //!
 //! Poles, delay and noise model are those of [`super::frozen`]. With these and t_M and G given the
-//! residual is linear in the coefficients of the numerator at both ends (all of them following the
-//! sigmoid, which products of gain and lead do at both ends), so that pairs of t_M and G are ranked
-//! by least squares ([`super::ranking`]): a grid of t_M for a slow, a middling and an abrupt change,
-//! then halved steps of t_M around the best of each.
+//! residual is linear in the coefficients of the numerator at both ends (all of them following the sigmoid, as products
+//! of gain and lead do at both ends), so that pairs of t_M and G are ranked by least squares ([`super::ranking`]): a
+//! grid of t_M for a slow, a moderate and an abrupt change, then halved steps of t_M around the best of each.
 
 use hoid_model::{Form, Record};
 
@@ -87,7 +86,7 @@ fn best_of_family(criterion: &ChangeCriterion<'_>, guessed: Option<Frozen>, log_
     all.into_iter().filter_map(noise).collect()
 }
 
-/// Gives poles the noise model of what they leave of u; `None` if they have no numerator.
+/// Returns the noise model of the part of u that the poles do not explain; `None` if they have no numerator.
 fn with_noise(criterion: &ChangeCriterion<'_>, mut frozen: Frozen, log_rate: f64) -> Option<Frozen> {
     let (nd, noise) = (criterion.layout.nd, criterion.layout.noise);
     let (_, theta, ranking) = on_grid(criterion, &frozen, log_rate)?;

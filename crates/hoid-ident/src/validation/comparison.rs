@@ -91,7 +91,7 @@ impl fmt::Display for Validation {
             )?,
             None => writeln!(
                 f,
-                "whiteness          not tested: fewer lags than coefficients of the noise model"
+                "whiteness          not tested: no more lags than coefficients of the noise model"
             )?,
         }
         let outside = |from: i64| {

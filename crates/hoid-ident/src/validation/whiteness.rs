@@ -18,8 +18,8 @@ pub struct LjungBox {
     pub p_value: f64,
 }
 
-/// Applies the test of Ljung and Box to residuals whose noise model has `free` coefficients; `None` if there are fewer
-/// lags than those.
+/// Applies the Ljung-Box test to residuals whose noise model has `free` coefficients; `None` unless there are more lags
+/// than coefficients.
 pub fn whiteness(residuals: &[f64], free: usize) -> Option<LjungBox> {
     let residuals = centred(residuals.to_vec());
     ljung_box(&autocorrelation(&residuals, LARGEST_LAG), residuals.len(), free)

@@ -3,8 +3,8 @@
 //! Row i is at `t_i = t_0 + k_i Ts + jitter`, with whole k that increase by one from row to row,
 //! and by more where rows are missing. The k are found by a phase that follows the times,
 //! `k_i - k_{i-1} = round((t_i - g) / Ts)`, with `g` pulled by a small share towards each time:
-//! jitter of nearly half a sample is then not a gap. A step too many is given back if the next row
-//! seems not to advance. Ts is the least-squares slope, computed twice.
+//! jitter of nearly half a sample is then not a gap. An excess step is undone if the next row seems not to advance. Ts
+//! is the least-squares slope, computed twice.
 //!
 //! The jitter is the deviation from straight lines over parts of 256 rows without a gap, so that
 //! slow drift does not count as jitter.
@@ -56,8 +56,8 @@ impl Grid {
             true => Cow::Borrowed(t),
             false => rows.iter().map(|row| t[*row]).collect(),
         };
-        // The median of single steps is exact without jitter; that of sixteen steps together
-        // averages jitter out, where few rows are missing.
+        // The median of single steps is exact without jitter; that of sums of sixteen steps averages out jitter, if few
+        // rows are missing.
         let median = |length: usize| {
             let mut spans: Vec<f64> = times
                 .windows(length + 1)
@@ -82,7 +82,7 @@ impl Grid {
                     sample_time_s = slope;
                 }
                 if is_even(&times, &steps, sample_time_s) {
-                    // Followed again, no step would be another one.
+                    // If followed again, every step would be the same.
                     break;
                 }
             }
@@ -137,7 +137,7 @@ impl Grid {
     }
 }
 
-/// True if no row is missing and each time is near its place on the grid.
+/// True if no row is missing and each time is near its grid point.
 fn is_even(times: &[f64], steps: &[f64], ts: f64) -> bool {
     let near = |(i, t): (usize, &f64)| (t - times[0] - i as f64 * ts).abs() < 0.25 * ts;
     steps.iter().all(|step| *step == 1.0) && times.iter().enumerate().all(near)
@@ -147,8 +147,8 @@ fn is_even(times: &[f64], steps: &[f64], ts: f64) -> bool {
 fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
     steps.fill(1.0);
     let mut owed: Option<usize> = None;
-    // Where a grid starts, its position is estimated from the first times together: a single one is
-    // off by its jitter.
+    // Where a grid starts, its position is estimated from several of the first times, since a single time deviates by
+    // its jitter.
     let begin = |i: usize| {
         let ahead = times[i..]
             .iter()
@@ -171,8 +171,7 @@ fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
         }
         known += 1.0;
         steps[i] = step.max(1.0);
-        // A row that seems not to advance gives back the step that an early time took, or borrows
-        // from the next one.
+        // A row that seems not to advance undoes the excess step of an early time, or takes a step from the next row.
         if step < 1.0 {
             match (i.saturating_sub(NEAR)..i).rev().find(|j| steps[*j] > 1.5) {
                 Some(taken) => steps[taken] -= 1.0,

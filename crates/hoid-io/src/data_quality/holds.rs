@@ -46,7 +46,7 @@ pub(super) fn standing(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<Quali
         let what = if kind == QualityIssueKind::Repeated {
             "duplicated, time included"
         } else {
-            "no later than the row before, with other values"
+            "not later than the row before, but with other values"
         };
         found.push(QualityIssue {
             kind,
@@ -118,8 +118,8 @@ pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Gri
                 2 * alone.iter().map(Range::len).max().unwrap_or(0)
             }
         };
-        // Next to a quantised channel, which holds often, one printed with few digits holds at a
-        // peak at the same time by chance.
+        // A channel printed with few digits, which holds at a peak, may by chance do so together with a quantised
+        // channel, which holds often.
         let by_chance = usize::from(moving.iter().any(|(_, levels)| levels.is_coarse()));
         moving.iter().zip(&holds).map(natural).min().unwrap_or(0).max(by_chance)
     };

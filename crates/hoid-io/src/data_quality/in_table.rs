@@ -90,7 +90,8 @@ fn of_columns(
     nominal_hz: Option<f64>,
     rows: Range<usize>,
 ) -> Vec<QualityIssue> {
-    // What --sparse has made is no fault of the recording, and neither is what was missing there.
+    // Values that --sparse has filled in are not a fault of the recording, and neither are those that were missing
+    // there.
     let own: Vec<(usize, Cow<'_, [f64]>)> = (used.iter())
         .map(|column| (*column, table.columns[*column].own_values(rows.clone())))
         .collect();

@@ -1,4 +1,4 @@
-//! A finding: kind, place, size and remedy.
+//! A finding: kind, location, size and remedy.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::wording::decimal;
 
-/// Maximum number of places of a finding written as JSON; all of them are counted.
+/// Maximum number of locations of a finding written as JSON; all of them are counted.
 const PLACES_WRITTEN: usize = 100;
 
 /// Kind of a problem.
@@ -39,23 +39,29 @@ pub enum QualityIssueKind {
 }
 
 impl QualityIssueKind {
-    /// Kinds that are places in a record and can be excluded from it; a clock error or a constant channel is not.
+    /// Kinds that have a location in a record and can be excluded from it; a clock error or a constant channel has
+    /// none.
     pub const MASKABLE: [Self; 4] = [Self::Missing, Self::Gap, Self::Stalled, Self::Saturated];
 
     /// Returns the remedy.
     pub fn remedy(self) -> &'static str {
         match self {
             Self::Missing => {
-                "bridge empty cells with --fill, read what was logged at its own instants with --sparse COLUMN=hold, or leave out with --from and --to or --mask missing"
+                "bridge empty cells with --fill, read a column logged at its own instants with --sparse COLUMN=hold, \
+                 or exclude the rows with --from and --to or --mask missing"
             }
-            Self::Unordered => "read trials whose time starts again with --trial t, or count the samples with --fs",
+            Self::Unordered => {
+                "use --trial t if the time restarts with each trial, or replace t by the sampling frequency with --fs"
+            }
             Self::Repeated => "drop them with --drop-repeated",
-            Self::Gap => "interpolate with --resample, or leave out with --mask gap",
-            Self::Jitter => "interpolate with --resample, or count the samples with --fs if only t is wrong",
+            Self::Gap => "interpolate with --resample, or exclude the gaps with --mask gap",
+            Self::Jitter => {
+                "interpolate with --resample, or replace t by the sampling frequency with --fs if only t is wrong"
+            }
             Self::Clock => "give the true sampling frequency with --fs if t is wrong",
             Self::Drift => "interpolate with --resample if t is right, or count the samples with --fs",
-            Self::Stalled => "leave out with --mask stalled or --from and --to",
-            Self::Saturated => "leave out with --mask saturated; a bias stays, see the page on record files",
+            Self::Stalled => "exclude the rows with --mask stalled or --from and --to",
+            Self::Saturated => "exclude the rows with --mask saturated; a bias remains, see the page on record files",
             Self::Quantised => "nothing; it adds noise of variance step^2 / 12",
             Self::Constant => "choose another column",
         }
@@ -83,7 +89,7 @@ pub struct RowSpan {
     pub row: usize,
     /// Number of rows; for a gap, of missing rows.
     pub rows: usize,
-    /// Time of the first row, s; none without a time column.
+    /// Time of the first row, s; `None` without a time column.
     pub from_s: Option<f64>,
     /// Time of the row after the last, s.
     pub to_s: Option<f64>,
@@ -105,7 +111,7 @@ pub struct QualityIssue {
     pub size: f64,
     /// Unit of the size.
     pub unit: String,
-    /// Places.
+    /// Locations.
     pub places: Vec<RowSpan>,
     /// A sentence without a full stop.
     pub text: String,

@@ -1,5 +1,5 @@
-//! Quality of recorded data: problems of the sampling and the values, their places and sizes; data are changed only on
-//! request.
+//! Quality of recorded data: problems of the sampling and the values, their locations and sizes; data are changed only
+//! on request.
 //!
 //! | module | contents |
 //! |---|---|

@@ -11,7 +11,7 @@ const JITTER: f64 = 1e-3;
 /// Relative deviation of a clock from a given rate above which it is reported; crystals are within 1e-4.
 const OFF: f64 = 2e-4;
 /// The same for a typical rate that was not given, and the largest deviation at which the rate still counts as that
-/// one.
+/// typical rate.
 const OFF_COMMON: (f64, f64) = (5e-4, 1e-2);
 /// Common sampling rates of recorders, Hz.
 const COMMON_HZ: [f64; 42] = [
@@ -145,7 +145,7 @@ fn rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec
             if given {
                 ""
             } else {
-                ", if that is not the rate of the recorder"
+                ", unless that is the rate of the recorder"
             }
         ),
         places: Vec::new(),
@@ -224,7 +224,7 @@ fn second_clocks(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssu
             size: off,
             unit: "1".to_owned(),
             text: format!(
-                "{} goes {} % {} than t: one of the two clocks is wrong",
+                "{} runs {} % {} than t: one of the two clocks is wrong",
                 clock.name,
                 short(100.0 * off.abs()),
                 if off > 0.0 { "faster" } else { "slower" }

@@ -1,15 +1,14 @@
 //! Saturation, quantisation, constants and missing values of one channel.
 //!
 //! A channel is quantised if its values, fewer than half as many as its rows (of a long channel: its first
-//! [`EXAMINED`]), lie on a grid within `1e-3 q`, where q is the smallest step between two of them; the smallest and the largest may lie
-//! off the grid, as the end stops of a stick do.
+//! [`EXAMINED`]), lie on a grid within `1e-3 q`, where q is the smallest step between two of them; the smallest and the
+//! largest may lie off the grid, like the end stops of a stick.
 //!
-//! It is saturated at a limit if it stays there as no peak does. In full precision no two
-//! consecutive values are equal by chance: three rows at the extreme value are saturation. In a
-//! quantised channel a peak stays longest at its top: a parabola with its top at the far edge of
-//! the last step stays 3 times as long there as on average at the next three steps. Saturation is
-//! reported if the rows at the extreme are at least 6 times as many as that average, with one stay
-//! of at least 5 rows, and if the channel reached the extreme and stayed there more than once.
+//! It is saturated at a limit if it stays there longer than a peak can. In full precision no two consecutive values are
+//! equal by chance: three rows at the extreme value are saturation. In a quantised channel a peak stays longest at its
+//! top: a parabola with its top at the far edge of the last step stays 3 times as long there as on average at the next
+//! three steps. Saturation is reported if the rows at the extreme are at least 6 times as many as that average, with
+//! one stay of at least 5 rows, and if the channel reached the extreme and stayed there more than once.
 
 use std::ops::Range;
 

@@ -166,7 +166,7 @@ pub fn write_fmu(
         let name = format!("binaries/{folder}/{MODEL}.{}", platform.ending);
         if parts.iter().any(|(other, _)| *other == name) {
             return Err(wrong(format!(
-                "two libraries are for {folder}; give one of each platform"
+                "two libraries are for {folder}; give one for each platform"
             )));
         }
         parts.push((name, &library.bytes));

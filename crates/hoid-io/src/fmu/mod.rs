@@ -2,10 +2,9 @@
 //! settings that it reads at start.
 //!
 //! *Functional Mock-up Interface for Model Exchange and Co-Simulation*, version 2.0.4 (Modelica
-//! Association, 2022), and *Functional Mock-up Interface Specification*, version 3.0.1 (2023). The
-//! library is that of `hoid-ffi`; this module defines what the library and the description share:
-//! the variables ([`FmuKind::variables`]), whose value references are their positions, and the
-//! token.
+//! Association, 2022), and *Functional Mock-up Interface Specification*, version 3.0.1 (2023). The library is
+//! `hoid-ffi`; this module defines the parts that the library and the description share: the variables
+//! ([`FmuKind::variables`]), whose value references are their positions, and the token.
 //!
 //! | file | contents |
 //! |---|---|

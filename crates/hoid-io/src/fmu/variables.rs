@@ -53,7 +53,7 @@ pub enum FmuStart {
 pub struct FmuVariable {
     /// Its name.
     pub name: &'static str,
-    /// Its unit, empty for none.
+    /// Its unit, empty if there is none.
     pub unit: &'static str,
     /// Its role.
     pub role: Role,
@@ -96,7 +96,7 @@ fn tracker() -> Vec<FmuVariable> {
             Real(0.01),
             "sample time; steps may be shorter, not longer",
         ),
-        parameter("method", "", text("adaptive"), "recursive method, as of hoid track"),
+        parameter("method", "", text("adaptive"), "recursive method, as for hoid track"),
         parameter(
             "prior",
             "",
@@ -107,13 +107,13 @@ fn tracker() -> Vec<FmuVariable> {
             "controlled_element",
             "",
             text(""),
-            "the controlled element, as 90/(s(s+6)); empty for none",
+            "the controlled element, such as 90/(s(s+6)); empty if there is none",
         ),
         parameter(
             "options",
             "",
             text(""),
-            "further options in JSON, by the keywords of pyhoid.Tracker",
+            "further options in JSON, with the keywords of pyhoid.Tracker",
         ),
         parameter("with_excitation", "", Boolean(false), "true if f_t is connected"),
         input("e", "tracking error"),
@@ -176,7 +176,7 @@ fn tracker() -> Vec<FmuVariable> {
             "restarts",
             "",
             Integer(0),
-            "how often the guard started the estimate again",
+            "number of times the guard restarted the estimate",
         ),
     ]);
     all

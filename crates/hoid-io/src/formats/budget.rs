@@ -48,8 +48,8 @@ impl Budget {
             None => Err(IoError::Unsupported {
                 file: file.to_owned(),
                 found: format!("it unpacks to more than {} MB", self.all >> 20),
-                remedy: "write it without compression, or in parts; where it is meant to be so large, set HOID_MAX_UNPACKED_MB in the \
-                         environment to the MB that it may take",
+                remedy: "write it without compression, or in parts; if it is meant to be so large, set \
+                         HOID_MAX_UNPACKED_MB in the environment to the number of MB allowed",
             }),
         }
     }

@@ -1,8 +1,8 @@
 //! Isolation of crates that read untrusted bytes, so that they cannot abort a study.
 //!
-//! They report most damage as an error, but some by a panic: an index or a sum out of range. This
-//! is the only place where a panic is caught. Partial results belong to the crate and are dropped
-//! here. With `panic = "abort"` no panic can be caught.
+//! These crates report most damage as an error, but some by a panic: an index or a sum out of range. This is the only
+//! place where a panic is caught. Partial results belong to the crate and are dropped here. With `panic = "abort"` no
+//! panic can be caught.
 
 use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};

@@ -45,41 +45,41 @@ const ELSEWHERE: [(&[&str], &str); 12] = [
     (&["arrow", "feather", "ipc", "xlsx", "xls", "ods"], PYTHON),
     (
         &["mcap"],
-        "read its topics by the Python package mcap and make a pyhoid.Record of them",
+        "read its topics with the Python package mcap and make a pyhoid.Record of them",
     ),
     (
         &["bag", "db3"],
-        "read its topics by the Python package rosbags and make a pyhoid.Record of them",
+        "read its topics with the Python package rosbags and make a pyhoid.Record of them",
     ),
     (
         &["edf"],
-        "read it by the Python package pyedflib or mne and make a pyhoid.Record of it",
+        "read it with the Python package pyedflib or mne and make a pyhoid.Record of it",
     ),
     (
         &["bdf"],
-        "read it by the Python package mne and make a pyhoid.Record of it",
+        "read it with the Python package mne and make a pyhoid.Record of it",
     ),
     (
         &["c3d"],
-        "read it by the Python package ezc3d and make a pyhoid.Record of it",
+        "read it with the Python package ezc3d and make a pyhoid.Record of it",
     ),
     (
         &["tdms"],
-        "read it by the Python package nptdms and make a pyhoid.Record of it",
+        "read it with the Python package nptdms and make a pyhoid.Record of it",
     ),
     (
         &["mf4"],
-        "read it by the Python package asammdf and make a pyhoid.Record of it",
+        "read it with the Python package asammdf and make a pyhoid.Record of it",
     ),
     (
         &["sav"],
-        "read it by pandas.read_spss and give the table to pyhoid.Record.from_pandas",
+        "read it with pandas.read_spss and give the table to pyhoid.Record.from_pandas",
     ),
     (&["rds", "rda"], "write it as CSV or Parquet in R"),
     (&["mlx", "slx"], "save the variables in MATLAB: save run1.mat e u t"),
 ];
 /// The remedy for files that pyhoid reads.
-const PYTHON: &str = "save it as CSV or Parquet, or read it in Python by pyhoid.read";
+const PYTHON: &str = "save it as CSV or Parquet, or read it in Python with pyhoid.read";
 
 /// The extension of a file, in lower case.
 fn ending_of(path: &Path) -> Option<String> {
@@ -99,8 +99,8 @@ fn format_of(path: &Path) -> Option<&'static Format> {
 fn unknown(path: &Path, expected: String, remedy: Option<&str>) -> IoError {
     IoError::UnknownFormat {
         file: path.display().to_string(),
-        found: ending_of(path).map_or(String::from("there is no extension"), |ending| {
-            format!("the extension is .{ending}")
+        found: ending_of(path).map_or(String::from("the name has no extension"), |ending| {
+            format!(".{ending} is not the extension of a record format")
         }),
         expected,
         remedy: remedy.map_or_else(String::new, |remedy| format!("; {remedy}")),
@@ -116,8 +116,8 @@ fn format_to_read(path: &Path) -> Result<&'static Format, IoError> {
     })
 }
 
-/// The format of a file to be written, which must not be a directory. A pipe or a device of any
-/// other name takes CSV.
+/// The format of a file to be written, which must not be a directory. A pipe or a device with any other name is written
+/// as CSV.
 pub(crate) fn format_to_write(path: &Path) -> Result<&'static Format, IoError> {
     let known = fs::metadata(path).ok();
     let format = match known {

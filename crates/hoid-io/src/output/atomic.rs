@@ -1,4 +1,4 @@
-//! Atomic files: written next to their place, then renamed.
+//! Atomic files: written under a temporary name in the same directory, then renamed.
 
 use std::fs;
 use std::io::{self, BufWriter, Write};
@@ -43,7 +43,7 @@ pub(crate) struct WholeFile {
     buffer: BufWriter<fs::File>,
     /// Name as the user gave it.
     name: String,
-    /// The final path and the temporary file; none for a pipe or a device.
+    /// The final path and the temporary file; `None` for a pipe or a device.
     part_file: Option<PartFile>,
 }
 
@@ -85,7 +85,7 @@ impl WholeFile {
         })
     }
 
-    /// Moves the file to its place once everything is on the disk.
+    /// Moves the file to its final path once everything is on the disk.
     pub(crate) fn finish(self) -> Result<(), IoError> {
         let Self {
             buffer,

@@ -1,8 +1,8 @@
 //! Exclusive use of a directory of results by one process.
 //!
 //! The lock is that of the operating system on the directory itself (on a file `.hoid-lock` in it
-//! where directories cannot be opened), so that a killed process leaves no lock. On a file system
-//! without locks there is none here either.
+//! where directories cannot be opened), so that a killed process leaves no lock. On a file system without locks,
+//! nothing is locked.
 
 use std::fs::{File, TryLockError};
 use std::path::Path;
@@ -50,7 +50,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let first = DirectoryLock::take(dir.path()).unwrap();
         let message = DirectoryLock::take(dir.path()).unwrap_err().to_string();
-        assert!(message.contains("another process works on"), "{message}");
+        assert!(message.contains("another process is working on"), "{message}");
         drop(first);
         DirectoryLock::take(dir.path()).unwrap();
         assert!(DirectoryLock::take(&dir.path().join("none")).is_err());

@@ -1,4 +1,4 @@
-//! Files in progress: `.hoid-*.part` next to their final place.
+//! Files in progress: `.hoid-*.part` in the directory of their final path.
 //!
 //! A part is locked during the life of its writer; the system releases the locks of a process that
 //! ended, for any reason. A part that can be locked therefore has no owner, and the next process
@@ -35,8 +35,7 @@ fn known() -> MutexGuard<'static, PartFiles> {
     KNOWN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes the partial output of this process when it is interrupted: an exiting process drops
-/// nothing.
+/// Removes the partial output of this process when it is interrupted, since nothing is dropped when a process exits.
 pub fn remove_unfinished_files() {
     for part in std::mem::take(&mut known().parts) {
         // A part that was already renamed, or cannot be removed now, is removed later.
@@ -66,10 +65,10 @@ impl Part {
         Ok((file, Self { path: Some(path) }))
     }
 
-    /// Renames the part into its place.
+    /// Renames the part to its final path.
     pub(super) fn persist(mut self, file: File, place: &Path, permissions: Option<fs::Permissions>) -> io::Result<()> {
         let Some(path) = self.path.take() else {
-            return Err(io::Error::other("the file was put in its place before"));
+            return Err(io::Error::other("the file was already put in its place"));
         };
         let name = path.to_path_buf();
         let part = NamedTempFile::from_parts(file, path);
@@ -101,8 +100,8 @@ fn make(directory: &Path) -> io::Result<NamedTempFile> {
     builder.tempfile_in(directory).map_err(without_path)
 }
 
-/// The error of the system without the name of the part, which is of no interest to the user: the
-/// message names the requested place.
+/// The error of the system without the name of the part, which is of no interest to the user: the message names the
+/// requested path.
 fn without_path(error: io::Error) -> io::Error {
     let text = error.to_string();
     match text.split_once(" at path ") {

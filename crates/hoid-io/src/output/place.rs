@@ -1,5 +1,5 @@
-//! Checks before the work starts whether a result can be written to a place: a result never
-//! replaces its own input, and an unwritable directory is detected at once.
+//! Checks before the work starts whether a result can be written to a path: a result never replaces its own input, and
+//! an unwritable directory is detected at once.
 //!
 //! Two paths denote the same file if the system gives them the same device and number (so that
 //! symbolic and hard links count), on other systems if their full paths agree.
@@ -30,8 +30,8 @@ pub fn is_same_file(a: &Path, b: &Path) -> bool {
     }
 }
 
-/// Checks that a file can be written at a place without replacing one of `inputs`. No file is left
-/// there; pipes and devices are not opened.
+/// Checks that a file can be written to a path without replacing one of `inputs`. No file is left there; pipes and
+/// devices are not opened.
 ///
 /// # Errors
 /// [`IoError::OutputIsInput`], [`IoError::Directory`], [`IoError::Unwritable`].

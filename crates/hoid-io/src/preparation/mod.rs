@@ -13,8 +13,8 @@
 //!
 //! [`Preparation`] in `pipeline` applies them to the channels of a record, separated by `record_parts`. The filter of
 //! the two steps that need one, and the decimation, are those of [`hoid_model::resampling`]. For an offset and for a
-//! new frequency, samples whose filter would reach beyond the record are cut, never invented; decimation keeps all
-//! samples. Each applied step is a [`Step`] with its numbers; reading adds its repairs before them.
+//! new frequency, samples whose filter would reach beyond the record are cut and never extrapolated; decimation keeps
+//! all samples. Each applied step is a [`Step`] with its numbers; reading adds its repairs before them.
 
 mod offset;
 mod pipeline;

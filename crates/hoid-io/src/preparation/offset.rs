@@ -1,11 +1,10 @@
 //! Alignment of channels that were recorded late.
 //!
-//! A channel with the offset d was recorded d samples late: its sample k + d belongs to sample k of
-//! the others, `x'(k) = x(k + d)`. An offset of whole samples moves rows and changes no number.
-//! Between samples the band-limited signal is interpolated by the windowed sinc of [`Kernel`]: up
-//! to 0.8 of the Nyquist frequency its error is below 1e-4 of the amplitude (80 dB); above, the
-//! channel is distorted. Rows for which a channel lacks a sample, or samples that the filter needs,
-//! are cut.
+//! A channel with the offset d was recorded d samples late: its sample k + d corresponds to sample k of the others,
+//! `x'(k) = x(k + d)`. An offset of whole samples moves rows and changes no number. Between samples the band-limited
+//! signal is interpolated by the windowed sinc of [`Kernel`]: up to 0.8 of the Nyquist frequency its error is below
+//! 1e-4 of the amplitude (80 dB); above, the channel is distorted. Rows for which a channel lacks a sample, or samples
+//! that the filter needs, are cut.
 
 use std::str::FromStr;
 

@@ -34,8 +34,8 @@ pub struct Preparation {
 }
 
 impl Preparation {
-    /// Returns the prepared record and the applied steps. [`Preparation::drop_repeated`] belongs to
-    /// reading and is ignored.
+    /// Returns the prepared record and the applied steps. [`Preparation::drop_repeated`] is applied in reading and is
+    /// ignored here.
     ///
     /// # Errors
     /// [`IoError::Preparation`] with the step, the value found and the expected value;

@@ -68,7 +68,7 @@ impl RecordParts {
             self.error(
                 "rate",
                 format!("{hz} Hz"),
-                "a positive finite number of samples in a second",
+                "a positive finite number of samples per second",
             )
         })?;
         if new.matches(old) {

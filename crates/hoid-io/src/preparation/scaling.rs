@@ -109,10 +109,10 @@ impl FromStr for Scaling {
             None => (text.trim(), None),
         };
         let known = |name: &str| UNITS.into_iter().find(|(unit, ..)| *unit == canonical(name));
-        // A number comes first: "1:deg" sets the unit and changes no value.
+        // A number is tried first: "1:deg" sets the unit and changes no value.
         if let Ok(factor) = left.parse::<f64>() {
             if right == Some("") {
-                return Err(refused(text, "a unit after the colon, as 12.5:deg"));
+                return Err(refused(text, "a unit after the colon, such as 12.5:deg"));
             }
             return Self::by(factor, right).map_err(|_| {
                 refused(
@@ -135,7 +135,7 @@ impl FromStr for Scaling {
             return Err(refused(
                 text,
                 &format!(
-                    "two units of one kind, but {} is {} and {} is {}",
+                    "two units of the same kind, but {} is {} and {} is {}",
                     from.0, from.1, to.0, to.1
                 ),
             ));
@@ -167,7 +167,7 @@ impl RecordParts {
                 let name = &self.channels[channel].name;
                 return Err(self.error(
                     STEP,
-                    format!("{name} is in {known} by its file, and declared to be in {unit}"),
+                    format!("{name} is in {known} according to its file, but declared to be in {unit}"),
                     format!("the unit of the file; --scale {name}={known}:{unit} changes it"),
                 ));
             }
@@ -188,7 +188,7 @@ impl RecordParts {
                 return Err(self.error(
                     STEP,
                     format!(
-                        "{} is in {found} by its file, and to be taken from {from}",
+                        "{} is in {found} according to its file, but to be converted from {from}",
                         self.channels[channel].name
                     ),
                     format!("the unit of the file, or a factor such as {}", decimal(scaling.factor)),

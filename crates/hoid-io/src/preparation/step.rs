@@ -28,7 +28,8 @@ pub enum Step {
         /// Time after its last sample, s.
         to_s: f64,
     },
-    /// A column that was logged at instants of its own has values in all rows.
+    /// The values of a column logged at its own instants were extended to all rows, or the rows without one were
+    /// dropped.
     Sparse {
         /// The column.
         channel: String,
@@ -36,9 +37,9 @@ pub enum Step {
         how: &'static str,
         /// Number of its own values.
         own: usize,
-        /// Rows between them that had none; with "drop" they are left out.
+        /// Rows between them without a value; with "drop" these rows are omitted.
         rows: usize,
-        /// Longest time from one own value to the next, where rows lie between them, s.
+        /// Longest time from one own value to the next with rows between them, s.
         longest_s: f64,
         /// Age of a value on average over all rows, if values are held, s.
         mean_age_s: Option<f64>,
@@ -97,7 +98,7 @@ pub enum Step {
         to_hz: f64,
         /// End of the pass band, Hz.
         pass_hz: f64,
-        /// Start of the stop band, Hz; none if the frequency increases.
+        /// Start of the stop band, Hz; `None` if the frequency increases.
         stop_hz: Option<f64>,
         /// Attenuation in the stop band, dB.
         stop_db: f64,
@@ -126,7 +127,7 @@ pub enum Step {
 }
 
 impl Step {
-    /// The step for a removed trend; none if none was removed.
+    /// The step for a removed trend; `None` if none was removed.
     pub(super) fn of_detrend(how: Detrend) -> Option<Self> {
         match how {
             Detrend::None => None,
@@ -177,7 +178,7 @@ impl fmt::Display for Step {
             }
             Self::Mask { what, from_s, to_s } => write!(
                 f,
-                "only {} to {} s taken, between what is {}",
+                "only {} to {} s used, between rows masked as {}",
                 decimal(*from_s),
                 decimal(*to_s),
                 what.join(" or ")
@@ -203,7 +204,7 @@ impl fmt::Display for Step {
                 mean_age_s.iter().try_for_each(|age| {
                     write!(
                         f,
-                        "; a value is {} s old on average, by which the signal is late",
+                        "; a value is {} s old on average, which is the delay of the signal",
                         short(*age)
                     )
                 })
@@ -263,9 +264,9 @@ impl fmt::Display for Step {
                 ..
             } if *input_lead_s > 0.0 => write!(
                 f,
-                "{} Hz, filtered and decimated by {} to {} Hz: a linear-phase filter of {taps} samples on all channels, pass band to \
-                 {} Hz, {stop_db} dB from {} Hz; each sample of the input is in the middle of its hold, {} s later, so that \
-                 the delay is that of the old rate",
+                "{} Hz, filtered and decimated by {} to {} Hz: a linear-phase filter of {taps} samples on all \
+                 channels, pass band to {} Hz, {stop_db} dB from {} Hz; each sample of the input is taken in the \
+                 middle of its hold, {} s later, so that the delay is the same as at the old rate",
                 decimal(*from_hz),
                 decimal(*factor),
                 decimal(*to_hz),
@@ -306,8 +307,8 @@ impl fmt::Display for Step {
             Self::RunIn { seconds, samples } => {
                 write!(f, "run-in of {} s dropped ({samples} samples)", decimal(*seconds))
             }
-            Self::Detrend { how: "mean" } => write!(f, "mean of input and output taken out"),
-            Self::Detrend { .. } => write!(f, "straight line of input and output taken out"),
+            Self::Detrend { how: "mean" } => write!(f, "mean of input and output removed"),
+            Self::Detrend { .. } => write!(f, "linear trend of input and output removed"),
         }
     }
 }

@@ -1,10 +1,9 @@
 //! Alignment of channels that were recorded late, without losing an end of the span.
 //!
-//! A channel that is moved by d samples lacks d rows at one end of the read data. A span of whole
-//! periods would lose its last period with them. If the file extends beyond the span, as much of it
-//! is read as the offsets need, channels are moved, and the span is cut out afterwards: it keeps
-//! its length. Otherwise, or if the rate changes (whose filters cut more than the offsets do), rows
-//! are lost as in any other record.
+//! A channel that is moved by d samples lacks d rows at one end of the read data. A span of whole periods would thereby
+//! lose its last period. If the file extends beyond the span, as much of it is read as the offsets need, channels are
+//! moved, and the span is cut out afterwards: it keeps its length. Otherwise, or if the rate changes (whose filters cut
+//! more than the offsets do), rows are lost as in any other record.
 
 use std::collections::BTreeMap;
 use std::path::Path;

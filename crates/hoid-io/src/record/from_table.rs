@@ -55,7 +55,8 @@ pub(super) fn record_of(
             steps.extend(step);
         }
         (true, None) => table.notes.push(String::from(
-            "there is no column t, so that a row written twice cannot be distinguished from a value that holds: no row is dropped",
+            "there is no column t, so that a row written twice cannot be distinguished from a held value: no row is \
+             dropped",
         )),
         _ => {}
     }

@@ -13,8 +13,7 @@ use crate::time::TimeChoice;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Repair {
     /// Interpolate linearly from an uneven t, also over gaps, to an even grid. The grid starts at
-    /// the first t; its sample time is that of the typical step, or of
-    /// [`ReadOptions::sampling_hz`].
+    /// the first t; its sample time is the typical step, or that of [`ReadOptions::sampling_hz`].
     pub resample: bool,
     /// Interpolate missing values (empty, NaN, NA) linearly between the values before and after.
     pub fill: bool,
@@ -56,11 +55,11 @@ pub struct ReadOptions {
     pub sampling_hz: Option<f64>,
     /// Uses the samples with `from <= t < to`, s. By default all.
     pub span_s: (Option<f64>, Option<f64>),
-    /// Columns that were logged at instants of their own, so that some rows lack their value; `e` and `u` are input and
+    /// Columns that were logged at their own instants, so that some rows lack their value; `e` and `u` are input and
     /// output where no column has that name. By default none.
     pub sparse: BTreeMap<String, Sparse>,
-    /// Columns to keep in addition to input, output and time, by their names; by default all. Of a CSV file the others are not
-    /// held in memory.
+    /// Columns to keep in addition to input, output and time, by their names; by default all. The other columns of a
+    /// CSV file are not kept in memory.
     pub columns: Option<Vec<String>>,
     /// Permitted repairs.
     pub repair: Repair,
@@ -83,7 +82,7 @@ impl Default for ReadOptions {
 }
 
 impl ReadOptions {
-    /// True if a column is to be read; the time is another matter.
+    /// True if a column is to be read; the time is treated separately.
     pub(crate) fn wants(&self, name: &str) -> bool {
         let is_term = |signal: &ColumnExpression| signal.terms().contains(&name);
         self.columns.as_ref().is_none_or(|kept| {
@@ -137,7 +136,7 @@ impl FromStr for TrialChoice {
         if column.is_empty() || value.as_ref().is_some_and(String::is_empty) {
             return Err(IoError::Expression {
                 found: text.to_owned(),
-                expected: String::from("expected the column that counts the trials, or one of them as trial=3"),
+                expected: String::from("expected the column that numbers the trials, or one of them, such as trial=3"),
             });
         }
         Ok(Self {

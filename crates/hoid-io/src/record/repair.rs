@@ -1,8 +1,8 @@
 //! Repairs of damaged records, applied only on request: duplicated rows are dropped, missing values
 //! are interpolated linearly, and samples with an uneven t are interpolated to an even grid.
 //!
-//! Interpolated data are invented. Over a gap of one or two samples that does little harm; a long
-//! straight line looks to every estimator like the behaviour of the operator.
+//! Interpolated data are invented. Over a gap of one or two samples this does little harm; a long straight line looks
+//! to every estimator like the behaviour of the operator.
 
 use std::ops::Range;
 
@@ -10,7 +10,7 @@ use crate::preparation::Step;
 use crate::table::{Table, kept};
 use crate::time::sampling::pairs;
 
-/// Part of a step within which a time on the grid is that of a row: the rounding of times.
+/// Fraction of a step within which a time on the grid counts as that of a row: the rounding of times.
 const ROUNDING: f64 = 1e-6;
 
 /// Reason why missing values could not be interpolated: there is no value on one side.

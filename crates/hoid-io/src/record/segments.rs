@@ -1,10 +1,10 @@
 //! Records between faults of the recording: a file is cut where samples are missing, constant or
 //! clipped, and each segment is a record.
 //!
-//! No data are invented, and each segment has its own initial states in a fit. But the recorded
-//! data determine what is excluded: without the samples at saturation the largest responses are
-//! missing, which biases the rest (the lead of C1 clipped at 1.5 standard deviations by 9 %; for
-//! the clipped record itself the gain is 12 % too small).
+//! No data are invented, and each segment has its own initial states in a fit. But the excluded samples depend on the
+//! recorded data: without the samples at saturation the largest responses are missing, which biases the estimate from
+//! the rest (the lead of C1 clipped at 1.5 standard deviations by 9 %; for the clipped record itself the gain is 12 %
+//! too small).
 
 use std::ops::Range;
 use std::path::Path;
@@ -27,8 +27,8 @@ use crate::wording::{decimal, list};
 /// In a file with several trials, each is read in this way, one after the other.
 ///
 /// # Errors
-/// As [`read_prepared`]; [`IoError::Preparation`] for kinds that are not places (a clock, a
-/// constant), for a run-in, and if no segment is left.
+/// As [`read_prepared`]; [`IoError::Preparation`] for kinds without a location (a clock, a constant), for a run-in, and
+/// if no segment is left.
 pub fn read_segments(
     path: &Path,
     options: &ReadOptions,
@@ -55,7 +55,7 @@ pub fn read_segments(
             if all.is_empty() {
                 let count = trials.len();
                 read.notes.push(format!(
-                    "{count} trials by {by} ({}): each is a record of its own",
+                    "{count} trials by {by} ({}): each is a separate record",
                     list_of(&trials)
                 ));
             } else {
@@ -119,7 +119,7 @@ fn read_trial(
     let mut segments = Vec::new();
     for segment in between(&quality_issues, mask, rows.clone()) {
         let (from, last) = (at(segment.start), at(segment.end.saturating_sub(1)));
-        // NaN is not long enough either.
+        // NaN also counts as too short.
         let is_long = last - from >= shortest_s;
         if !is_long {
             continue;

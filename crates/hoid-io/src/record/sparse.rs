@@ -1,4 +1,5 @@
-//! Columns that were logged at instants of their own: topics at several rates in one table, as an outer join makes it.
+//! Columns that were logged at their own instants: topics with several rates in one table, as produced by an outer
+//! join.
 //!
 //! Let the own values of a column be `x_i` at the times `t_i`, and t a row between `t_i` and `t_{i+1}`:
 //!
@@ -8,10 +9,9 @@
 //! | [`Sparse::Linear`] | `x_i + (x_{i+1} - x_i) (t - t_i)/(t_{i+1} - t_i)`, for a signal that is smooth between the samples |
 //! | [`Sparse::Drop`] | none: the row is left out |
 //!
-//! A value that is held is late by half the time from one to the next on average. Rows before the first and after the
-//! last own value are cut. All values are made before rows are cut and before the span is, so that a row at the start
-//! of a span takes what was logged before it. Text and infinite numbers are no missing values: they stay, and reading
-//! refuses them.
+//! A held value is late by half the time between values on average. Rows before the first and after the last own value
+//! are cut. All values are computed before rows and the span are cut, so that a row at the start of a span takes the
+//! value logged before it. Text and infinite numbers are not missing values: they remain, and reading refuses them.
 
 use std::ops::Range;
 
@@ -23,11 +23,11 @@ use crate::wording::{list, named};
 
 const STEP: &str = "sparse";
 
-/// The table without gaps in the columns named as sparse, and the steps on this way.
+/// The table without gaps in the columns named as sparse, and the steps applied.
 ///
 /// # Errors
-/// [`IoError::Preparation`] for a column that is not there, is the time, is named twice or is empty throughout, and if
-/// no row is left; [`IoError::NoSuchColumn`].
+/// [`IoError::Preparation`] for a column that does not exist, is the time, is named twice or is empty throughout, and
+/// if no row is left; [`IoError::NoSuchColumn`].
 pub(super) fn without_gaps<'a>(mut table: Table<'a>, options: &ReadOptions) -> Result<(Table<'a>, Vec<Step>), IoError> {
     if options.sparse.is_empty() {
         return Ok((table, Vec::new()));
@@ -152,9 +152,9 @@ fn at(values: &[f64], row: usize) -> f64 {
     values.get(row).copied().unwrap_or(f64::NAN)
 }
 
-/// Where a column has values.
+/// The rows in which a column has values.
 struct Gaps {
-    /// From the first to after the last row with a value; none if there is none.
+    /// From the first to after the last row with a value; `None` if there is none.
     own: Option<Range<usize>>,
     /// Rows without one.
     missing: Vec<usize>,
@@ -213,7 +213,7 @@ impl Gaps {
             for (value, x) in (values.iter_mut().zip(x)).take(run.end).skip(run.start) {
                 let share = (x - from) / (to - from);
                 *value = match how {
-                    // Times that stand have no line between them.
+                    // There is no line between two equal times.
                     Sparse::Linear if share.is_finite() => a * (1.0 - share) + b * share,
                     _ => a,
                 };

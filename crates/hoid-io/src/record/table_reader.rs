@@ -50,7 +50,8 @@ impl TableReader<'_> {
             let columns = self.signals.iter().filter_map(|column| self.table.columns.get(*column));
             let names: Vec<String> = columns.map(|column| named(&column.name)).collect();
             self.table.notes.push(format!(
-                "{before} rows at the start and {behind} at the end are left out: {} have not all a value there to bridge to",
+                "{before} rows at the start and {behind} at the end are left out: not all of {} have a value there to \
+                 bridge to",
                 names.join(" and ")
             ));
         }
@@ -86,8 +87,8 @@ impl TableReader<'_> {
         value.is_finite().then_some(value)
     }
 
-    /// The times of the signal with the most samples, if there are fewer than rows: each of two topics in one table has
-    /// its own clock.
+    /// The times of the signal with the most samples, if it has fewer samples than there are rows: each of two topics
+    /// in one table has its own clock.
     pub(super) fn own_times(&self, rows: &Range<usize>, time: usize, t: &[f64]) -> Option<Vec<f64>> {
         // As a signal the time has a sample in each row. Its values were taken from the table.
         if self.signals.contains(&time) {
@@ -135,7 +136,8 @@ impl TableReader<'_> {
         })?;
         if bridged.values > 0 && lacks && self.signals.contains(&column) {
             self.table.notes.push(format!(
-                "column {} lacks values at many places, as if logged at instants of its own: --fill draws straight lines, {} holds the last value",
+                "column {} lacks values at many places, as if logged at its own instants: --fill draws straight lines, \
+                 {} holds the last value",
                 named(&source.name),
                 sparse_option(&source.name)
             ));

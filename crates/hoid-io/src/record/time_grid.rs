@@ -57,7 +57,7 @@ impl TableReader<'_> {
         match (t, first) {
             (None, _) if self.options.repair.resample => {
                 self.table.notes.push(String::from(
-                    "there is no column t to resample along: the samples count as even",
+                    "there is no column t to resample along: the samples are taken as even",
                 ));
             }
             (Some(t), Some(first)) if first.is_finite() => {
@@ -66,7 +66,7 @@ impl TableReader<'_> {
                 // More than one percent is more than a clock error.
                 if (stated - ts).abs() > 0.01 * ts {
                     self.table.notes.push(format!(
-                        "the given sampling frequency of {} Hz counts; t gives {:.6} Hz on average",
+                        "the given sampling frequency of {} Hz is used; t gives {:.6} Hz on average",
                         1.0 / ts,
                         1.0 / stated
                     ));
@@ -75,7 +75,7 @@ impl TableReader<'_> {
             (Some(_), _) => {
                 let place = self.table.source.place(0);
                 self.table.notes.push(format!(
-                    "t is not a number on {place}: the time of the first sample is taken as 0 s"
+                    "t is not a number in {place}: the time of the first sample is taken as 0 s"
                 ));
             }
             _ => {}

@@ -158,8 +158,8 @@ struct NoiseObject {
 }
 
 impl FitObject {
-    /// The response to the only target. Its delay `tau_f` counts from the present target, and is negative where the future is
-    /// shown; that of [`Feedforward`] counts from the end of the preview.
+    /// The response to the only target. Its delay `tau_f` is relative to the present target, and is negative if the
+    /// future target is displayed; that of [`Feedforward`] is relative to the end of the preview.
     fn feedforward(&self) -> Option<Feedforward> {
         let mut seen = self.channels.iter().filter(|channel| channel.role == "feedforward");
         let channel = seen.next().filter(|_| seen.next().is_none())?;
@@ -171,7 +171,7 @@ impl FitObject {
         };
         let tau_f_s = value("tau_f")?;
         let preview_s = channel.preview.unwrap_or(0.0).max(-tau_f_s);
-        // Without the products of others.
+        // Without parameters that are products of others.
         let is_own = |name: &&str| !(*name == "K_e_dot" || *name == "K" && form.has_lag());
         let names = form.parameters(self.neuromuscular?).into_iter().filter(is_own);
         let pairs: Option<Vec<(String, f64)>> = names
@@ -191,7 +191,7 @@ impl FitObject {
     fn operator(self, source: &str) -> Result<FittedOperator, String> {
         let Some(form) = self.form else {
             return Err(format!(
-                "it is a fit of the structure {}, which has no form of an operator",
+                "it is a fit of the structure {}, which has no operator form",
                 self.structure.as_deref().unwrap_or("?")
             ));
         };
@@ -207,7 +207,7 @@ impl FitObject {
         let names: Vec<&str> = form.coordinates(neuromuscular).iter().map(|c| c.name()).collect();
         if covariance.coordinates != names {
             return Err(format!(
-                "its covariance is of {}, expected {} for the form {form}",
+                "its covariance has the coordinates {}, expected {} for the form {form}",
                 covariance.coordinates.join(", "),
                 names.join(", ")
             ));
@@ -309,7 +309,7 @@ mod tests {
             (
                 r#""gain", "ln omega_nm""#,
                 r#""ln omega_nm", "gain""#,
-                "covariance is of",
+                "covariance has the coordinates",
             ),
             (r#""sample_time": 0.01, "#, "", "sample_time"),
             ("[0.01, 0, 0, 0]", "[0.01, 0, 0]", "expected 16"),

@@ -7,9 +7,9 @@
 //! | text | quoted where that is needed | BYTE_ARRAY in UTF-8 |
 //! | comments | lines above the header, behind `# ` | lines under the key `hoid.comments` |
 //!
-//! Parquet reproduces the written data. CSV stores no types: a column is of integers if each cell is one, of reals if
-//! each cell is a number or empty, otherwise of text. Data written by hoid are reproduced except for a column of text
-//! that looks like numbers, and one without rows.
+//! Parquet reproduces the written data. CSV stores no types: a column contains integers if each cell is an integer,
+//! reals if each cell is a number or empty, otherwise text. Data written by hoid are reproduced except for a column of
+//! text that looks like numbers, and one without rows.
 
 use std::ops::Range;
 

@@ -46,8 +46,8 @@ pub fn write_table(path: &Path, table: &OutputTable) -> Result<(), IoError> {
 }
 
 /// Reads a table, with the kinds with which it was written; see the table of this module for those
-/// of CSV. A column of integers in a Parquet file of other origin is of integers if no value is
-/// missing or negative, otherwise real.
+/// of CSV. A column of integers in a Parquet file of other origin is read as integers if no value is missing or
+/// negative, otherwise as reals.
 ///
 /// # Errors
 /// [`IoError`], naming the place in the file.

@@ -156,7 +156,7 @@ impl TableWriter {
         Ok(())
     }
 
-    /// Completes the file and moves it to its place.
+    /// Completes the file and moves it to its final path.
     ///
     /// # Errors
     /// [`IoError::Unwritable`] for errors that the operating system reports.
@@ -184,7 +184,7 @@ impl TableWriter {
 fn broken(name: &str) -> IoError {
     IoError::Unwritable {
         file: name.to_owned(),
-        source: io::Error::other("writing it failed before"),
+        source: io::Error::other("writing it failed earlier"),
     }
 }
 

@@ -66,7 +66,9 @@ impl Source<'_> {
             );
         }
         if scenario.schedule != Schedule::Constant && scenario.initial == scenario.last {
-            return Err(self.keys("[schedule] is given, but both states are the same: add [last] with what changes"));
+            return Err(
+                self.keys("[schedule] is given, but both states are the same: add [last] with the values that change")
+            );
         }
         self.remnant(&mut scenario, file.remnant)?;
         if let Some(tables) = file.forcing {

@@ -3,7 +3,7 @@
 use hoid_model::ModelError;
 use thiserror::Error;
 
-/// Reason why a file gives no scenario.
+/// Reason why a file is not a valid scenario.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ScenarioFileError {
@@ -15,7 +15,7 @@ pub enum ScenarioFileError {
         /// Error reported by the operating system.
         reason: String,
     },
-    /// Invalid TOML, or keys and types that do not belong to a scenario.
+    /// Invalid TOML, or keys and types that a scenario does not have.
     #[error("scenario file {path}, line {line}: {reason}")]
     Syntax {
         /// The file.

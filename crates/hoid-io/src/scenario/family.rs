@@ -33,7 +33,7 @@ impl Source<'_> {
             (Some(ts), None) => SampleTime::new(ts).map_err(|error| self.model(error))?,
             (None, Some(rate)) => SampleTime::new(1.0 / rate).map_err(|error| self.model(error))?,
             (Some(_), Some(_)) => {
-                return Err(self.keys("sample_time_s and sampling_rate_hz state the same: give one of them"));
+                return Err(self.keys("sample_time_s and sampling_rate_hz specify the same quantity: give one of them"));
             }
         };
         let initial = self.family_state(form, file.neuromuscular, "initial", &file.initial)?;
@@ -58,7 +58,9 @@ impl Source<'_> {
                     self.keys("[last] is given, but nothing changes: add [schedule] with rate_per_s and midpoint_s")
                 );
             }
-            (None, _) => return Err(self.keys("[schedule] is given, but no [last]: add it with what changes")),
+            (None, _) => {
+                return Err(self.keys("[schedule] is given, but no [last]: add it with the values that change"));
+            }
             (Some(last), _) => {
                 let last = last.over(&file.initial);
                 scenario.last = self.family_state(form, file.neuromuscular, "last", &last)?;
@@ -69,7 +71,7 @@ impl Source<'_> {
         }
         if let Some(table) = file.feedforward {
             if scenario.target.function.sinusoids().is_empty() {
-                return Err(self.keys("[feedforward] is given, but no [target] that is seen"));
+                return Err(self.keys("[feedforward] is given, but no [target] that is displayed"));
             }
             scenario.feedforward = Some(self.feedforward(table, &scenario)?);
         }
@@ -171,7 +173,7 @@ impl Source<'_> {
             .find(|(key, value)| value.is_some() && !used.contains(key))
         {
             return Err(self.keys(&format!(
-                "[{table}] has {}, which the form {form} has not, or which reports what another key states; it takes {}",
+                "[{table}] has {}, which the form {form} does not have, or which repeats another key; it takes {}",
                 key.0,
                 used.join(", ")
             )));
@@ -200,7 +202,8 @@ impl Source<'_> {
         let delay_s = if delay_s.abs() < 1e-12 { 0.0 } else { delay_s };
         if delay_s < 0.0 {
             return Err(self.keys(&format!(
-                "feedforward.tau_f_s is {}, expected no less than {}: a response to what is not shown is impossible",
+                "feedforward.tau_f_s is {}, expected at least {}: a person cannot respond to a target before it is \
+                 displayed",
                 given.tau_f_s, -preview_s
             )));
         }
@@ -222,7 +225,7 @@ impl Source<'_> {
         })
     }
 
-    /// Parses `90/(s(s+6))`, or `90/1,6,0` by falling powers of s.
+    /// Parses `90/(s(s+6))`, or `90/1,6,0` by descending powers of s.
     fn element(&self, key: &str, given: &Spanned<String>) -> Result<ContinuousTransferFunction, ScenarioFileError> {
         let at = given.span().start;
         let element: ContinuousTransferFunction = given.get_ref().parse().map_err(|error| match error {
@@ -266,7 +269,7 @@ impl Source<'_> {
         let of_primes = given.interleaved.is_some() || given.largest_multiple.is_some();
         if given.period_s.is_some() || of_primes || given.rms.is_some() {
             return Err(self.keys(&format!(
-                "[{name}] has lines of its own and keys of a multi-sine: give one of both"
+                "[{name}] has its own lines and keys of a multi-sine: give only one of them"
             )));
         }
         if lines.len() > MOST_LINES {
@@ -327,7 +330,7 @@ impl Source<'_> {
                 last: given.gain_last.unwrap_or(initial),
             },
             _ => {
-                return refuse("give share (of the variance of u) or gain, and gain_last next to gain only".to_owned());
+                return refuse("give share (of the variance of u) or gain, and gain_last only with gain".to_owned());
             }
         };
         let mut used = Vec::new();

@@ -64,12 +64,12 @@ pub(super) struct FamilyStateTable {
     pub(super) omega_nm_rad_s: Option<f64>,
     pub(super) zeta_nm: Option<f64>,
     pub(super) tau_e_s: Option<f64>,
-    /// In s, as `90/(s(s+6))`, or `NUM/DEN` by falling powers of s, as `90/1,6,0`.
+    /// In s, such as `90/(s(s+6))`, or `NUM/DEN` by descending powers of s, such as `90/1,6,0`.
     #[schemars(with = "Option<String>")]
     pub(super) controlled_element: Option<Spanned<String>>,
 }
 
-/// The neuromuscular system is that of the operator.
+/// It has the neuromuscular system of the operator.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct FeedforwardTable {
@@ -86,15 +86,15 @@ pub(super) struct FeedforwardTable {
     pub(super) t_l_s: Option<f64>,
     #[serde(rename = "T_I_s")]
     pub(super) t_i_s: Option<f64>,
-    /// Delay to what happens now; not below `-preview_s`.
+    /// Delay relative to the present target; not below `-preview_s`.
     #[serde(default)]
     pub(super) tau_f_s: f64,
-    /// How much of the future of the target is shown. Default: nothing.
+    /// Length of the future target that is displayed. Default: zero.
     #[schemars(with = "Option<f64>")]
     pub(super) preview_s: Option<Number>,
 }
 
-/// A multi-sine at primes, or lines of one's own.
+/// A multi-sine at primes, or given lines.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ExcitationTable {
@@ -102,10 +102,11 @@ pub(super) struct ExcitationTable {
     pub(super) largest_multiple: Option<u32>,
     pub(super) rms: Option<f64>,
     pub(super) lines: Option<Vec<LineTable>>,
-    /// Which of the primes: `all`, or every other one, `even` or `odd`, so that target and disturbance do not meet.
+    /// Selected primes: `all`, or every other prime, `even` or `odd`, so that target and disturbance have no common
+    /// lines.
     #[schemars(with = "Option<String>")]
     pub(super) interleaved: Option<Spanned<String>>,
-    /// Whether each run draws its phases. Default: true without lines.
+    /// Whether new phases are drawn for each run. Default: true without lines.
     pub(super) random_phases: Option<bool>,
 }
 

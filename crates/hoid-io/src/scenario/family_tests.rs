@@ -101,7 +101,7 @@ fn what_does_not_fit_is_refused_with_its_remedy() {
         (with("form", "sample_time_s = 0\nform"), "line 1: sample_time_s is 0"),
         (
             with("form", "sample_time_s = 0.01\nsampling_rate_hz = 100\nform"),
-            "state the same",
+            "specify the same quantity",
         ),
         (more("K_e = 1"), "unknown field `K_e`"),
         (more("[last]\nT_L_s = 0.5"), "add [schedule]"),
@@ -120,7 +120,7 @@ fn what_does_not_fit_is_refused_with_its_remedy() {
             "lacks off_s",
         ),
         (more("[[remnant]]\nshape = \"white\"\nshare = 1.1"), "below one"),
-        (more("[disturbance]\nrms = 1\nlines = []"), "give one of both"),
+        (more("[disturbance]\nrms = 1\nlines = []"), "give only one of them"),
     ] {
         let message = parse(&text).unwrap_err().to_string();
         assert!(
@@ -153,7 +153,7 @@ fn a_target_that_is_seen_is_read() {
     let lines = |excitation: &hoid_model::family_scenario::Excitation| excitation.function.sinusoids().len();
     assert_eq!((lines(&scenario.target), lines(&scenario.disturbance)), (5, 6));
     for (from, to, expected) in [
-        ("tau_f_s = -0.05", "tau_f_s = -0.3", "not shown"),
+        ("tau_f_s = -0.05", "tau_f_s = -0.3", "before it is displayed"),
         ("form = \"derivative\"", "form = \"bent\"", "form of the operator"),
         ("K_d_s = 0.7", "K = 0.7", "K_d_s"),
         ("interleaved = \"even\"", "interleaved = \"some\"", "even"),

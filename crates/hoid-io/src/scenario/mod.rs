@@ -1,8 +1,7 @@
 //! Scenarios in TOML.
 //!
-//! A file starts from a condition C1-C6 and changes the given keys, or describes everything itself.
-//! Units are part of the keys, times count from the start of the measurement, an unknown key is an
-//! error.
+//! A file starts from a condition C1-C6 and changes the given keys, or describes everything itself. Units are part of
+//! the keys, times are relative to the start of the measurement, and an unknown key is an error.
 //!
 //! ```toml
 //! condition = "C4"          # without it, tau_e_s and all keys of [initial] are required
@@ -32,8 +31,8 @@
 //! A file with the key `form` describes an operator of the family with any controlled element
 //! ([`AnyScenario`]); its keys are in `family_keys`.
 //!
-//! Missing keys have the values of the condition; without one, the parameters of `[last]` are those of `[initial]`, and
-//! all others are as in C1.
+//! Missing keys have the values of the condition; without a condition, the parameters of `[last]` are those of
+//! `[initial]`, and all others are as in C1.
 //!
 //! | module | contents |
 //! |---|---|

@@ -28,7 +28,7 @@ pub struct SamplingSurvey {
     pub repeated: usize,
 }
 
-/// The sampling given by a time; none if it has fewer than two finite values.
+/// The sampling given by a time; `None` if it has fewer than two finite values.
 pub(super) fn sampling(time: &RawColumn, columns: &[RawColumn]) -> Option<SamplingSurvey> {
     let t: Vec<f64> = time
         .values

@@ -31,7 +31,7 @@ pub struct ValueSurvey {
     pub sketch: String,
 }
 
-/// Statistics of a column; none if no value is finite.
+/// Statistics of a column; `None` if no value is finite.
 pub(super) fn values(all: &[f64]) -> Option<ValueSurvey> {
     let finite: Vec<f64> = all.iter().copied().filter(|value| value.is_finite()).collect();
     let (min, max) = finite.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), v| {

@@ -1,8 +1,8 @@
 //! Selection of input and output: `NAME`, `-NAME` or `NAME-NAME`.
 //!
-//! Laboratories often record the target r and the output y of the controlled element and not the
-//! tracking error `e = r - y`, or use the opposite sign of the control. A column whose name is the
-//! whole text takes precedence, so that a name may contain a hyphen.
+//! Laboratories often record the target r and the output y of the controlled element instead of the tracking error
+//! `e = r - y`, or use the opposite sign of the control. A column whose name is the whole text takes precedence, so
+//! that a name may contain a hyphen.
 
 use std::fmt;
 use std::str::FromStr;
@@ -58,7 +58,7 @@ impl ColumnExpression {
         terms
     }
 
-    /// What is on both sides of each hyphen.
+    /// The texts on both sides of each hyphen.
     fn splits(&self) -> impl Iterator<Item = (&str, &str)> {
         let hyphens = self.text.match_indices('-');
         hyphens.filter_map(|(at, hyphen)| {

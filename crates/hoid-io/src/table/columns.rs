@@ -13,8 +13,8 @@ use super::precision::Precision;
 use crate::IoError;
 use crate::wording::{named, shown};
 
-/// Number of separate places and share of the rows from which missing values are those of a sparse column. A dropout
-/// is one place.
+/// Number of separate gaps and share of the rows from which on missing values are those of a sparse column. A dropout
+/// is one gap.
 const SPARSE: (usize, f64) = (5, 0.05);
 
 /// One column.
@@ -30,7 +30,7 @@ pub(crate) struct Column {
     pub(crate) texts: Vec<usize>,
     /// True if the values are clock times, in s from the first.
     pub(crate) moments: bool,
-    /// Rows whose value is not the column's own but follows from its others (`--sparse`), in increasing order.
+    /// Rows whose value was not recorded but follows from the column's other values (`--sparse`), in increasing order.
     pub(crate) made: Vec<usize>,
     /// True if these values are held, so that the signal is constant between the rows as well.
     pub(crate) is_held: bool,
@@ -44,7 +44,7 @@ impl Column {
         self.values.get(row).is_none_or(|value| value.is_nan()) && self.texts.binary_search(&row).is_err()
     }
 
-    /// True if missing values are at many places: what a topic of another rate leaves, and no dropout.
+    /// True if values are missing in many places, as for a topic with another rate, and not in a dropout.
     pub(crate) fn is_sparse(&self, rows: Range<usize>) -> bool {
         let missing = |row: &usize| self.is_missing(*row);
         let follows = |row: &usize| {
@@ -110,8 +110,7 @@ impl Table<'_> {
         self.columns.iter().all(has_none)
     }
 
-    /// Returns the reason why the value at `row` of a column, which is not finite, cannot be used.
-    /// `rows` are the rows in use.
+    /// Returns the reason why the non-finite value at `row` of a column cannot be used. `rows` are the rows in use.
     pub(crate) fn bad_value(&self, at: usize, row: usize, rows: Range<usize>) -> IoError {
         let unknown = Column::default();
         let column = self.columns.get(at).unwrap_or(&unknown);
@@ -130,7 +129,8 @@ impl Table<'_> {
             } else if row == 0 && self.rows > 1 && self.has_no_number_in(row) {
                 UNITS_ROW
             } else if is_last_cell && self.source.is_open(row) {
-                "the file is cut there, in the middle of its last line: copy or record it again, or remove that line"
+                "the file is truncated there, in the middle of its last line: copy or record it again, or remove that \
+                 line"
             } else {
                 "correct the cell, empty it and bridge it with --fill, or choose another column"
             };
@@ -176,7 +176,7 @@ impl Table<'_> {
 
 /// The remedy for a first row without numbers.
 pub(crate) const UNITS_ROW: &str =
-    "no column has a number there: where that line names the units, remove it and report them with --unit e=deg,u=deg";
+    "no column has a number there: if that line names the units, remove it and give them with --unit e=deg,u=deg";
 
 /// Checks that the names are unique, and notes the columns without one.
 pub(crate) fn check_names(names: &[String], file: &str, notes: &mut Vec<String>) -> Result<(), IoError> {

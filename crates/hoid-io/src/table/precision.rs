@@ -21,10 +21,10 @@ impl Precision {
         }
     }
 
-    /// Precision of times in a file of binary numbers. If a recorder rounds its values, as to tenths of a ms, all times
-    /// are multiples of its last digit, by which the rounding is recognised. The remainder of a rounded number is below
-    /// two units of its last binary digit; with the number of digits searched for here no such remainder occurs by
-    /// chance.
+    /// Precision of times in a file of binary numbers. If a recorder rounds its values, for example to tenths of a ms,
+    /// all times are multiples of its last digit, by which the rounding is recognised. The remainder of a rounded
+    /// number is below two units of its last binary digit; with the number of digits searched for here no such
+    /// remainder occurs by chance.
     pub(crate) fn of_times(values: &[f64], single: bool) -> Self {
         if single {
             return Self::single();
@@ -85,7 +85,7 @@ impl Precision {
         }
     }
 
-    /// The size below which the unit is that of fixed decimals, and that unit.
+    /// The size below which the unit is that of fixed decimals, and this unit.
     pub(crate) fn fixed_unit(self) -> (f64, f64) {
         match self.decimals {
             None => (f64::INFINITY, 0.0),

@@ -1,4 +1,4 @@
-//! The columns of a table that are kept, where not all are.
+//! The columns of a table that are kept, if not all are.
 
 use super::columns::{Source, Table};
 use crate::IoError;
@@ -54,10 +54,10 @@ pub(crate) fn selected<'a>(table: Table<'a>, keep: impl Fn(usize, &str) -> bool)
     }
 }
 
-/// Checks that the columns asked for are among these.
+/// Checks that the requested columns are among these.
 ///
 /// # Errors
-/// [`IoError::NoSuchColumn`] for one that is not, be it of the input, the output or in addition.
+/// [`IoError::NoSuchColumn`] for a column that is not: of the input, the output or an additional one.
 pub(crate) fn check_selected(names: &[&str], options: &ReadOptions, file: &str) -> Result<(), IoError> {
     let Some(kept) = &options.columns else { return Ok(()) };
     for signal in options.input.iter().chain([&options.output]) {

@@ -34,7 +34,7 @@ pub(crate) enum Uneven {
     },
 }
 
-/// A sample time, and a note if it was not simply read.
+/// A sample time, and a note if it was not simply read from the file.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sampling {
     pub(crate) sample_time_s: f64,
@@ -99,7 +99,7 @@ pub(crate) fn even(t: &[f64], precision: Precision, stated_s: Option<f64>) -> Re
                 note: None,
             });
         }
-        let note = format!("the stated sample time {stated} s contradicts t, which gives {mean_s} s; t counts");
+        let note = format!("the stated sample time {stated} s contradicts t, which gives {mean_s} s; t is used");
         return Ok(Sampling {
             sample_time_s: mean_s,
             note: Some(note),

@@ -1,4 +1,4 @@
-//! The time column under the name and in the unit of a recorder.
+//! The time column, with the name and in the unit that a recorder uses.
 //!
 //! The time is the column t, in s. If there is no such column, the first of these is used:
 //! 1. the only one whose name denotes a time, with or without a unit: `Time (s)`, `Zeit [s]`,
@@ -10,8 +10,8 @@
 //!    number.
 //!
 //! `--time COLUMN[:unit]` takes precedence. The unit is that of the name; otherwise it follows from the size of numbers
-//! that count from 1970 (1e11 s would be the year 5138); otherwise from the steps: integers at least 5 apart are not s
-//! but the unit of which 2 to 2000 steps make a second. The choice is reported.
+//! that count from 1970 (1e11 s would be the year 5138); otherwise from the steps: integers at least 5 apart are not s,
+//! but in the unit in which a second has 2 to 2000 steps. The choice is reported.
 
 use super::sampling::{pairs, steps};
 use super::time_choice::{TimeChoice, Unit};
@@ -142,7 +142,7 @@ fn chosen(table: &Table<'_>, choice: &TimeChoice) -> Result<(usize, Option<Unit>
     })
 }
 
-/// The only column that is meant; none if there are several.
+/// The only column that is meant; `None` if there are several.
 fn only(table: &Table<'_>, is_meant: impl Fn(usize, &Column) -> bool) -> Option<usize> {
     let all = table.columns.iter().enumerate();
     let mut meant = all.filter(|(at, column)| is_meant(*at, column)).map(|(at, _)| at);
@@ -177,7 +177,7 @@ fn found(table: &Table<'_>) -> Option<(usize, Option<Unit>)> {
         .or_else(|| first_line(table).map(|at| (at, None)))
 }
 
-/// The column of nanoseconds that belongs to one of whole seconds.
+/// The column of nanoseconds that accompanies one of whole seconds.
 fn nanoseconds_of(table: &Table<'_>, at: usize) -> Option<usize> {
     let split = |name: &str| -> Option<(String, Option<Unit>)> {
         let lower = name.to_lowercase();

@@ -178,7 +178,7 @@ impl Shared {
         }
         if counted.len() > 16 || counted.values().any(|v| !v.is_finite()) {
             return Err(LabError::Message(
-                "what the page counted is not a few numbers".to_owned(),
+                "the counts of the page are not a few numbers".to_owned(),
             ));
         }
         self.end_run(state, How::Finished, counted)?;
@@ -236,7 +236,7 @@ impl Shared {
         Ok(Some(checked.measures))
     }
 
-    /// Creates the pages about the session, on a thread of its own.
+    /// Creates the pages about the session, on a separate thread.
     pub(super) fn report(self: &Arc<Self>, state: &mut Current) {
         let (Some(program), Some(session)) = (&self.program, &state.session) else {
             return;
@@ -269,7 +269,7 @@ fn not_taken(error: LabError) -> LabError {
         _ => return error,
     };
     LabError::Order(format!(
-        "{what}. The run was ended and does not count; make room on the disk and start it again"
+        "{what}. The run was ended and does not count; free space on the disk and start it again"
     ))
 }
 

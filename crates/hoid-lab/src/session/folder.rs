@@ -19,7 +19,7 @@ pub(super) fn check_subject(subject: &str) -> Result<(), LabError> {
         return Ok(());
     }
     Err(LabError::Order(format!(
-        "the pseudonym is {:?}, expected 1 to 20 letters and digits, as P01",
+        "the pseudonym is {:?}, expected 1 to 20 letters and digits, such as P01",
         hoid_io::printable(subject)
     )))
 }

@@ -248,7 +248,7 @@ mod tests {
         assert!(log.append(&batch(10)).unwrap_err().to_string().contains("frames.csv"));
         assert_eq!(log.ticks(), 10);
         assert_eq!(std::fs::read(stem.file("ticks.csv")).unwrap(), before);
-        // Once there is space it continues at the same place.
+        // Once there is space it continues at the same position.
         log.files[2].1 = frames;
         log.append(&batch(10)).unwrap();
         assert_eq!(log.ticks(), 20);

@@ -292,7 +292,7 @@ impl Session {
             how: How::Interrupted,
             utc: utc::now(),
             verdict: "unverified".to_owned(),
-            reasons: "run.json is cut or not as hoid lab wrote it".to_owned(),
+            reasons: "run.json is truncated or not as hoid lab wrote it".to_owned(),
             notes: String::new(),
             rms_e: 0.0,
             score: 0.0,

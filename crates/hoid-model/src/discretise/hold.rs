@@ -41,7 +41,7 @@ pub(super) fn hold(
     for i in 0..n {
         difference[(i, i)] -= 1.0;
     }
-    // The triangle hold feeds u(k) and u(k + 1) into the state; x - Gamma_2 u needs u(k) alone.
+    // The triangle hold feeds u(k) and u(k + 1) into the state; x - Gamma_2 u needs only u(k).
     let drive = if triangle {
         &over_sample.constant + &difference * &over_sample.slope
     } else {
@@ -75,8 +75,8 @@ pub(super) fn hold(
         num[i + 1] += b;
     }
     if fraction != 0.0 {
-        // What is read within the sample was driven by the input at its start; `ahead` belongs to
-        // the input at its end.
+        // The output read within the sample depends on the input at the start of the sample; `ahead` is the coefficient
+        // of the input at its end.
         num.insert(0, 0.0);
         for (n, d) in num.iter_mut().zip(&den) {
             *n += ahead * d;

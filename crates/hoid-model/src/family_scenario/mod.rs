@@ -3,8 +3,8 @@
 //!
 //! `e = f - y`, `u = Y e + F f + n`, `y = P (u + d)`: a target f, which the person may see (F, [`Feedforward`]), and a
 //! disturbance d at the input of the controlled element P. Changes follow the sigmoid of eq. 5 as in
-//! [`Scenario`](crate::scenario::Scenario), which is the task of the thesis and remains separate: its operator is the
-//! lead, its element `K_c/(s(s + omega_b))`.
+//! [`Scenario`](crate::scenario::Scenario), which is the task of the thesis and remains separate: its operator has the
+//! form of the lead, and its element is `K_c/(s(s + omega_b))`.
 //!
 //! | file | contents |
 //! |---|---|

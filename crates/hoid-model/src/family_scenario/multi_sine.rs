@@ -1,11 +1,11 @@
 //! Sums of sines at prime multiples of one frequency, as in tasks with people.
 //!
 //! `d(t) = sum over primes p of A_p sin(2 pi p t/T + phi_p)`, `A_p` proportional to `1/p`: no line
-//! is a harmonic of another, so that what a person makes of one line does not fall on another, and
-//! the power lies where people follow (D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in
-//! Electronics 8 (1967) 231-249; M. M. van Paassen and M. Mulder, *Identification of Human Control
-//! Behaviour*, 2006; M. Yamagami et al., IEEE Trans. Cybernetics 53 (2023) 2039-2050 with primes
-//! times 0.05 Hz). Phases are random in each run, so that no one learns the signal by heart.
+//! is a harmonic of another, so that a nonlinear response of a person to one line does not fall on another, and the
+//! power lies where people follow (D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in Electronics 8 (1967)
+//! 231-249; M. M. van Paassen and M. Mulder, *Identification of Human Control Behaviour*, 2006; M. Yamagami et al.,
+//! IEEE Trans. Cybernetics 53 (2023) 2039-2050 with primes times 0.05 Hz). Phases are random in each run, so that no
+//! one can memorise the signal.
 
 use std::f64::consts::TAU;
 
@@ -97,7 +97,7 @@ impl MultiSine {
             return refuse(
                 "largest multiple of a multi-sine",
                 found,
-                "2 to 10000, and a prime that it has",
+                "2 to 10000, with at least one prime among the multiples",
             );
         }
         let multiples = self.multiples();

@@ -7,9 +7,9 @@
 //!
 //! with g and h normal, b = 1 with probability `lambda Ts` (Poisson pulses; else 0), s on or off
 //! for times that are exponential with means `T_on`, `T_off`, `D = T_on/(T_on + T_off)`, and
-//! `m^2 = 1 - c + c r^2/E r^2`, r^2 the running mean square of u or of its rate, `E r^2` that of the
-//! whole run. All factors of g and h are known before sample k: w is white and of unit variance, so
-//! that spectrum and strength of the remnant are those of the filter.
+//! `m^2 = 1 - c + c r^2/E r^2`, where r^2 is the running mean square of u or of its rate, and `E r^2` is its mean over
+//! the whole run. All factors of g and h are known before sample k: w is white and of unit variance, so that spectrum
+//! and strength of the remnant are those of the filter.
 //!
 //! | part | source |
 //! |---|---|
@@ -234,9 +234,10 @@ impl RemnantPart {
         }
         if self.signal_dependence.is_some() && self.intermittence.is_some() {
             return Err(ModelError::Operator {
-                reason: "a part of the remnant follows u and is there at times only: u is larger while it is there, and its \
-                         strength would not be what is requested; make two parts of it"
-                    .to_owned(),
+                reason:
+                    "a part of the remnant follows u and is intermittent: u is larger while it is present, so that \
+                         its strength would differ from the requested one; split it into two parts"
+                        .to_owned(),
             });
         }
         Ok(())

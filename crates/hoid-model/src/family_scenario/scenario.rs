@@ -66,7 +66,7 @@ pub struct ResolvedFamilyScenario {
 }
 
 impl FamilyScenario {
-    /// Returns a task of 40 s at 60 Hz after 5 s of run-in, with operator and element only.
+    /// Returns a task of 40 s at 60 Hz after 5 s of run-in, with only an operator and an element.
     pub fn new(state: FamilyState, sample_time: SampleTime) -> Self {
         Self {
             name: "people".to_owned(),

@@ -7,13 +7,13 @@ use num_complex::Complex64;
 use super::crossings::{LARGEST_TURN_RAD, turn};
 use crate::{ContinuousTransferFunction, polynomial};
 
-/// Limit of the stability test, which gives no proof beyond it.
+/// Limit of the stability test, beyond which it gives no proof.
 const MOST_EVALUATIONS: usize = 4_000_000;
 
 /// True if unit negative feedback around the open loop gives a stable loop: all closed-loop poles are in the open left
 /// half plane. Poles of the open loop may be anywhere, also at the origin.
 ///
-/// Stable means proven stable. A closed-loop pole so near to the imaginary axis that rounding matters counts as
+/// Stable means proven stable. A closed-loop pole so close to the imaginary axis that rounding matters counts as
 /// unstable, and so do a biproper open loop with delay whose gain at infinite frequency is one or more (it has
 /// infinitely many poles in the right half plane) and a delay of millions of radians at frequencies where the gain
 /// exceeds 1/2.
@@ -24,7 +24,7 @@ pub fn closed_loop_is_stable(open_loop: &ContinuousTransferFunction) -> bool {
 /// Lowest frequency at which a closed loop is evaluated, relative to the magnitude of the controlled element's poles
 /// and 1 rad/s.
 const LOWEST: f64 = 1e-4;
-/// Distance in rad from an integer number of half turns above which it is not rounding.
+/// Deviation in rad from a whole number of half turns that is too large to be rounding.
 const NO_HALF_TURN_RAD: f64 = 0.5;
 
 /// Returns the number of closed-loop poles in the right half plane of a stable operator with the frequency response
@@ -49,7 +49,7 @@ pub fn unstable_poles(
         (horner(element.den(), s) + loop_part) / Complex64::new(scale, omega).powu(order as u32)
     };
     let low = LOWEST * scale.min(1.0);
-    // The rest of D/(s + a)^n, beyond the last frequency, is followed without the operator.
+    // Beyond the last frequency, D/(s + a)^n is followed without the operator.
     if !(highest_rad_s > low && (operator(highest_rad_s) * element.response(highest_rad_s)).norm() < 1.0) {
         return None;
     }
@@ -180,7 +180,7 @@ impl<'a> Characteristic<'a> {
                 }
             }
         }
-        // From here to infinity the argument goes back to that of the limit without another round.
+        // From here to infinity the argument returns to that of the limit without another turn.
         let limit = if tau == 0.0 && self.open_loop.num().len() == self.order + 1 {
             Complex64::new(1.0 + self.open_loop.num()[0], 0.0)
         } else {

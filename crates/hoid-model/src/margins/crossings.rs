@@ -37,7 +37,7 @@ pub struct Crossings {
 }
 
 impl Crossings {
-    /// Returns the margins nearest to zero; of equal ones, the first.
+    /// Returns the margins nearest to zero; of equal margins, the first.
     pub fn margins(&self) -> Margins {
         let nearest = |of: &[Crossing]| {
             of.iter().copied().reduce(|held, next| {

@@ -11,20 +11,19 @@
 //! its frequency. MATLAB's `margin` and python-control's `margin` use the same rule. Margins do not show whether a loop
 //! is stable, and have no meaning for an unstable one: see [`closed_loop_is_stable`].
 //!
-//! **Scan.** A logarithmic grid, halved wherever the phase turns by more than 0.5 rad between
-//! neighbours, as seen from their phases or from the slope of the phase at each (a whole round
-//! between two points would look like no turn), so that the phase is followed however fast a delay
-//! turns it; sign changes are refined by bisection to rounding. A pair of crossings closer than the
-//! grid (a curve that only touches) is not seen.
+//! **Scan.** A logarithmic grid is halved wherever the phase changes by more than 0.5 rad between neighbours, according
+//! to their phases or to the slope of the phase at each (a whole turn between two points would look like no change), so
+//! that the phase is followed however fast a delay changes it; sign changes are refined by bisection to rounding. A
+//! pair of crossings closer together than the grid (a curve that only touches) is not detected.
 //!
 //! **Stability.** With `L = N e^{-s tau} / D`, the closed loop is stable when
-//! `F(s) = D + N e^{-s tau}` has no zero in the closed right half plane. `F/(s + a)^n`, n the
-//! degree of D, is analytic there and goes to 1, so that its argument turns by `-pi Z` along s = j
-//! omega, omega from 0 to infinity, Z the number of zeros (Cauchy's argument principle; Mikhailov's
-//! form of the Nyquist criterion). F has no poles, so that open-loop poles at the origin or on the
-//! axis need no detour, and common factors of N and D in the right half plane count as they should.
-//! For an operator of which only the frequency response Y is known ([`unstable_poles`]), stable and
-//! sampled, `F = D + N Y e^{-s tau}` is followed up to a frequency beyond which `|L| < 1`.
+//! `F(s) = D + N e^{-s tau}` has no zero in the closed right half plane. `F/(s + a)^n`, where n is the degree of D, is
+//! analytic there and tends to 1, so that its argument changes by `-pi Z` along s = j omega from omega = 0 to infinity,
+//! where Z is the number of zeros (Cauchy's argument principle; Mikhailov's form of the Nyquist criterion). F has no
+//! poles, so that open-loop poles at the origin or on the axis need no detour, and common factors of N and D in the
+//! right half plane are counted correctly. For an operator of which only the frequency response Y is known
+//! ([`unstable_poles`]), stable and sampled, `F = D + N Y e^{-s tau}` is followed up to a frequency beyond which
+//! `|L| < 1`.
 
 mod closed_loop;
 mod crossings;

@@ -18,7 +18,7 @@ pub struct FittedOperator {
     pub sample_time: SampleTime,
     /// Units of e and u; empty if they were not declared.
     pub units: [String; 2],
-    /// Its source, for messages: the name of a file.
+    /// Source of the fit, for messages: the name of a file.
     pub source: String,
 }
 
@@ -64,8 +64,8 @@ impl FittedOperator {
         let wrong = |reason: String| Err(ModelError::Operator { reason });
         if !self.sample_time.matches(sample_time) {
             return wrong(format!(
-                "{} was identified at {:.6} Hz, the samples here come at {:.6} Hz: its noise model does not hold here; \
-                 identify the person at this rate, or bring the record to that one with --resample",
+                "{} was identified at {:.6} Hz, but the samples here come at {:.6} Hz: its noise model is not valid \
+                 here; identify the person at this rate, or resample the record to that one with --resample",
                 self.source,
                 1.0 / self.sample_time.s(),
                 1.0 / sample_time.s()
@@ -74,8 +74,8 @@ impl FittedOperator {
         for (signal, (of_fit, here)) in ["e", "u"].into_iter().zip(self.units.iter().zip(units)) {
             if !of_fit.is_empty() && !here.is_empty() && of_fit != here {
                 return wrong(format!(
-                    "{} was identified with {signal} in {of_fit}, here {signal} is in {here}: its gains are others here; \
-                     scale one of them, as --scale {signal}={here}:{of_fit}",
+                    "{} was identified with {signal} in {of_fit}, but here {signal} is in {here}: its gains differ \
+                     here; scale one of them, such as with --scale {signal}={here}:{of_fit}",
                     self.source
                 ));
             }

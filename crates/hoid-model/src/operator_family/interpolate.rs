@@ -1,11 +1,11 @@
 //! The discrete model of an operator of the family for an error that is smooth between samples.
 //!
-//! A hold makes the response that of a staircase: if the operator's step response starts with a slope (relative degree
-//! 1), the model has a kink at every delay of an integer number of samples, and a search over the delay of a recorded
-//! person ends in one. A person does not see a staircase. Here the error is linear from sample to sample, `e(t)`, and
-//! the operator acts on `e(t - tau - Ts/2)`: half a sample later, as after a hold, so that tau has the same meaning in
-//! both. At frequency omega the two differ by the factor `sin(x)/x`, `x = omega Ts/2` (0.5 % at 20 rad/s and 60 Hz),
-//! and not in phase.
+//! With a hold, the response is that to a staircase: if the operator's step response starts with a slope (relative
+//! degree 1), the model has a kink at every delay of an integer number of samples, and a search over the delay of a
+//! recorded person ends at such a kink. A person does not see a staircase. Here the error is linear from sample to
+//! sample, `e(t)`, and the operator acts on `e(t - tau - Ts/2)`: half a sample later, as after a hold, so that tau has
+//! the same meaning in both. At frequency omega the two differ by the factor `sin(x)/x`, `x = omega Ts/2` (0.5 % at 20
+//! rad/s and 60 Hz), and not in phase.
 //!
 //! With `tau + Ts/2 = l Ts + delta`, `0 <= delta < Ts`, and times in samples,
 //!

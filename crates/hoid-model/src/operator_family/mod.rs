@@ -2,8 +2,8 @@
 //!
 //! `Y(s) = K (T_L s + 1)^p / (T_I s + 1)^q e^{-tau s} omega^2/(s^2 + 2 zeta omega s + omega^2)`,
 //! p = 0, 1, 2, q = 0, 1 (eq. 2.2 of the thesis; D. T. McRuer and H. R. Jex, IEEE Trans. Human
-//! Factors in Electronics 8 (1967) 231-249), with or without the neuromuscular part, and two rivals
-//! for controlled elements of second order ([`Form`]).
+//! Factors in Electronics 8 (1967) 231-249), with or without the neuromuscular part, and two alternative forms for
+//! controlled elements of second order ([`Form`]).
 //!
 //! A person who integrates slow errors has a lag with a long T_I. Then K and T_I cannot be distinguished, but `K/T_I`
 //! can; an operator is therefore represented by the coordinates `[K/T_I, T_L, 1/T_I, ln omega, ln zeta, tau]`

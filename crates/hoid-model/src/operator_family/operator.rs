@@ -64,8 +64,8 @@ pub struct FamilyResponse {
 }
 
 impl FamilyResponse {
-    /// Returns the covariance of the real and imaginary part of `dY/Y = d ln Y`, i.e. of gain and phase, from that of
-    /// the coordinates by rows.
+    /// Returns the covariance of the real and imaginary part of `dY/Y = d ln Y`, i.e. of gain and phase, from the
+    /// covariance of the coordinates by rows.
     pub fn relative_covariance(&self, covariance: &[f64]) -> [[f64; 2]; 2] {
         let along = |part: fn(Complex64) -> f64| -> Vec<f64> {
             let gradient = self.gradient.iter().map(|g| part(g / self.value));
@@ -114,8 +114,8 @@ impl FamilyOperator {
         let wrong = |reason: String| Err(ModelError::Operator { reason });
         if !form.is_proper(neuromuscular) {
             return wrong(format!(
-                "the form {form} without neuromuscular dynamics is a pure derivative, which no sampled model holds; add \
-                 the neuromuscular part or take a form with a lag"
+                "the form {form} without neuromuscular dynamics is a pure derivative, which has no sampled model; add \
+                 the neuromuscular part or choose a form with a lag"
             ));
         }
         let expected = form.coordinates(neuromuscular);
@@ -157,7 +157,7 @@ impl FamilyOperator {
     pub fn of_names(form: Form, pairs: &[(String, f64)]) -> Result<Self, ModelError> {
         let wrong = |reason: String| ModelError::Operator { reason };
         let find = |name: &str| pairs.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
-        let need = |name: &str| find(name).ok_or_else(|| wrong(format!("{name} is lacking for the form {form}")));
+        let need = |name: &str| find(name).ok_or_else(|| wrong(format!("{name} is missing for the form {form}")));
         let neuromuscular = find("omega_nm").is_some() || find("zeta_nm").is_some();
         let positive = |name: &str| {
             let value = need(name)?;
@@ -238,7 +238,7 @@ impl FamilyOperator {
     }
 
     /// Returns the parameters by name: `K`, `K_over_T_I`, `T_L`, `T_I`, `omega_nm`, `zeta_nm`, `tau_e`; `K_e`, `T_L`,
-    /// `K_e_dot` for the lead; `c_1`, `c_2`, `alpha` for the rivals.
+    /// `K_e_dot` for the lead; `c_1`, `c_2`, `alpha` for the alternative forms.
     pub fn named(&self) -> Vec<NamedParameter> {
         let gain = self.coordinates[0];
         let mut all = Vec::new();

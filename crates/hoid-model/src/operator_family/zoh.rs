@@ -8,10 +8,10 @@
 //! `x(k+1) = Phi x(k) + Gamma_1 e(k-l-1) + Gamma_0 e(k-l)`,
 //! `Phi = Phi_2 Phi_1`, `Gamma_1 = Phi_2 Gamma(delta)`, `Gamma_0 = Gamma(Ts - delta)`
 //!
-//! (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, 1997, section 3.2). The matrices
-//! are those of the exponential of `[A B; 0 0] h`, by scaling and squaring of its series. F is the
-//! characteristic polynomial of Phi, B the product of F and the impulse response. Everything is
-//! computed with numbers that carry their derivatives along the coordinates ([`super::dual`]).
+//! (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, 1997, section 3.2). The matrices are blocks of the
+//! exponential of `[A B; 0 0] h`, computed by scaling and squaring of its series. F is the characteristic polynomial of
+//! Phi, B the product of F and the impulse response. Everything is computed with numbers that carry their derivatives
+//! with respect to the coordinates ([`super::dual`]).
 //!
 //! **Direct part.** A form whose numerator has the degree of its denominator has a direct feedthrough of e. For the
 //! held error, at a sampling instant this would be one sample or the next, with a step if the delay is an integer

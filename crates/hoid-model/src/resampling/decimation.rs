@@ -10,7 +10,7 @@ use crate::{ModelError, SampleTime};
 const HIGHEST_HZ: f64 = 200.0;
 /// Target rate of the automatic decimation, Hz.
 const WANTED_HZ: f64 = 100.0;
-/// Relative difference of two rates above which it is not rounding.
+/// Relative difference between two rates that is too large to be rounding.
 const ROUNDING: f64 = 1e-6;
 
 /// Choice of the decimation of a record.
@@ -21,7 +21,7 @@ pub enum Decimation {
     Auto,
     /// No decimation.
     Off,
-    /// By this factor.
+    /// Decimation by this factor.
     By(usize),
 }
 
@@ -70,7 +70,7 @@ impl FromStr for Decimation {
                 _ => Err(ModelError::Decimation {
                     label: "decimate".to_owned(),
                     found: format!("{text:?}"),
-                    expected: "auto, off, or by how many samples, as 10".to_owned(),
+                    expected: "auto, off, or an integer factor, such as 10".to_owned(),
                 }),
             },
         }

@@ -36,7 +36,7 @@ pub struct Decimator<const C: usize> {
 struct Lane {
     /// Offset of the whole sample before a new value from its old sample: 0, or the middle of M.
     lead: i64,
-    /// Place of the first weight relative to that sample, and the weights.
+    /// Position of the first weight relative to that sample, and the weights.
     offset: i64,
     weights: Vec<f64>,
     /// Samples that the filter needs; the first is at `first` old samples, which is negative for the reflection of the
@@ -47,7 +47,7 @@ struct Lane {
     last: f64,
     /// True if there has been a valid value.
     seen: bool,
-    /// Numbers of the samples from the last output on that are not valid.
+    /// Indices of the samples from the last output on that are not valid.
     bad: VecDeque<u64>,
 }
 
@@ -64,7 +64,7 @@ impl<const C: usize> Decimator<C> {
             return Err(ModelError::Decimation {
                 label: "stream".to_owned(),
                 found: format!("a factor of {factor}"),
-                expected: "2 to some thousand; decimate off keeps the rate".to_owned(),
+                expected: "2 to a few thousand; decimate off keeps the rate".to_owned(),
             });
         };
         let lane = |held: bool| {
@@ -169,7 +169,7 @@ impl Lane {
     fn reflect(&mut self, half: usize) {
         let begin = self.past[0];
         for k in 1..=half {
-            // What was put before it is in front of the k-th.
+            // The k - 1 values that were inserted before precede the k-th sample.
             let value = 2.0 * begin - self.past[2 * k - 1];
             self.past.push_front(value);
         }

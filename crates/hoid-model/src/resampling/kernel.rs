@@ -59,8 +59,8 @@ impl Kernel {
 
     /// Returns a kernel that passes up to 0.8 `ratio` and stops from 1.2 `ratio`, with 6 dB at `ratio`, the new Nyquist
     /// frequency relative to the old one: aliases fall between 0.8 and 1 of it, where they replace the part that the
-    /// filter has removed, so that the spectrum of noise has no gap. `None` if it would be longer than `longest` on
-    /// each side.
+    /// filter has removed, so that the spectrum of noise has no gap. `None` if the filter would be longer than
+    /// `longest` on each side.
     pub fn folding(ratio: f64, longest: usize) -> Option<Self> {
         let half = half_length(2.0 * (1.0 - PASS) * ratio);
         // Written so that NaN gives `None`.
@@ -105,7 +105,7 @@ impl Kernel {
                 let whole = (t - t.round()).abs() < WHOLE;
                 let at = if whole { t.round() } else { t.floor() };
                 let fraction = if whole { 0.0 } else { t - at };
-                // NaN, before the first, is another fraction.
+                // Before the first value the fraction is NaN, which differs from every fraction.
                 let is_known = (fraction - known).abs() < 1e-13;
                 if !is_known {
                     (offset, weights) = self.weights(fraction);

@@ -1,5 +1,4 @@
-//! Bode diagrams next to each other: magnitude in dB over phase in deg, several curves and the true
-//! response in each column.
+//! Bode diagrams side by side: magnitude in dB over phase in deg, several curves and the true response in each column.
 //!
 //! The phase is unwrapped after removing the delay, as in [`super::bode`].
 
@@ -16,7 +15,7 @@ use crate::numbers::Z_95;
 /// One frequency response.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BodeCurve {
-    /// Name in the legend, where entries with equal name and style appear once; empty for none.
+    /// Name in the legend, where entries with equal name and style appear once; empty if there is none.
     pub name: String,
     /// Style: [`LineKind::Truth`] for the reference response.
     pub kind: LineKind,
@@ -28,15 +27,15 @@ pub struct BodeCurve {
     pub magnitude_db: Vec<f64>,
     /// Phase in deg at each frequency, on any branch.
     pub phase_deg: Vec<f64>,
-    /// Lower and upper edge of the band of the magnitude, dB; empty for none.
+    /// Lower and upper edge of the band of the magnitude, dB; empty if there are none.
     pub magnitude_band: Vec<(f64, f64)>,
     /// Lower and upper edge of the band of the phase, deg, on the branch of the phase; empty for
     /// none.
     pub phase_band: Vec<(f64, f64)>,
-    /// Lower and upper end of the error bar of the magnitude, dB; empty for none.
+    /// Lower and upper end of the error bar of the magnitude, dB; empty if there are none.
     pub magnitude_bars: Vec<(f64, f64)>,
-    /// Lower and upper end of the error bar of the phase, deg, on the branch of the phase; empty
-    /// for none.
+    /// Lower and upper ends of the error bars of the phase, deg, on the same branch as the phase; empty if there are
+    /// none.
     pub phase_bars: Vec<(f64, f64)>,
     /// Delay removed for unwrapping the phase, s; that of the model, or zero.
     pub delay_s: f64,
@@ -129,13 +128,13 @@ impl BodeCurve {
 /// Bode diagrams of one column.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BodeColumn {
-    /// Title; empty for none. `_` or `^` is followed by one character, or several in braces.
+    /// Title; empty if there is none. `_` or `^` is followed by one character, or several in braces.
     pub title: String,
     /// Its curves.
     pub curves: Vec<BodeCurve>,
 }
 
-/// Bode diagrams next to each other, with common ordinates.
+/// Bode diagrams side by side, with common ordinates.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BodeGrid {
     /// The columns. A single one has the width of a text column, several have that of a page.

@@ -57,14 +57,14 @@ pub struct BoxPanel {
     /// Name of the quantity, such as `B_r(b_0)`; `_` or `^` is followed by one character, or
     /// several in braces.
     pub name: String,
-    /// Its unit; empty for none.
+    /// Its unit; empty if there is none.
     pub unit: String,
     /// The boxes by group and series; a missing box is one without values.
     pub boxes: Vec<Vec<BoxStatistics>>,
     /// Limit up to which the ordinate is linear, and logarithmic beyond; `None` for a linear
     /// ordinate.
     pub linear_within: Option<f64>,
-    /// Text above the panel, such as the largest of its numbers; empty for none.
+    /// Text above the panel, such as the largest of its numbers; empty if there is none.
     pub note: String,
 }
 
@@ -76,7 +76,7 @@ pub struct BoxGrid {
     /// Panels per row; zero counts as one. A single column has the width of a text column, several
     /// have that of a page.
     pub columns: usize,
-    /// Title of each column, or of each panel; empty for none.
+    /// Title of each column, or of each panel; empty if there are none.
     pub titles: Vec<String>,
     /// Name of the grouping variable, such as `n_k^*`.
     pub abscissa: String,

@@ -52,7 +52,7 @@ pub enum LineKind {
 /// One curve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    /// Name in the legend, where entries with equal name and style appear once; empty for none.
+    /// Name in the legend, where entries with equal name and style appear once; empty if there is none.
     pub name: String,
     /// Style.
     pub kind: LineKind,
@@ -62,9 +62,9 @@ pub struct Curve {
     pub x: Vec<f64>,
     /// Ordinates. A value that is not finite, or not positive on a logarithmic axis, is a gap.
     pub y: Vec<f64>,
-    /// Lower and upper edge of the band at each abscissa; empty for none.
+    /// Lower and upper edge of the band at each abscissa; empty if there are none.
     pub band: Vec<(f64, f64)>,
-    /// Lower and upper end of the error bar at each abscissa; empty for none.
+    /// Lower and upper end of the error bar at each abscissa; empty if there are none.
     pub bars: Vec<(f64, f64)>,
 }
 
@@ -73,7 +73,7 @@ pub struct Curve {
 pub struct CurvePanel {
     /// Name of the ordinate; `_` or `^` is followed by one character, or several in braces.
     pub name: String,
-    /// Its unit; empty for none. An ordinate in `deg` has ticks at fractions of a full turn.
+    /// Its unit; empty if there is none. An ordinate in `deg` has ticks at fractions of a full turn.
     pub unit: String,
     /// True for a logarithmic ordinate.
     pub logarithmic: bool,
@@ -91,7 +91,7 @@ pub struct CurveGrid {
     /// Panels per row; zero counts as one. A single column has the width of a text column, several
     /// have that of a page.
     pub columns: usize,
-    /// Title of each column, or of each panel; empty for none.
+    /// Title of each column, or of each panel; empty if there are none.
     pub titles: Vec<String>,
     /// Name and unit of the abscissa, such as `time (s)`.
     pub abscissa: String,
@@ -208,7 +208,7 @@ impl CurvePanel {
         let edges = |c: &Curve| -> Vec<f64> { c.band.iter().chain(&c.bars).flat_map(|b| [b.0, b.1]).collect() };
         let mut values: Vec<f64> = self.curves.iter().flat_map(|c| c.y.iter().copied()).collect();
         if self.logarithmic {
-            // An edge at or below zero belongs to a wide band, and is not a value to be shown.
+            // An edge at or below zero is that of a wide band, and not a value to be shown.
             let least = values
                 .iter()
                 .copied()

@@ -32,7 +32,7 @@ pub struct ModelCurve {
     pub omega_rad_s: Vec<f64>,
     /// Response at each frequency.
     pub response: Vec<Complex64>,
-    /// Standard errors of magnitude in dB and phase in deg at each frequency, for a band; empty for none.
+    /// Standard errors of magnitude in dB and phase in deg at each frequency, for a band; empty if there are none.
     pub standard_errors: Vec<[f64; 2]>,
     /// Delay removed for unwrapping the phase, s.
     pub delay_s: f64,

@@ -22,7 +22,7 @@ pub enum FigureFormat {
 }
 
 impl FigureFormat {
-    /// The format given by the extension of a name; none for another extension.
+    /// The format given by the extension of a name; `None` for another extension.
     pub fn of(path: &Path) -> Option<Self> {
         let ending = path.extension()?.to_str()?.to_ascii_lowercase();
         match ending.as_str() {
@@ -51,7 +51,7 @@ impl FigureFormat {
             Self::Png => converted::png(svg),
             #[cfg(not(feature = "pdf-png"))]
             Self::Pdf | Self::Png => Err(ReportError::Figure {
-                reason: "this hoid was built without PDF and PNG, the feature pdf-png".to_owned(),
+                reason: "this hoid was built without PDF and PNG (feature pdf-png)".to_owned(),
             }),
         }
     }
@@ -106,7 +106,7 @@ mod converted {
         let scale = (DPI / PIXELS_AN_INCH) as f32;
         let size = (tree.size().to_int_size().scale_by(scale)).ok_or_else(|| failed(&"it has no size"))?;
         let mut dots =
-            Pixmap::new(size.width(), size.height()).ok_or_else(|| failed(&"it has more dots than memory"))?;
+            Pixmap::new(size.width(), size.height()).ok_or_else(|| failed(&"it has more pixels than fit in memory"))?;
         resvg::render(&tree, Transform::from_scale(scale, scale), &mut dots.as_mut());
         dots.encode_png().map_err(|e| failed(&e))
     }

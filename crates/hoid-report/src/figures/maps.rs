@@ -46,7 +46,7 @@ pub struct MapGrid {
     /// Panels per row; zero counts as one. A single column has the width of a text column, several
     /// have that of a page.
     pub columns: usize,
-    /// Title of each column, or of each panel; empty for none.
+    /// Title of each column, or of each panel; empty if there are none.
     pub titles: Vec<String>,
     /// Name of the abscissa, such as `n_k^*`; `_` or `^` is followed by one character, or several
     /// in braces.
@@ -65,7 +65,7 @@ pub struct MapGrid {
     pub limits: Option<(f64, f64)>,
     /// True if each row has its own colours and bar.
     pub bar_per_row: bool,
-    /// Meaning of the cross, for the legend; empty for none.
+    /// Meaning of the cross, for the legend; empty if there is none.
     pub mark: String,
 }
 

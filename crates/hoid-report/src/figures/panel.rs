@@ -45,7 +45,7 @@ pub struct TraceCurve {
     pub times_s: Vec<f64>,
     /// One value for each time. Non-finite values are gaps.
     pub values: Vec<f64>,
-    /// Lower and upper edge of the band at each time; empty for none.
+    /// Lower and upper edge of the band at each time; empty if there are none.
     pub band: Vec<(f64, f64)>,
 }
 
@@ -77,7 +77,7 @@ pub struct TracePanel {
     /// Name: `K_e` and the other parameters of the operator, `b0` and other coefficients are
     /// written with subscripts, others unchanged.
     pub name: String,
-    /// Unit, empty for none.
+    /// Unit, empty if there is none.
     pub unit: String,
     /// The curves, drawn in this order over all bands.
     pub curves: Vec<TraceCurve>,

@@ -33,7 +33,7 @@ pub type PersonAt = Option<(f64, Option<f64>)>;
 pub struct PeoplePanel {
     /// Name of the quantity, such as `omega_c`.
     pub name: String,
-    /// Its unit; empty for none.
+    /// Its unit; empty if there is none.
     pub unit: String,
     /// The estimates by person and category.
     pub people: Vec<Vec<PersonAt>>,

@@ -36,11 +36,11 @@ pub struct TraceGrid {
     /// Panels per row; zero counts as one. A single column has the width of a text column, several
     /// have that of a page.
     pub columns: usize,
-    /// Title of each column, or of each panel; empty for none.
+    /// Title of each column, or of each panel; empty if there are none.
     pub titles: Vec<String>,
-    /// Names of the methods for the legend, which contains those that are drawn; empty for none.
+    /// Names of the methods for the legend, which contains those that are drawn; empty if there are none.
     pub methods: Vec<String>,
-    /// Names of the levels of each method, such as noise levels, from the lowest; empty for none.
+    /// Names of the levels of each method, such as noise levels, from the lowest; empty if there are none.
     /// They are shades of the colour of the method.
     pub levels: Vec<String>,
     /// Shaded spans, s.

@@ -246,7 +246,7 @@ impl GroupReport<'_> {
         trace_panels(id, &format!("Estimates over time, condition {condition}"), &grid)
     }
 
-    /// One recursion of a subject and condition; none if it has no values.
+    /// One recursion of a subject and condition; `None` if it has no values.
     fn curve(
         &self,
         (subject, condition, method): (&str, &str, &str),

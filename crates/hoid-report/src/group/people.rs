@@ -1,8 +1,8 @@
 //! The verdict on a group, the unreadable runs, and the operator of each person in each condition
 //! with its errors.
 //!
-//! A determined parameter is given with its standard error. Others are in parentheses; if the
-//! interval is open above, `> x` gives its lower end.
+//! A determined parameter is given with its standard error. Others are in parentheses; if the interval has no upper
+//! limit, `> x` gives its lower end.
 
 use hoid_ident::family::Parameter;
 use hoid_model::{VerdictLevel, uncertainty::Estimate};

@@ -15,7 +15,7 @@ pub struct GroupReport<'a> {
     pub tables: GroupTables<'a>,
     /// Inputs and processing, as name and value.
     pub settings: Vec<(String, String)>,
-    /// A single subject; none for all.
+    /// A single subject; `None` for all.
     pub subject: Option<&'a str>,
 }
 

@@ -32,8 +32,8 @@ fn orders_within(trace: &Trace, (from, to): (f64, f64)) -> Orders {
     }
 }
 
-/// A fit of a span of a record with the structure and the orders of a trace; if the trace tracks
-/// the delay, with its estimate there.
+/// A fit of a span of a record with the structure and the orders of a trace; if the trace tracks the delay, with the
+/// estimated delay in that span.
 ///
 /// # Errors
 /// The errors of the fit.
@@ -46,9 +46,8 @@ pub fn batch_fit(trace: &Trace, record: &Record, (from, to): (f64, f64)) -> Resu
     Ok(((from, to), estimator.fit(&[record.span(from, to)?])?))
 }
 
-/// The default batch fits for comparison with a trace: the start fit, and one of the last third of
-/// the record; none for a method that starts by itself; with the reason if the last third cannot be
-/// fitted.
+/// The default batch fits for comparison with a trace: the start fit, and a fit to the last third of the record unless
+/// the method starts by itself; with the error if the latter fails.
 pub fn default_batch_fits(trace: &Trace, record: &Record) -> (Vec<BatchFit>, Option<IdentError>) {
     let mut all = Vec::new();
     if let (Some(start), StartAt::Span(Some((from, to)))) = (trace.start(), &trace.options().start)

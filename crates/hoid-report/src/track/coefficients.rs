@@ -49,8 +49,8 @@ pub fn of_trace(trace: &Trace) -> Vec<Coefficient> {
         .collect()
 }
 
-/// The coefficients of a fit, in the order of theta; none for a grey-box model, whose parameters
-/// are not coefficients.
+/// The coefficients of a fit, in the order of theta; `None` for a grey-box model, whose parameters are not
+/// coefficients.
 pub fn of_fit(fit: &Fit) -> Vec<Coefficient> {
     if fit.is_grey_box() {
         return Vec::new();

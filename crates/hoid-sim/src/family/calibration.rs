@@ -2,8 +2,9 @@
 //!
 //! Part i with gain 1 contributes `V_i = sum over k of h_i(k)^2` to the variance of u, with h_i the response of u,
 //! through the closed loop, to one unit of w at sample 0. The sinusoids of target and disturbance contribute
-//! `V_0 = sum of A^2/2 |u/f|^2` at their frequencies, with the responses of the sampled loop: of a target that the person
-//! answers with F `e/f = (1 - P F)/(1 + B P)` and `u/f = (B + F)/(1 + B P)`. All parts are independent, so that with shares p_i
+//! `V_0 = sum of A^2/2 |u/f|^2` at their frequencies, with the responses of the sampled loop: for a target to which the
+//! person responds with F, `e/f = (1 - P F)/(1 + B P)` and `u/f = (B + F)/(1 + B P)`. All parts are independent, so
+//! that with shares p_i
 //!
 //! `var u = (V_0 + sum of K_j^2 V_j of given gains) / (1 - sum of p_i)`, `K_i^2 = p_i var u / V_i`.
 //!
@@ -134,7 +135,7 @@ fn energy(held: &HeldLoop, shaping: &Shaping) -> Result<MeanSquares, ModelError>
             return Ok(total);
         }
         if horizon >= LONGEST {
-            return Err(unstable("the response of u to a unit of remnant does not die away"));
+            return Err(unstable("the response of u to a unit of remnant does not decay"));
         }
         horizon *= 2;
     }
@@ -157,13 +158,13 @@ fn line_power(held: &HeldLoop, scenario: &FamilyScenario) -> Result<MeanSquares,
             let [y, p] = held.responses(omega).ok_or(ModelError::OutOfRange {
                 quantity: "frequency of a sinusoid in rad/s",
                 found: omega,
-                expected: "one that is not a pole of operator or controlled element",
+                expected: "one that is not a pole of the operator or of the controlled element",
             })?;
             let closed = 1.0 + y * p;
             let backward = Complex64::from_polar(1.0, -omega * scenario.sample_time.s());
             let (of_e, of_u) = match (is_target, &seen) {
                 (true, Some(seen)) => {
-                    // The preview only turns the phase of F relative to f: e depends on it.
+                    // The preview changes only the phase of F relative to f, on which e depends.
                     let shown_s = scenario.feedforward.as_ref().map_or(0.0, |seen| seen.preview_s);
                     let f = held_response(seen, backward) * Complex64::from_polar(1.0, omega * shown_s);
                     ((1.0 - p * f) / closed, (y + f) / closed)

@@ -4,12 +4,12 @@
 //!
 //! `u = r(k - l) + n`, `y = C x_p + D (u + d)`, `e = f - y`,
 //!
-//! r is the response of the operator after the fractional part of the delay `tau = l Ts + delta`, x_p the state of the
-//! controlled element. Operator and element are then advanced by one sample exactly, for held inputs
-//! ([`hoid_model::held_system`]). An operator without a neuromuscular part may pass e on without lag: of the held
-//! error that would be one sample or the next, so it is taken from the error interpolated about `t - delta - Ts/2`, as
-//! in [`FamilyOperator::zoh`](hoid_model::FamilyOperator::zoh). If that part and D form a loop within a sample, both
-//! equations are solved together.
+//! where r is the response of the operator after the fractional part of the delay `tau = l Ts + delta`, x_p the state
+//! of the controlled element. Operator and element are then advanced by one sample exactly, for held inputs
+//! ([`hoid_model::held_system`]). An operator without a neuromuscular part may pass e on without lag: with the held
+//! error this would be one sample or the next, so the direct part is computed from the error interpolated about
+//! `t - delta - Ts/2`, as in [`FamilyOperator::zoh`](hoid_model::FamilyOperator::zoh). If that part and D form a loop
+//! within a sample, both equations are solved together.
 
 use hoid_model::{
     ModelError, SampleTime, family_scenario::FamilyState, held_system::HeldSystem, scenario::Realisation,

@@ -1,4 +1,4 @@
-//! The operator of a scenario of the family alone, sample by sample: for a loop that is closed elsewhere.
+//! Only the operator of a scenario of the family, sample by sample: for a loop that is closed elsewhere.
 //!
 //! Simulates, as [`FamilySimulator`] does in a loop, `u = r(k - l) + n`, with the same random numbers and with the
 //! strength of the remnant in the loop of the scenario: a loop that responds to u like its controlled element gives
@@ -87,7 +87,7 @@ impl FamilyOperatorRun {
     }
 
     /// Continues from a saved state of an operator of the same scenario and run ([`FamilyOperatorRun::saved`]), with
-    /// the same digits. False, without any change, if the numbers belong to another one.
+    /// the same digits. Returns false, without any change, for numbers of another operator.
     pub fn restore(&mut self, saved: &[f64]) -> bool {
         let Some((&[k, n], rest)) = saved.split_first_chunk::<2>() else {
             return false;

@@ -124,7 +124,7 @@ impl FamilySimulator {
         self.scenario.run_in_samples() + self.scenario.measurement_samples()
     }
 
-    /// Returns the loop at sample `k`; after the end of the scenario it is that of the last one.
+    /// Returns the loop at sample `k`; after the end of the scenario it is that of the last sample.
     #[inline]
     pub(super) fn held(&self, k: usize) -> &HeldLoop {
         let place = self.places.get(k).or(self.places.last()).copied().unwrap_or(0);
@@ -237,8 +237,8 @@ impl FamilySimulator {
         Ok(record)
     }
 
-    /// Returns the same record with the true parameters of the operator at each sample under their names, those that
-    /// are finite throughout.
+    /// Returns the same record with the true parameters of the operator at each sample under their names; only
+    /// parameters that are finite throughout are included.
     ///
     /// # Errors
     /// As [`FamilySimulator::run`].

@@ -27,7 +27,7 @@ pub struct Task {
     pub measurement_s: f64,
     /// Run-in, s. Default 5 s.
     pub run_in_s: f64,
-    /// Spread of the parameters between runs, 0.03 for 3 %. Default none.
+    /// Spread of the parameters between runs, 0.03 for 3 %. Default: none.
     pub between_runs: f64,
 }
 

@@ -1,7 +1,7 @@
 //! Distribution of the drawn people, and the controlled element.
 //!
 //! Each parameter is drawn uniformly over a range; time constants and damping uniformly in the logarithm. The gain
-//! follows from a crossover frequency that is drawn likewise. A loop whose phase margin lies outside its range, that
+//! follows from a crossover frequency that is drawn likewise. A loop whose phase margin lies outside its range, or that
 //! has a resonance or is not stable, is drawn again with all its parameters.
 //!
 //! | parameter | range | source |
@@ -53,7 +53,7 @@ impl Range {
         Err(ModelError::OutOfRange {
             quantity,
             found: if self.low >= least { self.high } else { self.low },
-            expected: "a range from a positive number (zero or more for shares) to one that is no smaller",
+            expected: "a range from a positive number (zero or more for shares) to one that is not smaller",
         })
     }
 }

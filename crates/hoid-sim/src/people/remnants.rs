@@ -11,7 +11,7 @@ use super::population::Range;
 /// A kind of remnant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum RemnantKind {
-    /// `1/(T_n s + 1)` alone, as in the thesis.
+    /// Only `1/(T_n s + 1)`, as in the thesis.
     Lag,
     /// Broad band, peak and drift, Gaussian.
     BroadBand,

@@ -10,26 +10,25 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AnalysisSettings {
-    /// The two sub-batches, s; the first and the last three eighths of each record where they are
-    /// left out.
+    /// The two sub-batches, s. Default: the first and the last three eighths of each record.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub windows_s: Option<[(f64, f64); 2]>,
-    /// Least and greatest order of the noise model; BIC chooses on each sub-batch, the greater one
-    /// is taken.
+    /// Smallest and largest order of the noise model; BIC selects an order on each sub-batch, and the larger of the two
+    /// is used.
     pub nd: (usize, usize),
     /// Range of the delay of ARX and Box-Jenkins models, s.
     pub delay_s: (f64, f64),
     /// Recursions by name, as in `hoid track`. Default: adaptive, rls, rpem.
     #[schemars(extend("items" = serde_json::json!({ "enum": method_names() })))]
     pub methods: Vec<String>,
-    /// Polynomial models that are fitted next to the operator, in tables and figures: arx, bj, both or none.
+    /// Polynomial models that are fitted in addition to the operator, for tables and figures: arx, bj, both or none.
     #[schemars(extend("items" = serde_json::json!({ "enum": POLYNOMIALS.map(Structure::name) })))]
     pub polynomials: Vec<String>,
     /// Samples from one kept point of a trace to the next.
     pub trace_every: usize,
     /// Whether the grey box is fitted too.
     pub grey_box: bool,
-    /// Form of the operator of the family: auto, or the name of one.
+    /// Form of the operator of the family: auto, or the name of a form.
     #[schemars(extend("enum" = serde_json::json!(form_names())))]
     pub form: String,
     /// Prior knowledge of the operator before the data: population, none, or NAME=CENTRE:SPREAD
@@ -40,7 +39,7 @@ pub struct AnalysisSettings {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schemars(extend("items" = serde_json::json!({ "enum": Coordinate::ALL.map(Coordinate::parameter) })))]
     pub individual: Vec<String>,
-    /// Whether the operator is fitted to each run too, with the form of all of them.
+    /// Whether the operator is also fitted to each run, with the common form of all runs.
     pub each_run: bool,
     /// Frequencies at which the response of the recursions is kept, rad/s.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -124,10 +123,10 @@ impl AnalysisSettings {
         Ok(POLYNOMIALS.into_iter().filter(needed).collect())
     }
 
-    /// How the family is fitted, the form left to the data or given.
+    /// Settings of the fit of the family; the form is selected by the data or given.
     ///
     /// # Errors
-    /// A form, a prior or a parameter that there is not.
+    /// A form, a prior or a parameter that does not exist.
     pub(super) fn family(&self) -> Result<FamilyEstimator, String> {
         let mut estimator = FamilyEstimator::default();
         if self.form != AUTO {
@@ -145,7 +144,7 @@ impl AnalysisSettings {
         Ok(estimator)
     }
 
-    /// Why the settings have no meaning.
+    /// Reason why the settings are not valid.
     pub(super) fn check(&self) -> Result<(), String> {
         self.structures()?;
         self.family()?;

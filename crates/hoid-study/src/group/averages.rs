@@ -120,7 +120,7 @@ pub(super) struct TraceAverages {
 }
 
 impl TraceAverages {
-    /// For these parameters; those that end in `_se` are averaged as variances.
+    /// Starts the collection for these parameters; names that end in `_se` are averaged as variances.
     pub fn new(names: Vec<String>) -> Self {
         Self {
             names,

@@ -5,7 +5,7 @@ use super::manifest::{Manifest, RunEntry};
 /// All runs of a person in a condition.
 pub(super) struct Cell<'a> {
     pub runs: Vec<&'a RunEntry>,
-    /// Reason why it has no operator of its own: the behaviour of the person changes within the runs.
+    /// Reason why it has no operator: the behaviour of the person changes within the runs.
     pub changes: Option<String>,
 }
 

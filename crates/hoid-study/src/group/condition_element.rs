@@ -5,8 +5,8 @@
 //! C3-roll=90/(s(s+6)) > 30/(s(s+.2)) @ 50 : 0.5
 //! ```
 //!
-//! Names of conditions (`*` matches anything), the element, and where it changes the element after the change, its time
-//! in s, and its rate G in 1/s; without G the change is sudden.
+//! Names of conditions (`*` matches anything) and the element; if the element changes, also the element after the
+//! change, the time of the change in s, and its rate G in 1/s; without G the change is sudden.
 
 use std::str::FromStr;
 
@@ -32,7 +32,7 @@ impl FromStr for ConditionElement {
 
     fn from_str(text: &str) -> Result<Self, String> {
         const EXPECTED: &str =
-            "expected NAMES=ELEMENT or NAMES=ELEMENT>ELEMENT@TIME:G, as C3-roll=90/(s(s+6))>30/(s(s+.2))@50:0.5";
+            "expected NAMES=ELEMENT or NAMES=ELEMENT>ELEMENT@TIME:G, such as C3-roll=90/(s(s+6))>30/(s(s+.2))@50:0.5";
         let (names, course) = text.split_once('=').ok_or_else(|| format!("{text}: {EXPECTED}"))?;
         let names: Vec<String> = names.split(',').map(|name| name.trim().to_owned()).collect();
         if names.iter().any(String::is_empty) {

@@ -10,19 +10,17 @@ use super::preparation_settings::PreparationSettings;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ConditionSettings {
-    /// Controlled element, as `90/(s(s+6))` or `90/1,6,0` (by descending powers of s); before the change where there
+    /// Controlled element, such as `90/(s(s+6))` or `90/1,6,0` (by descending powers of s); before the change, if there
     /// is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub controlled_element: Option<String>,
     /// Channel whose lines excite the loop: f_t or a disturbance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub excitation: Option<String>,
-    /// Period of the excitation, s; the longest that all its lines are harmonics of where it is
-    /// left out.
+    /// Period of the excitation, s. Default: the longest period of which all its lines are harmonics.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub period_s: Option<f64>,
-    /// Samples by which u is recorded later than the e that it answers: `e[k]` belongs to
-    /// `u[k + offset]`.
+    /// Samples by which u is recorded later than the e to which it responds: `e[k]` belongs to `u[k + offset]`.
     pub offset_samples: f64,
     /// Time at which the task changes, s.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -30,11 +28,11 @@ pub struct ConditionSettings {
     /// Controlled element after the change.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub changes_to: Option<String>,
-    /// Rate G of the change, 1/s: a share `1/(1 + exp(-G (t - change_s)))` of the new element at t; sudden where it
-    /// is left out.
+    /// Rate G of the change, 1/s: a share `1/(1 + exp(-G (t - change_s)))` of the new element at t. Default: a sudden
+    /// change.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub change_per_s: Option<f64>,
-    /// Treatment of its runs before they are analysed; what it names wins over that of the group.
+    /// Treatment of its runs before they are analysed; keys given here override those of the group.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prepare: Option<PreparationSettings>,
 }
@@ -48,10 +46,10 @@ impl ConditionSettings {
         }
     }
 
-    /// Checks the controlled elements and the change of one to the other.
+    /// Checks the controlled elements and the change between them.
     ///
     /// # Errors
-    /// The key, what is wrong with it, and the remedy.
+    /// The key, the problem, and the remedy.
     pub(super) fn check_elements(&self) -> Result<(), String> {
         let elements = [
             ("controlled_element", &self.controlled_element),

@@ -3,8 +3,7 @@
 //!
 //! For each subject and each condition with an excitation in the manifest: the describing function
 //! over the readable runs, its verdict, and crossover and margins with the controlled element, all
-//! as by `hoid describe` ([`describe_runs`]). They complement the parametric fits and assume
-//! nothing of their structure.
+//! as by `hoid describe` ([`describe_runs`]). They complement the parametric fits and do not assume their structure.
 //!
 //! The distance of a fit: with `H_j` the describing function at line j, `s_j` its standard error
 //! and `F_j` the median response of the fits over the runs, the distance is
@@ -12,12 +11,11 @@
 //! weighted by their precision, and in standard errors `sqrt(mean |F_j - H_j|^2/s_j^2)`. The error
 //! of a line is estimated from few runs; each is shrunk towards the median of all lines,
 //! `r_j^2 <- (nu r_j^2 + 4 r~^2)/(nu + 4)` with `r = s/|H|` and `nu = 2 (runs - 1)` (moderated
-//! variances, Smyth 2004), otherwise one that is small by chance would dominate. Both come from the
-//! same runs, so that a fit without bias is closer than one error. If the controlled element is
-//! known, a fit agrees if its crossover is within 10 % and its phase margin within 5 deg of those
-//! of the describing function: about the difference between two experiments with the same person;
-//! otherwise if its distance is below 10 %. If the task changes within the run, both are different
-//! averages over the change, and no agreement is reported.
+//! variances, Smyth 2004), otherwise an error that is small by chance would dominate. Both come from the same runs, so
+//! that a fit without bias is closer than one error. If the controlled element is known, a fit agrees if its crossover
+//! is within 10 % and its phase margin within 5 deg of those of the describing function: about the difference between
+//! two experiments with the same person; otherwise if its distance is below 10 %. If the task changes within the run,
+//! both are different averages over the change, and no agreement is reported.
 
 use std::path::Path;
 
@@ -84,7 +82,7 @@ struct Tables {
 }
 
 /// Describing functions of all subjects and conditions with an excitation, and the distances of the
-/// fits from them; none if the manifest gives no excitation.
+/// fits from them; `None` if the manifest gives no excitation.
 pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAverages) -> Option<Frequencies> {
     manifest.conditions.values().find(|facts| facts.excitation.is_some())?;
     let with_errors: Vec<String> = MARGINS

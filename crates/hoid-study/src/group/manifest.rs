@@ -1,5 +1,4 @@
-//! The manifest of a group, in TOML: which file is which run of which subject, and what is done
-//! with it.
+//! The manifest of a group, in TOML: the assignment of files to subjects, conditions and runs, and their treatment.
 //!
 //! ```toml
 //! name = "tracking"
@@ -56,7 +55,7 @@ pub const MANIFEST: &str = "group.toml";
 pub struct Manifest {
     /// Name of the experiment.
     pub name: String,
-    /// How the files are read.
+    /// Settings for reading the files.
     #[serde(default)]
     pub read: ReadSettings,
     /// Treatment of the runs before they are analysed.
@@ -87,9 +86,9 @@ pub struct RunEntry {
     /// The controlled element.
     #[serde(default)]
     pub condition: String,
-    /// Which run.
+    /// Number or name of the run.
     pub run: String,
-    /// Whether it counts: training runs are listed and left out.
+    /// Whether the run is analysed: training runs are listed but not analysed.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub counts: bool,
 }
@@ -178,7 +177,8 @@ impl Manifest {
                 && (facts.excitation.is_some() || facts.change_s.is_some())
             {
                 return Err(format!(
-                    "run {} of {} is joined of two files, but [conditions.{}] names an excitation or change_s: leave them out, the change is at the seam",
+                    "run {} of {} is joined from two files, but [conditions.{}] names an excitation or change_s: leave \
+                     them out, the change is at the seam",
                     run.run, run.subject, run.condition
                 ));
             }
@@ -256,7 +256,7 @@ impl Manifest {
     /// Treatment of the runs of a condition.
     ///
     /// # Errors
-    /// The key that has no meaning, and why.
+    /// The invalid key, and the reason.
     pub fn preparation(&self, condition: &str) -> Result<Preparation, String> {
         let of_condition = self.conditions.get(condition).and_then(|facts| facts.prepare.as_ref());
         self.prepare.preparation(of_condition)

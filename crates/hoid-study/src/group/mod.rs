@@ -23,9 +23,9 @@
 //! | `averages` | means over the runs, chosen delays, averages of traces |
 //! | `join` | the tables of the group from those of its runs |
 //!
-//! Each run is a part on disk, like a block of a study, and so are the joint results of all runs of a person in a
-//! condition, which come first: a stopped group continues, and only the estimates and responses of a run remain in
-//! memory; traces are averaged for one person in one condition at a time.
+//! Each run is stored as a part on disk, like a block of a study, and so are the joint results of all runs of a person
+//! in a condition, which are computed first. A stopped group can therefore continue, and only the estimates and
+//! responses of a run remain in memory; traces are averaged for one person in one condition at a time.
 
 mod analysis;
 mod analysis_settings;

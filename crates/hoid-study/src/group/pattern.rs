@@ -101,14 +101,14 @@ impl Pattern {
         Ok(Self(parts))
     }
 
-    /// Values of the placeholders in a file name; none if it does not match.
+    /// Values of the placeholders in a file name; `None` if it does not match.
     pub fn matches(&self, name: &str) -> Option<FileNameParts> {
         let mut found = FileNameParts::default();
         found_in(&self.0, name, &mut found).then_some(found)
     }
 }
 
-/// Whether a text is that of a pattern in which only `*` has a meaning.
+/// Whether a text matches a pattern in which only `*` is a placeholder.
 pub(super) fn matches_any(pattern: &str, text: &str) -> bool {
     let mut parts = Vec::new();
     for (i, fixed) in pattern.split('*').enumerate() {

@@ -1,5 +1,5 @@
-//! How the runs of a group are prepared: the keys of `[prepare]` and of
-//! `[conditions.NAME.prepare]`, which win one by one.
+//! Preparation of the runs of a group: the keys of `[prepare]`, and those of `[conditions.NAME.prepare]`, each of which
+//! overrides the same key of `[prepare]`.
 //!
 //! ```toml
 //! [prepare]
@@ -13,9 +13,9 @@
 //! offset = { stick = 0 }
 //! ```
 //!
-//! If the rate is not specified, what is recorded at more than 200 Hz is decimated to about 100 Hz
-//! ([`hoid_model::resampling`]); `offset_samples` of a condition counts samples as they were recorded, after a factor
-//! or a frequency of one's own those of the new rate.
+//! If the rate is not specified, recordings at more than 200 Hz are decimated to about 100 Hz
+//! ([`hoid_model::resampling`]); `offset_samples` of a condition then counts recorded samples; if a factor or a
+//! frequency is given, it counts samples of the new rate.
 
 use std::collections::BTreeMap;
 
@@ -24,20 +24,19 @@ use hoid_model::Decimation;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Treatment of the runs before they are analysed. What is left out is not done, or as the group
-/// reports.
+/// Treatment of the runs before they are analysed. Steps that are not given are not applied, or are applied as given
+/// for the group.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PreparationSettings {
     /// Factor, factor and unit, or two units by channel.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub scale: BTreeMap<String, NumberOrText>,
-    /// Amount by which a channel was recorded late, in samples, or in s as a text such as
-    /// "0.0167s".
+    /// Delay with which a channel was recorded, in samples, or in s as a text such as "0.0167s".
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub offset: BTreeMap<String, NumberOrText>,
-    /// Every M-th sample after a low-pass filter; "off" or 1 keeps the rate. Default: "auto", above 200 Hz by the M
-    /// that comes nearest to 100 Hz.
+    /// Every M-th sample after a low-pass filter; "off" or 1 keeps the rate. Default: "auto", which above 200 Hz
+    /// selects the M whose rate is nearest to 100 Hz.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub decimate: Option<NumberOrText>,
     /// New sampling frequency, Hz.
@@ -76,7 +75,8 @@ impl PreparationSettings {
         *self == Self::default()
     }
 
-    /// Report about the rate: it is one thing with two keys, and a condition that names one of them names the rate.
+    /// The settings of the rate. `decimate` and `rate_hz` are two keys for one quantity: a condition that gives either
+    /// replaces both values of the group.
     fn rate<'a>(&'a self, condition: Option<&'a Self>) -> (Option<&'a NumberOrText>, Option<f64>) {
         let of = condition.unwrap_or(self);
         let named = of.decimate.is_some() || of.rate_hz.is_some();
@@ -87,7 +87,7 @@ impl PreparationSettings {
     /// Decimation of the runs of a condition because of a high rate: nothing if the rate is named.
     ///
     /// # Errors
-    /// The key that has no meaning, and why.
+    /// The invalid key, and the reason.
     pub fn by_rate(&self, condition: Option<&Self>) -> Result<Decimation, String> {
         let (decimate, rate_hz) = self.rate(condition);
         Ok(match decimation(decimate)? {
@@ -96,11 +96,11 @@ impl PreparationSettings {
         })
     }
 
-    /// Treatment of the runs of a condition: what the condition states, and what the group reports
-    /// about the rest.
+    /// Treatment of the runs of a condition: the settings of the condition, and those of the group for keys that the
+    /// condition does not give.
     ///
     /// # Errors
-    /// The key that has no meaning, and why.
+    /// The invalid key, and the reason.
     pub fn preparation(&self, condition: Option<&Self>) -> Result<Preparation, String> {
         let of = condition.unwrap_or(self);
         let (decimate, rate_hz) = self.rate(condition);
@@ -135,10 +135,10 @@ fn decimation(typed: Option<&NumberOrText>) -> Result<Decimation, String> {
     };
     let text = typed.text();
     text.parse()
-        .map_err(|_| format!("decimate is {text}, expected \"auto\", \"off\", or by how many samples, 1 or more"))
+        .map_err(|_| format!("decimate is {text}, expected \"auto\", \"off\", or an integer factor of 1 or more"))
 }
 
-/// Report about each channel; the second list wins.
+/// The settings by channel; those of the second list override those of the first.
 fn parsed<T>(
     group: &BTreeMap<String, NumberOrText>,
     condition: &BTreeMap<String, NumberOrText>,

@@ -1,4 +1,4 @@
-//! How the files of a group are read: the keys of `[read]`.
+//! Settings for reading the files of a group: the keys of `[read]`.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use hoid_model::{FaultHandling, UnknownName};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How files are read, as in `hoid identify`.
+/// Settings for reading files, as in `hoid identify`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ReadSettings {
@@ -15,13 +15,13 @@ pub struct ReadSettings {
     pub input: String,
     /// Column of the output.
     pub output: String,
-    /// Column of the time and its unit, as `clock:ms`; t, or a common name of a time, where it is left out.
+    /// Column of the time and its unit, such as `clock:ms`. Default: t, or a common name of a time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<String>,
-    /// The trial of each file that is read, as `trial=3`.
+    /// The trial of each file that is read, such as `trial=3`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trial: Option<String>,
-    /// Sampling frequency, Hz; that of the column t where it is left out.
+    /// Sampling frequency, Hz. Default: that of the column t.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sampling_hz: Option<f64>,
     /// Start of the span that counts, s.
@@ -34,14 +34,13 @@ pub struct ReadSettings {
     pub resample: bool,
     /// Bridge missing values.
     pub fill: bool,
-    /// Columns logged at instants of their own, as `{ u = "hold" }`: hold, linear or drop.
+    /// Columns logged at their own instants, such as `{ u = "hold" }`: hold, linear or drop.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub sparse: BTreeMap<String, String>,
     /// Trend removed from e and u: none, mean or linear.
     pub detrend: Detrending,
-    /// Faults of the recordings: bridge, report or keep. Where a fault is too long to be bridged the operator
-    /// of a person is that of all parts without it, and of what is done with single runs the longest part
-    /// counts.
+    /// Faults of the recordings: bridge, report or keep. If a fault is too long to be bridged, the operator of a person
+    /// is fitted to all parts without it, and single runs are analysed on the longest part.
     pub faults: FaultTreatment,
 }
 
@@ -60,17 +59,17 @@ impl ReadSettings {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum FaultTreatment {
-    /// Short ones are bridged; of a run with long ones the longest part without them counts.
+    /// Short faults are bridged; of a run with long faults, the longest part without them is used.
     #[default]
     Bridge,
-    /// They are reported.
+    /// Faults are reported.
     Report,
-    /// They are not searched for.
+    /// Faults are not searched for.
     Keep,
 }
 
 impl FaultTreatment {
-    /// The same for callers that repairs.
+    /// The same as an option of the repair.
     pub(super) fn handling(self) -> FaultHandling {
         match self {
             Self::Bridge => FaultHandling::Bridge,

@@ -20,7 +20,7 @@ use crate::{StudyError, columns::Rows};
 pub(super) enum Pairing {
     /// As recorded, with the offsets of `[prepare]`.
     Recorded,
-    /// Also with `offset_samples` of the condition reversed: u aligned with the e that it answers.
+    /// Also with `offset_samples` of the condition reversed: u aligned with the e to which it responds.
     InTheLoop,
 }
 
@@ -178,7 +178,7 @@ pub(super) struct Run {
     pub factor: usize,
     /// Time by which a sample of the input is later than that of the output in the same row, s.
     pub input_lead_s: f64,
-    /// Recorded run for an identification; none for a run joined from two files, whose task changes at the seam.
+    /// Recorded run for an identification; `None` for a run joined from two files, whose task changes at the seam.
     pub recorded: Option<Recorded>,
 }
 

@@ -168,7 +168,7 @@ fn prepare(manifest: &Manifest, directory: &Path, record: &RunRecord, resume: bo
         if let Some(reason) = found.differs(record) {
             return Err(StudyError::OtherStudy {
                 directory: shown(),
-                reason: format!("{reason} (the sum covers the manifest and its files)"),
+                reason: format!("{reason} (the checksum covers the manifest and its files)"),
             });
         }
         ready(directory, &found, record)?;

@@ -1,11 +1,10 @@
 //! Orders and delay of the ARX and Box-Jenkins models, chosen in advance.
 //!
-//! A single run determines the delay of a person poorly: the loss of a second-order model is flat
-//! over nk, has several minima, of which another is selected with a sample more or less, and often
-//! decreases towards the end of the range. The delay is therefore common to all runs of a person in
-//! a condition, that of their operator in the family: `nk = round(tau_e/Ts) + 1`, plus the samples
-//! by which u is recorded late. If there is no such operator, every nk in the range is fitted
-//! jointly to all runs on each of two sub-batches, and nk is the rounded mean of the two best. nd
+//! A single run determines the delay of a person poorly: the loss of a second-order model is flat over nk, often
+//! decreases towards the end of the range, and has several minima, between which the selection changes with a single
+//! sample. The delay is therefore common to all runs of a person in a condition, that of their operator in the family:
+//! `nk = round(tau_e/Ts) + 1`, plus the samples by which u is recorded late. If there is no such operator, every nk in
+//! the range is fitted jointly to all runs on each of two sub-batches, and nk is the rounded mean of the two best. nd
 //! is the larger of the orders that BIC selects on the sub-batches of all runs.
 
 use hoid_ident::{Estimator, OrderRanges, choose_orders, order_selection::Criterion};
@@ -30,8 +29,8 @@ pub(super) fn nk_of(delay_s: f64, sample_time_s: f64, late_samples: f64) -> usiz
     (delay_s / sample_time_s + late_samples).round().max(0.0) as usize + 1
 }
 
-/// Orders of a structure for all runs, with a known or estimated delay; if it is estimated, there
-/// is a row for that of each sub-batch.
+/// Orders of a structure for all runs, with a known or estimated delay; if it is estimated, there is a row for the
+/// delay of each sub-batch.
 pub(super) fn choose(
     settings: &AnalysisSettings,
     records: &[Record],

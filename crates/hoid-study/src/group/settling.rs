@@ -2,12 +2,12 @@
 //! condition and parameter.
 //!
 //! For a recorded person the true values are not known: the levels before and after the change are
-//! those of the recursion itself, the medians over the second half of its rows before, and of those
-//! after the change, of the median over the runs. The settling times are those at which the median
-//! first covers 50 and 90 % of the step, as in the studies; the noise is the deviation of one run
-//! around its own level after the change, `1.4826` times the median absolute deviation, and its
-//! median over the runs. There is no settling time if the step is smaller than the noise, and none
-//! if the share was already covered at the change: then the estimate moved for another reason.
+//! those of the recursion itself, namely the medians, over the second half of the rows before the change and over the
+//! second half of those after it, of the median over the runs. The settling times are those at which the median first
+//! covers 50 and 90 % of the step, as in the studies; the noise is the deviation of one run around its own level after
+//! the change, `1.4826` times the median absolute deviation, and its median over the runs. There is no settling time if
+//! the step is smaller than the noise, and none if the share was already covered at the change: in the latter case the
+//! estimate changed for another reason.
 
 use std::collections::BTreeMap;
 
@@ -139,7 +139,7 @@ impl Step {
         }
     }
 
-    /// Time from the change until a share of the step is covered; none if it was covered before.
+    /// Time from the change until a share of the step is covered; `None` if it was covered before.
     fn settled_s(&self, times: &[f64], values: &[f64], change_s: f64, share: f64) -> Option<f64> {
         let covered = |v: f64| (v - self.before) / (self.after - self.before) >= share;
         let (before, after): (Vec<_>, Vec<_>) = times.iter().zip(values).partition(|(t, _)| **t <= change_s);

@@ -99,7 +99,7 @@ fn findings(runs: usize, failures: &[RunFailure], people: &[Person], other: usiz
     } else if sought().next().is_some() && !sought().any(stands) {
         all.push(Finding::undetermined(
             "nothing-determined",
-            "the data determine the operator of no person",
+            "the data do not determine the operator of any person",
         ));
     }
     for f in failures {
@@ -115,11 +115,11 @@ fn findings(runs: usize, failures: &[RunFailure], people: &[Person], other: usiz
         all.extend(match (p.status, p.verdict) {
             (PersonStatus::Failed, _) => Some(Finding::doubt(
                 "condition-failed",
-                format!("there is no operator of {name}: {}", p.reason),
+                format!("there is no operator for {name}: {}", p.reason),
             )),
             (PersonStatus::Changes, _) => Some(Finding::note(
                 "condition-changes",
-                format!("{name} has no operator of the whole run: {}", p.reason),
+                format!("{name} has no operator for the whole run: {}", p.reason),
             )),
             (_, Some(VerdictLevel::NotDetermined)) => Some(Finding::doubt(
                 "person-not-determined",

@@ -2,11 +2,10 @@
 //! parameters.
 //!
 //! The gain K_e, the lead T_L, omega_nm, zeta_nm and the noise level of subject s are those of the
-//! condition times `exp(a z)`, z a normal deviate of the subject, a the spread between subjects
-//! (0.15 is 15 %); in each run each of them is again multiplied by `exp(b z)`, b the spread between
-//! runs. The delay differs by whole samples. An unstable loop is drawn again, from the next
-//! deviates. Deviates come from the random stream (seed, subject, run), remnants from the streams
-//! that `hoid simulate` uses.
+//! condition times `exp(a z)`, where z is a normal deviate of the subject and a the spread between subjects (0.15 is 15
+//! %); in each run each parameter is again multiplied by `exp(b z)`, where b is the spread between runs. The delay
+//! differs by whole samples. An unstable loop is drawn again, from the next deviates. Deviates come from the random
+//! stream (seed, subject, run), remnants from the streams that `hoid simulate` uses.
 
 use std::path::Path;
 
@@ -121,7 +120,7 @@ pub(super) fn check_number(factors: &[u64]) -> Result<(), StudyError> {
     Err(StudyError::Virtual {
         reason: format!(
             "subjects times runs times conditions are {}, expected at most {MOST_RUNS} runs in all: ask for fewer, or \
-             make several experiments with other seeds",
+             make several experiments with different seeds",
             found.join(" x ")
         ),
     })
@@ -207,7 +206,8 @@ impl VirtualExperiment {
         }
         Err(StudyError::Virtual {
             reason: format!(
-                "subject {subject} has no stable loop in {condition} after {MOST_DRAWS} draws ({reason}): take smaller spreads"
+                "subject {subject} has no stable loop in {condition} after {MOST_DRAWS} draws ({reason}): use smaller \
+                 spreads"
             ),
         })
     }

@@ -1,4 +1,4 @@
-//! Estimators of a plan that are run as by `hoid identify`, with their verdict: the operator of a person, one with
+//! Estimators of a plan that run as in `hoid identify`, with their verdict: the operator of a person, an operator with
 //! changing gains, instrumental variables.
 //!
 //! Their options are those of the registry of estimators.
@@ -17,8 +17,8 @@ pub(super) const TIME_VARYING: &str = "time-varying";
 /// Another word for `operator`.
 const FAMILY: &str = "family";
 
-/// Options of the registry that are not keys of a plan's own table: they have types there, or no meaning for single
-/// runs.
+/// Options of the registry that are not separate keys of a plan: the plan has typed keys for them, or they do not apply
+/// to single runs.
 const ELSEWHERE: [&str; 10] = [
     "noise",
     "change",
@@ -53,7 +53,7 @@ pub(super) fn of_method(method: &str, changes: bool) -> Option<ResolvedRequest> 
         TIME_VARYING => CHANGE,
         OPERATOR | FAMILY if changes => CHANGE,
         OPERATOR | FAMILY => OPERATOR,
-        // These have tables of their own.
+        // These have separate tables.
         registry::PEM | registry::REMNANT | CHANGE => return None,
         name => name,
     };
@@ -118,7 +118,7 @@ pub(crate) fn parameters(asked: &ResolvedRequest) -> Vec<String> {
         }
         ResolvedRequest::Change(how) => {
             let mut names = how.estimator.most_names();
-            // Not a parameter of the fit, but a product of some that change.
+            // Not a parameter of the fit, but a product of parameters that change.
             let all = how.estimator.form.parameters(how.estimator.neuromuscular).into_iter();
             let products = all.filter(|name| matches!(*name, "K" | "K_e_dot"));
             names.extend(products.flat_map(|name| [1, 2].map(|end| format!("{name}{end}"))));

@@ -1,4 +1,4 @@
-//! A plan as a whole: read, taken apart into cells and estimators, checked.
+//! A plan as a whole: read, expanded into cells and estimators, and checked.
 
 use std::{collections::BTreeSet, path::Path};
 
@@ -38,7 +38,7 @@ pub struct Plan {
     pub replications: u64,
     /// Replications that are run and stored together.
     pub block: u64,
-    /// Samples from one kept point of a trace to the next; none keeps no traces.
+    /// Samples from one stored point of a trace to the next; `None` if traces are not stored.
     pub trace_every: Option<usize>,
     /// Whether the points of traces are kept, not only their summary.
     pub trace_points: bool,
@@ -60,7 +60,7 @@ pub struct Cell {
     pub index: u64,
     /// Name of its table in the plan.
     pub scenario: String,
-    /// The condition from which it started, empty for none.
+    /// The condition from which it started, empty if there is none.
     pub condition: String,
     /// Axes that replace the lists of its table.
     pub axes: Vec<Axis>,
@@ -77,7 +77,7 @@ struct OwnKeys {
     condition: Option<String>,
 }
 
-/// Most replications of a cell.
+/// Largest number of replications of a cell.
 const MOST_REPLICATIONS: u64 = 100_000_000;
 
 /// Largest number of estimates of a study.
@@ -203,7 +203,7 @@ impl Plan {
                 return Err(PlanProblem {
                     line: None,
                     reason: format!(
-                        "no estimator takes the scenario {}: remove it or add an estimator",
+                        "no estimator uses the scenario {}: remove it or add an estimator",
                         cell.scenario
                     ),
                 });

@@ -8,9 +8,9 @@
 //! orders = { nd = [1, 2], nk = "true" }
 //! ```
 //!
-//! The keys are those of the command line, with units where it has none. `"true"` as an order takes
-//! what the scenario has: nk of its delay, nd of its remnant; `nk = "ramp"` is one less. Orders
-//! that are left out are those of the operator's structure, `nk = "true"`.
+//! The keys are the options of the command line, with units where these have none. `"true"` as an order takes the value
+//! of the scenario: nk from its delay, nd from its remnant; `nk = "ramp"` is one less. Orders that are not given are
+//! those of the operator's structure, with `nk = "true"`.
 
 use std::collections::BTreeMap;
 
@@ -28,7 +28,7 @@ use super::{
     problem::PlanProblem,
 };
 
-/// One estimator of a study: what is done with each record.
+/// One estimator of a study: the treatment of each record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EstimatorCell {
     /// Its name in the plan.
@@ -37,17 +37,17 @@ pub struct EstimatorCell {
     pub label: String,
     /// Axes that replace the lists.
     pub axes: Vec<Axis>,
-    /// The estimator from whose VAF that of this one is counted.
+    /// The estimator whose VAF is subtracted from that of this one.
     pub versus: Option<String>,
-    /// Names of the scenarios that it takes; none for all.
+    /// Names of the scenarios that it takes; `None` for all.
     pub scenarios: Option<Vec<String>>,
-    /// Span of the record that it takes, s; none for all.
+    /// Span of the record that it takes, s; `None` for all.
     pub span_s: Option<(f64, f64)>,
     /// Every n-th sample is taken.
     pub decimate: usize,
-    /// Trend removed from e and u before.
+    /// Trend removed from e and u before the estimate.
     pub detrend: Detrend,
-    /// Its behaviour.
+    /// Its task.
     pub task: Task,
     /// Label of its start, empty for its own.
     pub start: String,
@@ -71,7 +71,7 @@ pub enum Task {
 }
 
 impl Task {
-    /// Analysis as by `hoid identify`; none for the other estimators.
+    /// Analysis as by `hoid identify`; `None` for the other estimators.
     pub(crate) fn analysis(&self) -> Option<&ResolvedRequest> {
         match self {
             Self::Analysis(asked) => Some(asked),
@@ -167,7 +167,7 @@ impl EstimatorCell {
             .is_none_or(|names| names.iter().any(|n| n == scenario))
     }
 
-    /// The polynomial structure; none of an operator, and where the record itself is described.
+    /// The polynomial structure; `None` for an operator, and if the record itself is described.
     pub fn structure(&self) -> Option<Structure> {
         match &self.task {
             Task::Describe => None,
@@ -195,8 +195,8 @@ impl EstimatorCell {
             return Orders::default();
         };
         let (ts, table) = (scenario.scenario().sample_time.s() * self.decimate as f64, &self.orders);
-        // The delay in whole samples, except for the rounding of the quotient: what is left over is
-        // for b0 and those after it.
+        // The delay in whole samples, except for the rounding of the quotient: b0 and the following coefficients
+        // represent the remaining fraction.
         let delay = (scenario.scenario().initial.operator.tau_e_s / ts + 1e-9).floor() as usize;
         let of = |order: Option<Order>, default: usize, simulated: usize| match order {
             None | Some(Order::Range(_)) => default,
@@ -224,8 +224,7 @@ impl EstimatorCell {
         self.start_values.get(name).copied()
     }
 
-    /// Start of theta for these orders, where the plan gives one; coefficients that it leaves out
-    /// are zero.
+    /// Start of theta for these orders, where the plan gives one; coefficients that are not given are zero.
     pub(crate) fn theta(&self, orders: &Orders) -> Option<Vec<f64>> {
         if self.start.is_empty() {
             return None;
@@ -266,7 +265,7 @@ impl EstimatorCell {
         analysis::with_orders(asked.clone(), &noise, &self.orders(scenario))
     }
 
-    /// Checks orders, start and options against a scenario: the key and the problems of it.
+    /// Checks orders, start and options against a scenario: returns the key and its problems.
     pub(crate) fn check(&self, scenario: &ResolvedScenario) -> Result<(), (&'static str, String)> {
         let orders = self.orders(scenario);
         if let Some(structure) = self.structure() {

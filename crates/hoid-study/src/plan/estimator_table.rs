@@ -1,4 +1,4 @@
-//! The table `[[estimators]]` as it is in a plan: keys, defaults, what belongs to which method.
+//! The table `[[estimators]]` as it is in a plan: keys, defaults, and the keys of each method.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ use serde::{Deserialize, Deserializer, de::Error as _};
 
 use super::{analysis, problem::PlanProblem};
 
-/// Keys that want a list or a table unchanged.
+/// Keys whose value is a list or a table, which is not an axis.
 pub fn whole_keys() -> Vec<String> {
     let fixed = ["scenarios", "span_s", "start_span_s", "delay_s", "delay_range_s"].map(str::to_owned);
     let settings = methods().into_iter().flat_map(|spec| spec.settings);
@@ -24,7 +24,7 @@ pub fn whole_keys() -> Vec<String> {
     fixed.into_iter().chain(spans).collect()
 }
 
-/// The recursive methods, and what is run as `hoid identify` runs it, with their options.
+/// The recursive methods, and the estimators that run as in `hoid identify`, with their options.
 pub(super) fn methods() -> Vec<MethodSpec> {
     [hoid_survey::registry(), analysis::methods()].concat()
 }
@@ -33,14 +33,15 @@ pub(super) fn methods() -> Vec<MethodSpec> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(
     untagged,
-    expecting = "an order is a whole number from 0 on, \"true\" (nk, nd), \"ramp\" (nk) or a range as \"0..8\" (nc, nd of operator)"
+    expecting = "an order is a whole number from 0 on, \"true\" (nk, nd), \"ramp\" (nk) or a range such as \"0..8\" \
+                 (nc, nd of operator)"
 )]
 pub(crate) enum Order {
-    /// This one.
+    /// This number.
     Number(usize),
     /// The value for the scenario.
     Scenario(OfScenario),
-    /// One of a range, LO..HI.
+    /// A number of the range LO..HI.
     Range(#[schemars(with = "String")] OrderRange),
 }
 
@@ -72,15 +73,15 @@ pub(crate) enum OfScenario {
     Ramp,
 }
 
-/// Orders; those left out are those of the operator's structure.
+/// Orders. Default: those of the operator's structure.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct OrdersTable {
     pub na: Option<usize>,
     pub nb: Option<usize>,
-    /// Order of C; of operator also a range.
+    /// Order of C; for operator also a range.
     pub nc: Option<Order>,
-    /// Order of D, or "true" for the order of the simulated remnant; of operator also a range.
+    /// Order of D, or "true" for the order of the simulated remnant; for operator also a range.
     pub nd: Option<Order>,
     pub nf: Option<usize>,
     /// Delay in samples, or "true" for that of the simulated operator (its default), or "ramp" for
@@ -97,7 +98,7 @@ impl OrdersTable {
             .any(|order| matches!(order, Order::Range(_)))
     }
 
-    /// All that are given, for an estimator with orders of its noise alone.
+    /// All given orders, for an estimator that has only orders of its noise model.
     pub(super) fn of_noise(&self, remnant_order: usize) -> NamedOrders {
         let numbers = [("na", self.na), ("nb", self.nb), ("nf", self.nf)];
         let numbers = numbers.map(|(name, n)| (name, n.map(Order::Number)));
@@ -115,7 +116,7 @@ impl OrdersTable {
     }
 }
 
-/// Whether what is estimated changes.
+/// Whether the estimated quantities change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Change {
@@ -133,10 +134,10 @@ pub(crate) struct EstimatorTable {
     /// The action taken.
     #[schemars(extend("enum" = what_is_done()))]
     pub(super) method: String,
-    /// Name of an estimator above, from whose VAF with the same nk on the same run that of this one
-    /// is counted: delta_vaf.
+    /// Name of an estimator above, whose VAF with the same nk on the same run is subtracted from that of this one:
+    /// delta_vaf.
     pub(super) versus: Option<String>,
-    /// Structure of the polynomial model. Default: arx for rls, else bj.
+    /// Structure of the polynomial model. Default: arx for rls, otherwise bj.
     #[schemars(extend("enum" = structure_names()))]
     pub(super) structure: Option<String>,
     /// Orders.
@@ -144,9 +145,9 @@ pub(crate) struct EstimatorTable {
     pub(super) orders: OrdersTable,
     /// Span of the record, s. Default: all of it.
     pub(super) span_s: Option<(f64, f64)>,
-    /// Takes every so manieth sample of e and u, without a filter. Default 1.
+    /// Every N-th sample of e and u is used, without a filter. Default 1.
     pub(super) decimate: Option<usize>,
-    /// Trend removed from e and u before. Default: none.
+    /// Trend removed from e and u before the estimate. Default: none.
     #[serde(default, deserialize_with = "choice")]
     #[schemars(with = "Option<String>", extend("enum" = names::<Detrend>(&[])))]
     pub(super) detrend: Option<Detrend>,
@@ -154,23 +155,22 @@ pub(crate) struct EstimatorTable {
     #[serde(default, deserialize_with = "choice_or_auto")]
     #[schemars(with = "Option<String>", extend("enum" = names::<InitialState>(&["auto"])))]
     pub(super) initial_state: Option<InitialState>,
-    /// Start of a search or a recursion: coefficients by name, those left out are zero; `name`
-    /// labels it.
+    /// Start of a search or a recursion: coefficients by name; those not given are zero. `name` labels it.
     pub(super) start: Option<BTreeMap<String, StartValue>>,
-    /// Own starts from which a search runs to its end. Default 2.
+    /// Number of own starts from which a search runs to completion. Default 2.
     pub(super) starts: Option<usize>,
     /// Largest number of iterations of a search. Default 100.
     pub(super) max_iterations: Option<usize>,
-    /// Shortest and longest delay tau_e of an operator, s. Default 0.05 to 0.6, of operator 0.02 to 0.8.
+    /// Shortest and longest delay tau_e of an operator, s. Default 0.05 to 0.6, for operator 0.02 to 0.8.
     #[serde(alias = "delay_range_s")]
     pub(super) delay_s: Option<(f64, f64)>,
-    /// How the gains of an operator change. Default: none.
+    /// Kind of change of an operator's gains. Default: none.
     pub(super) change: Option<Change>,
     /// Span of the start fit of a recursion, s. Default: the first third.
     pub(super) start_span_s: Option<(f64, f64)>,
-    /// Time from which a recursion moves its estimate, s.
+    /// Time from which a recursion updates its estimate, s.
     pub(super) update_from_s: Option<f64>,
-    /// Options of the method, as the registries of methods and estimators have them.
+    /// Options of the method, as in the registries of methods and estimators.
     #[serde(flatten)]
     #[schemars(skip)]
     pub(super) settings: BTreeMap<String, toml::Value>,
@@ -187,7 +187,7 @@ pub(super) enum StartValue {
 }
 
 impl EstimatorTable {
-    /// Refuses keys that the method does not look at: a setting without effect would be trusted.
+    /// Refuses keys that the method does not use, since a setting without effect would mislead the user.
     pub(super) fn check_placement(
         &self,
         method: Option<&Method>,
@@ -241,7 +241,7 @@ impl EstimatorTable {
         ];
         for (key, is_given, has_effect, of) in given {
             if is_given && !has_effect {
-                return Err(at(key, format!("has no effect here: it belongs to {of}")));
+                return Err(at(key, format!("has no effect here: it applies to {of}")));
             }
         }
         if self.settings.contains_key("memory") && self.settings.contains_key("lambda") {
@@ -305,7 +305,7 @@ impl EstimatorTable {
         })
     }
 
-    /// Estimator that runs as `hoid identify` runs it, with the options of the table but its orders; `None` for another
+    /// Estimator that runs as in `hoid identify`, with the options of the table except its orders; `None` for another
     /// method.
     pub(super) fn asked(
         &self,
@@ -372,7 +372,7 @@ impl EstimatorTable {
         structure: Structure,
         at: &impl Fn(&str, String) -> PlanProblem,
     ) -> Result<TrackOptions, PlanProblem> {
-        // In the order of the registry: what belongs to a way of forgetting comes after it.
+        // In the order of the registry: the options of a rule of forgetting follow the rule.
         let known = hoid_survey::registry().into_iter().flat_map(|spec| spec.settings);
         let mut left: BTreeMap<&str, &toml::Value> = self.settings.iter().map(|(k, v)| (k.as_str(), v)).collect();
         for setting in known {
@@ -383,7 +383,7 @@ impl EstimatorTable {
             let text = text_of(value, setting.kind).map_err(|reason| at(&key, reason))?;
             if !method.settings().list().iter().any(|own| own.name == setting.name) {
                 let of = methods_with(&key).join(", ");
-                return Err(at(&key, format!("has no effect here: it belongs to {of}")));
+                return Err(at(&key, format!("has no effect here: it applies to {of}")));
             }
             method
                 .set(setting.name, &text)
@@ -401,7 +401,7 @@ impl EstimatorTable {
     }
 }
 
-/// Words for `method` next to those of the recursive methods.
+/// Words for `method` in addition to those of the recursive methods.
 pub(super) const FIT: &str = "fit";
 pub(super) const GREY_BOX: &str = "grey-box";
 pub(super) const RECORD: &str = "record";
@@ -419,7 +419,7 @@ fn structure_names() -> Vec<&'static str> {
     Structure::ALL.iter().map(|structure| structure.name()).collect()
 }
 
-/// Key of an option: its name, and its unit where the value has none of its own.
+/// Key of an option: its name, followed by its unit if the value is given without one.
 pub(super) fn plan_key(setting: &Setting) -> String {
     match (setting.kind, setting.unit) {
         (Kind::Span | Kind::NumberOrSpan | Kind::Number, "s") => format!("{}_s", setting.name),
@@ -492,8 +492,8 @@ fn methods_with(key: &str) -> Vec<&'static str> {
 /// Problems with a key that the method does not have.
 fn misplaced(key: &str) -> String {
     match methods_with(key).as_slice() {
-        [] => "is unknown; the book has the keys of an estimator on its page Monte Carlo studies".to_owned(),
-        of => format!("has no effect here: it belongs to {}", of.join(", ")),
+        [] => "is unknown; the keys of an estimator are on the page Monte Carlo studies of the book".to_owned(),
+        of => format!("has no effect here: it applies to {}", of.join(", ")),
     }
 }
 
@@ -502,7 +502,7 @@ fn unknown_key(method: &Method) -> String {
     format!("is unknown; {method} has {}", keys.join(", "))
 }
 
-/// The names of a choice, behind others.
+/// Appends the names of a choice to others.
 fn names<T: NamedChoice>(others: &[&'static str]) -> Vec<&'static str> {
     let own = T::CHOICES.iter().map(|choice| choice.choice_name());
     others.iter().copied().chain(own).collect()
@@ -514,7 +514,7 @@ fn choice<'de, T: NamedChoice, D: Deserializer<'de>>(from: D) -> Result<Option<T
     T::of_name(&name).map(Some).map_err(D::Error::custom)
 }
 
-/// A choice by its name; none for `auto`.
+/// A choice by its name; `None` for `auto`.
 fn choice_or_auto<'de, T: NamedChoice, D: Deserializer<'de>>(from: D) -> Result<Option<T>, D::Error> {
     let name = String::deserialize(from)?;
     match name.as_str() {

@@ -1,10 +1,9 @@
-//! Grids in TOML: where a list represents a value, each of its entries is taken.
+//! Grids in TOML: a list in the place of a value gives each of its entries in turn.
 //!
-//! A table of a plan is taken apart into its leaves, `remnant.order = [1, 2]` and so on. A leaf
-//! with a list is an axis, unless a list is what the key wants. All combinations are formed, the
-//! first axis of the file slowest. Each is written down as a table without lists, one key a line,
-//! and the line of the plan from which each of its lines came is kept, so that who reads the table
-//! can name the line that the user wrote.
+//! A table of a plan is split into its leaves, `remnant.order = [1, 2]` and so on. A leaf with a list is an axis,
+//! unless the value of the key is itself a list. All combinations are formed; the first axis of the file varies
+//! slowest. Each combination is written as a table without lists, one key per line, and the line of the plan from which
+//! each line came is stored, so that messages can refer to the line that the user wrote.
 
 use toml::{
     Spanned,
@@ -13,7 +12,7 @@ use toml::{
 
 use super::problem::PlanProblem;
 
-/// Most combinations of one table, so that a slip does not ask for all memory.
+/// Largest number of combinations of one table, so that a typing error does not exhaust the memory.
 const MOST: usize = 1_000_000;
 
 /// One combination of the axes of a table.
@@ -27,7 +26,7 @@ pub struct Variant {
     pub axes: Vec<Axis>,
 }
 
-/// A key with a list, and the entry that was taken.
+/// A key with a list, and the selected entry.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Axis {
     /// The key from the top of the table, joined by `_`.
@@ -41,7 +40,7 @@ struct Leaf {
     /// Each entry as it was written, and as it is shown.
     entries: Vec<(String, String)>,
     is_axis: bool,
-    /// Where it is in the plan.
+    /// Its position in the plan.
     start: usize,
 }
 
@@ -81,8 +80,8 @@ pub fn line_at(text: &str, byte: usize) -> usize {
         .count()
 }
 
-/// All combinations of the lists of a table. Keys in `whole`, joined by dots, want a list or a
-/// table unchanged.
+/// All combinations of the lists of a table. The lists or tables of the keys in `whole`, joined by dots, are kept
+/// unchanged.
 pub fn variants(table: &Spanned<DeTable<'_>>, source: &str, whole: &[&str]) -> Result<Vec<Variant>, PlanProblem> {
     let mut leaves = Vec::new();
     collect(table.get_ref(), source, whole, &mut Vec::new(), &mut leaves)?;
@@ -193,8 +192,7 @@ fn entry_of(entry: &Spanned<DeValue<'_>>, source: &str) -> (String, String) {
     (written, shown)
 }
 
-/// A value on one line. Tables under headings of their own have no text in one piece and are put
-/// together.
+/// A value on one line. A table under a separate heading has no contiguous text, which is therefore assembled.
 fn written(value: &Spanned<DeValue<'_>>, source: &str) -> String {
     match value.get_ref() {
         DeValue::Table(table) => {

@@ -1,7 +1,7 @@
-//! JSON schema of a plan: what editors complete and check.
+//! JSON schema of a plan, with which editors complete and check it.
 //!
-//! It is made of the types that read plans and of the schema of a scenario file, in which each
-//! single value may also be a list.
+//! It is generated from the types that read plans and from the schema of a scenario file, in which each single value
+//! may also be a list.
 
 use hoid_ident::settings::{Kind, MethodSpec};
 use schemars::{SchemaGenerator, generate::SchemaSettings};
@@ -48,7 +48,7 @@ pub fn plan_schema_of(methods: &[MethodSpec]) -> String {
     format!("{plan:#}\n")
 }
 
-/// The options of the methods, as the registries have them.
+/// The options of the methods, as in the registries.
 fn add_settings(estimator: &mut Value, methods: &[MethodSpec]) {
     let Some(table) = estimator.as_object_mut() else { return };
     table.insert("additionalProperties".to_owned(), false.into());
@@ -97,7 +97,7 @@ fn of_kind(kind: Kind) -> Value {
     }
 }
 
-/// Parts that belong to a schema of its own.
+/// Parts that only a separate schema has.
 fn strip(schema: &mut Value) {
     if let Some(object) = schema.as_object_mut() {
         object.remove("$schema");

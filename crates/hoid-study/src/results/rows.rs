@@ -9,9 +9,9 @@ use crate::Statistics;
 pub struct SummaryRow {
     /// Number of the cell.
     pub cell: u64,
-    /// The condition on which it is based; empty for none.
+    /// The condition on which it is based; empty if there is none.
     pub scenario: String,
-    /// The condition from which it started, empty for none.
+    /// The condition from which it started, empty if there is none.
     pub condition: String,
     /// Order m0 of the simulated remnant.
     pub remnant_order: usize,

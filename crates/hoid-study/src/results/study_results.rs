@@ -75,7 +75,7 @@ impl Results {
         found.into_iter().map(|row| &self.rows[row]).collect()
     }
 
-    /// The row of the summary that a query selects; none if there is not exactly one.
+    /// The row of the summary that a query selects; `None` if there is not exactly one.
     pub fn one(&self, query: &Query) -> Option<&SummaryRow> {
         match self.find(query).as_slice() {
             [row] => Some(row),

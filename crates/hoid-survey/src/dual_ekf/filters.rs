@@ -76,7 +76,7 @@ impl Filters {
     pub fn predict(&mut self, e: f64) {
         let (a, b) = self.held(&self.w);
         let mut slope = &a * &self.slope;
-        // K_e and K_e_dot are in C alone.
+        // K_e and K_e_dot are only in C.
         for i in 2..self.w.len() {
             let by = STEP * self.w[i];
             let moved = |by: f64| {

@@ -57,20 +57,20 @@ const UNKNOWN: f64 = 0.1;
 settings! {
     /// Options of the two filters.
     pub struct DualEkfOptions {
-        /// Drift of K_e and K_e_dot in a root second, share of their start
+        /// Drift of K_e and K_e_dot per root second, relative to their start
         #[setting(bounds(Bounds::NonNegative))]
         pub gain_drift: f64 = 0.1,
-        /// Drift of omega_nm and zeta_nm in a root second, share of their start
+        /// Drift of omega_nm and zeta_nm per root second, relative to their start
         #[setting(bounds(Bounds::NonNegative))]
         pub nms_drift: f64 = 0.005,
-        /// Drift of tau_e in a root second, share of its start, behind a Padé approximation
+        /// Drift of tau_e per root second, relative to its start, with a Padé approximation
         #[setting(bounds(Bounds::NonNegative))]
         pub delay_drift: f64 = 0.02,
-        /// Error that enters the neuromuscular part next to e, share of the size of e
+        /// Noise added to e at the input of the neuromuscular system, relative to the size of e
         #[setting(bounds(Bounds::NonNegative))]
         pub state_noise: f64 = 0.1,
         /// Root mean square of e
-        #[setting(bounds(Bounds::NonNegative), default("that of the record; in a stream of the data so far"))]
+        #[setting(bounds(Bounds::NonNegative), default("from the record, or from the stream so far"))]
         pub error_size: Option<f64> = None,
         /// Order of the Padé approximation of the delay, 1 to 3; 0 for whole samples
         pub pade: usize = 0,
@@ -85,7 +85,7 @@ impl RecursiveMethod for DualEkfOptions {
     fn about(&self) -> About {
         About {
             name: NAME,
-            help: "two extended Kalman filters that take turns, of state and of parameters, for comparison",
+            help: "two alternating extended Kalman filters, of state and of parameters, for comparison",
             source: "Wan and Nelson 2001; Popovici, Zaal and Pool 2017",
             structures: &[Structure::BoxJenkins, Structure::General],
             defaults: &[],

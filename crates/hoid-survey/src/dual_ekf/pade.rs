@@ -25,8 +25,8 @@ fn coefficients(order: usize) -> Vec<f64> {
 /// The neuromuscular part with a delay, over one sample of held input: states y_0, y_1 and those of the delay.
 ///
 /// The delay is in controllable canonical form, `p^(n) + sum a_k p^(k) = e`, its output
-/// `d e + sum b_k p^(k)` with the direct part `d = (-1)^n`; y_0 is driven by it. Both together are held exactly, by
-/// the exponential of the matrix of states and input.
+/// `d e + sum b_k p^(k)` with the direct part `d = (-1)^n`; y_0 is driven by it. Both are discretised together, exactly
+/// for a held input, by the exponential of the matrix of states and input.
 pub(super) fn delayed_second_order(
     omega: f64,
     zeta: f64,

@@ -12,12 +12,11 @@
 //! `p <- e - (1 - A) m + (R/omega^2) v`, `v <- R m + (1 - A - 2 zeta R/omega) v`;
 //!
 //! the parameters make a random walk, the remnant is taken to be white noise in u and in the drive
-//! of v. Neither is true of a coloured remnant in a closed loop; it is what the published
-//! estimators suppose. [`ekf`] linearises (A. Popovici, P. M. T. Zaal, D. M. Pool, *Dual extended
-//! Kalman filter for the identification of time-varying human manual control behavior*, AIAA
-//! 2017-3666, there with two filters that take turns), [`ukf`] sends points through (J. Rojer, D.
-//! M. Pool, M. M. van Paassen, M. Mulder, *UKF-based identification of time-varying manual control
-//! behaviour*, IFAC-PapersOnLine 52-19 (2019)).
+//! of v. Neither is true of a coloured remnant in a closed loop; the published estimators assume both. [`ekf`]
+//! linearises (A. Popovici, P. M. T. Zaal, D. M. Pool, *Dual extended Kalman filter for the identification of
+//! time-varying human manual control behavior*, AIAA 2017-3666, there with two filters that take turns), [`ukf`] sends
+//! points through (J. Rojer, D. M. Pool, M. M. van Paassen, M. Mulder, *UKF-based identification of time-varying manual
+//! control behaviour*, IFAC-PapersOnLine 52-19 (2019)).
 //!
 //! The noise of both is in proportion to the variance of the remnant of the start fit, `sigma^2`
 //! times the power of the impulse response of 1/D, and the drift in proportion to the start values;

@@ -1,5 +1,5 @@
-//! The bank of hypotheses of the real-time kernel ([`crate::kernel::multiple_model`]) after the face of a recursion:
-//! what it supposes of a person, in seconds.
+//! The bank of hypotheses of the real-time kernel ([`crate::kernel::multiple_model`]) with the interface of a recursion
+//! and with its assumptions about a person, in seconds.
 //!
 //! Where the delay is tracked, other delays are proposed every 1.28 s.
 //!
@@ -41,7 +41,7 @@ use prior::{bad, change_prior, delays, first_hypothesis, outside};
 /// Room for hypotheses where the delay is known, and where it is not.
 const HYPOTHESES: usize = 16;
 const WITH_DELAYS: usize = 48;
-/// Standard deviations beyond which an innovation moves the estimate no further.
+/// Limit on innovations, in standard deviations.
 const LIMIT: f64 = 3.5;
 /// Order of the noise model when none is named: the odds need innovations that are white.
 const DEFAULT_ND: usize = 6;
@@ -49,13 +49,13 @@ const DEFAULT_ND: usize = 6;
 settings! {
     /// Options of the bank of hypotheses.
     pub struct MultipleModelOptions {
-        /// Logarithm of the odds from which a change is declared
+        /// Log odds at which a change is declared
         pub alarm: f64 = 6.0,
-        /// Standard deviations beyond which an innovation moves the estimate no further
+        /// Limit on innovations, in standard deviations
         #[setting(bounds(Bounds::Positive), default("3.5"))]
         pub limit: Option<f64> = None,
-        /// At each sample what all of a recorded run shows about it, by hypotheses run from both
-        /// ends, in place of the prediction from the past alone
+        /// Smooth a recorded run: estimate each sample from the whole run, with hypotheses run from both ends, not
+        /// from the past alone
         pub smooth: bool = false,
     }
     groups {
@@ -72,7 +72,7 @@ impl RecursiveMethod for MultipleModelOptions {
     fn about(&self) -> About {
         About {
             name: "multiple-model",
-            help: "a bank of hypotheses of when the person changed, which sets its memory itself and reports changes",
+            help: "a bank of hypotheses about when the person changed, which sets its own memory and reports changes",
             source: "Andersson 1985; Willsky and Jones 1976; Adams and MacKay 2007; the book, page A person who changes",
             structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
             defaults: &[],
@@ -94,7 +94,7 @@ impl RecursiveMethod for MultipleModelOptions {
             return Err(bad_option(
                 "the range of the delay",
                 "with the two-sided estimate".to_owned(),
-                "a delay that is given or searched on the start span: past and future are joined for one delay",
+                "a delay given or searched on the start span: past and future are joined for one delay",
             ));
         }
         Ok(())

@@ -234,7 +234,8 @@ impl RefinedRecursion {
         StepOutcome { innovation, shortened }
     }
 
-    /// Moves theta of the filters, unless that leads out of the region of stable F, which is not convex for nf > 2.
+    /// Moves the filters' theta towards the estimate, unless this would leave the region of stable F, which is not
+    /// convex for nf > 2.
     fn follow_theta(&mut self) {
         let w = &mut self.work;
         for (trial, (auxiliary, theta)) in w.trial.iter_mut().zip(self.auxiliary.iter().zip(&self.theta)) {
@@ -405,12 +406,12 @@ fn check(orders: &Orders, start: &RefinedStart<'_>, lambda: &[f64]) -> Result<()
         return Err(IdentError::BadOption {
             option: "the forgetting factors".to_owned(),
             found: format!("{lambda:?}"),
-            expected: format!("{p} numbers above 0 and not above 1, one for each of the parameters"),
+            expected: format!("{p} numbers above 0 and at most 1, one for each parameter"),
         });
     }
     if start.theta.len() != p || start.covariance.len() != p * p {
         return bad(format!(
-            "it has {} coefficients and {} elements of the covariance, the orders {orders} need {p} and {}",
+            "it has {} coefficients and {} elements of the covariance, but the orders {orders} need {p} and {}",
             start.theta.len(),
             start.covariance.len(),
             p * p
@@ -430,7 +431,7 @@ fn check(orders: &Orders, start: &RefinedStart<'_>, lambda: &[f64]) -> Result<()
     }
     if !roots_inside(&start.theta[p - orders.nf..], RADIUS) {
         return bad(format!(
-            "F has a root outside of the circle of radius {RADIUS}; start from a span that excites its poles"
+            "F has a root outside the circle of radius {RADIUS}; start from a span that excites its poles"
         ));
     }
     Ok(())

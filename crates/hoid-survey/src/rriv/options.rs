@@ -12,7 +12,7 @@ use hoid_track::{
 settings! {
     /// Options of the recursive refined instrumental variable.
     pub struct RrivOptions {
-        /// Channel of the signal from outside the loop of which the instruments are made
+        /// Channel outside the loop from which the instruments are made
         #[setting(default("f_t where a record has it, else the error itself"))]
         pub instruments: Option<String> = None,
     }

@@ -13,9 +13,9 @@ pub struct About {
     pub name: &'static str,
     /// Description.
     pub help: &'static str,
-    /// Author, year, place.
+    /// Author, year, publication.
     pub source: &'static str,
-    /// Information that it has and a recursion does not, as text; empty for none.
+    /// Information that it has and a recursion does not, as text; empty if there is none.
     pub told: &'static str,
 }
 
@@ -36,7 +36,7 @@ pub struct Task<'a> {
     pub nk: usize,
     /// A second run of the same person in the same task, if available.
     pub validation: Option<&'a Record>,
-    /// Time of the change of the controlled element, s, and its rate, 1/s; none if it is constant.
+    /// Time of the change of the controlled element, s, and its rate, 1/s; `None` if it is constant.
     pub change: Option<(f64, f64)>,
 }
 
@@ -102,7 +102,7 @@ impl Task<'_> {
             return Err(unsuited(
                 "the input",
                 "zero throughout".to_owned(),
-                "an error that moves",
+                "an error that varies",
             ));
         }
         if let Some(k) = self.at.iter().find(|k| **k >= e.len()) {

@@ -61,9 +61,9 @@ impl Comparator for FourierCoefficients {
     fn about(&self) -> About {
         About {
             name: NAME,
-            help: "Fourier coefficients at the lines, in a window that moves",
+            help: "Fourier coefficients at the lines, in a moving window",
             source: "van Paassen and Mulder 1998",
-            told: "the lines of the forcing function; half a window of anything after",
+            told: "the lines of the forcing function; half a window of data after each time",
         }
     }
 

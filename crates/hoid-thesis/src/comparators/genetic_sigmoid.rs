@@ -8,8 +8,8 @@
 //! population of parameter vectors drawn from wide ranges, of which each generation keeps the best,
 //! and makes the others from two parents each, the better of three drawn ones (a *tournament*),
 //! every gene from a range that reaches half of the parents' distance beyond both (*blend
-//! crossover*, L. J. Eshelman and J. D. Schaffer 1993), at intervals moved by a normal deviate. What
-//! it minimises is the one-step prediction error,
+//! crossover*, L. J. Eshelman and J. D. Schaffer 1993), at intervals moved by a normal deviate. It minimises the
+//! one-step prediction error,
 //!
 //! `eps(k) = v(k) + d1 v(k-1)`, `v = u - K_e(t) y_0 - K_e_dot(t) y_1`, `K_e_dot = K_e T_L`,
 //!
@@ -52,7 +52,7 @@ const MIDPOINT: usize = 4;
 const ELITE: usize = 2;
 /// Members that are drawn for each parent.
 const DRAWN: usize = 3;
-/// How far beyond its parents a gene may lie, share of their distance.
+/// Distance beyond its parents within which a gene may lie, as a fraction of the distance between them.
 const BLEND: f64 = 0.5;
 
 settings! {
@@ -109,7 +109,7 @@ impl GeneticSigmoid {
             let size = 0.3 * (1.0 - generation as f64 / (self.generations + 1) as f64);
             let mut children = all[..ELITE.min(all.len())].to_vec();
             while children.len() < all.len() {
-                // Sorted: the first place is the best.
+                // Sorted: the first is the best.
                 let mut parent = || {
                     let places = (0..DRAWN).map(|_| (next() * all.len() as f64) as usize);
                     all[places.min().unwrap_or(0).min(all.len() - 1)]
@@ -214,7 +214,7 @@ impl Comparator for GeneticSigmoid {
             name: NAME,
             help: "maximum likelihood of gains that follow a sigmoid, from a genetic search",
             source: "Zaal et al. 2009; Zaal and Sweet 2011",
-            told: "that there is one change, a sigmoid; the whole record (not the delay)",
+            told: "the assumption of one change, a sigmoid; the whole record (not the delay)",
         }
     }
 

@@ -6,21 +6,20 @@
 //!
 //! `x(k+1) = A x(k) + (B_0 + mu(k) B_1) v(k) + K eps(k)`, `u(k) = C x(k) + eps(k)`.
 //!
-//! At 100 Hz a state reports the next one except for hundredths, and B is lost in them; so every
-//! d-th sample of u is taken, and v(k) is the mean of the d values of e, nk - 1 samples before, that
-//! act until the next. The scheduling mu is the sigmoid of the controlled element, which the
-//! experimenter knows (the analytical scheduling of the source). Only the gains of an operator
-//! change, so that A, C and K do not depend on mu and the number of coefficients grows with the
-//! window p and not with 2^p. Steps:
+//! At 100 Hz consecutive states differ only by hundredths, in which B is lost; therefore every d-th sample of u is
+//! used, and v(k) is the mean of the d values of e, nk - 1 samples before, that act until the next sample used. The
+//! scheduling mu is the sigmoid of the controlled element, which the experimenter knows (the analytical scheduling of
+//! the source). Only the gains of an operator change, so that A, C and K do not depend on mu and the number of
+//! coefficients grows with the window p and not with 2^p. Steps:
 //!
 //! 1. The predictor `u(k) = sum_{i=1..p} C Ã^(i-1) [B_0, B_1, K] z(k-i) + eps`, with
 //!    `z = [v, mu v, u]` and `Ã = A - K C`, by least squares; p so long that Ã^p is nothing.
-//! 2. The same coefficients, shifted, times z are `Gamma x(k)`, what the past shows about the next f
-//!    outputs; its n main directions over the record are a state.
+//! 2. The same coefficients, shifted, times z are `Gamma x(k)`, the information of the past about the next f outputs;
+//!    its n main directions over the record are a state.
 //! 3. With that state, C by least squares, its residuals are eps, and A, B_0, B_1, K again by least
 //!    squares.
 //!
-//! The response at t is that of the model with mu(t) held. Where nothing changes mu is left out.
+//! The response at t is that of the model with mu(t) held. If nothing changes, mu is omitted.
 
 use hoid_ident::{settings, settings::Bounds};
 use nalgebra::{DMatrix, DVector};
@@ -39,7 +38,7 @@ const RIDGE: f64 = 1e-9;
 settings! {
     /// Options of the subspace method.
     pub struct LpvSubspace {
-        /// Every so manieth sample is taken
+        /// Every N-th sample is used
         #[setting(bounds(Bounds::AtLeast(1.0)))]
         pub decimate: usize = 4,
         /// Window p of the past, in samples that are taken
@@ -125,7 +124,7 @@ impl LpvSubspace {
             method: NAME,
             quantity: "the rank of the prediction of the future from the past".to_owned(),
             found,
-            expected: format!("the order {n} at least: lower it, or lengthen future"),
+            expected: format!("at least the order {n}: lower it, or lengthen future"),
         };
         if n > order.len() {
             return Err(unsuited(order.len().to_string()));
@@ -149,7 +148,7 @@ impl LpvSubspace {
             output.add(1.0, x.as_slice(), &[z[p + i][width - 1]]);
         }
         let c = output.solve(NAME, &output.ridge(0.0))?.column(0).into_owned();
-        // The state, the inputs, and the innovation in the place of the output.
+        // The state, the inputs, and the innovation instead of the output.
         let mut next = NormalEquations::new(n + width, n);
         for i in 0..states.ncols() - 1 {
             let x = states.column(i);
@@ -172,7 +171,7 @@ impl Comparator for LpvSubspace {
             name: NAME,
             help: "predictor-based subspace identification of an LPV model",
             source: "van Wingerden and Verhaegen 2009; Duarte et al. 2017",
-            told: "when and how fast the controlled element changes; the whole record",
+            told: "the time and the rate of the change of the controlled element; the whole record",
         }
     }
 

@@ -1,11 +1,10 @@
 //! The survey's other methods as comparators: those that Part II of the thesis describes (section 2.4) and that need
 //! more than the samples so far: the lines, what comes after, a second run. The recursive ones are in `hoid_survey`.
 //!
-//! A comparator follows a record and states, at times that are asked for, what the operator's
-//! response is at some frequencies, and its parameters where it has them. Each is small, after the
-//! source that it names, tuned on runs of its own (`research/notes/survey-methods.md` states
-//! how), and reached by the plan of a [survey](crate::survey), not by `track --method`: these are
-//! here to be compared with.
+//! A comparator processes a record and returns, at requested times, the operator's response at some frequencies, and
+//! its parameters if it has them. Each is small, follows the source that it names, was tuned on separate runs
+//! (`research/notes/survey-methods.md` states how), and is used by the plan of a [survey](crate::survey), not by
+//! `track --method`: these methods are included only for comparison.
 //!
 //! | module | method |
 //! |---|---|
@@ -50,8 +49,8 @@ pub fn comparators() -> Vec<Box<dyn Comparator>> {
     ]
 }
 
-/// Why a comparator, by its name or the first word of it, does not track a recording, and the command that runs it;
-/// `None` for a name that no comparator has.
+/// Reason why a comparator, given by its name or the first word of it, does not track a recording, and the command that
+/// runs it; `None` for a name that no comparator has.
 pub fn not_tracked(name: &str) -> Option<String> {
     let typed = name.trim().to_ascii_lowercase();
     let (_, about) = names().find(|(word, _)| *word == typed)?;
@@ -68,7 +67,7 @@ pub fn not_tracked(name: &str) -> Option<String> {
             "with more coefficients than the 64 of a tracked model; up to 64 are followed by --method rls --structure fir"
                 .to_owned(),
         ),
-        told => ("is no recursion over a recording", format!("which has to know {told}")),
+        told => ("is not a recursion over a recording", format!("which needs {told}")),
     };
     Some(format!(
         "{name} {what}: {help} ({source}), {why}. It follows simulated runs only: cargo run --release -p hoid-evidence \
@@ -77,8 +76,8 @@ pub fn not_tracked(name: &str) -> Option<String> {
     ))
 }
 
-/// The names under which [`not_tracked`] knows the comparators: each with its first word, as `lpv`, where that is no
-/// recursive method.
+/// The names under which [`not_tracked`] knows the comparators: each with its first word, such as `lpv`, unless that is
+/// a recursive method.
 pub fn names() -> impl Iterator<Item = (&'static str, About)> {
     let all = comparators().into_iter().map(|one| one.about());
     all.flat_map(|about| {

@@ -81,7 +81,7 @@ impl RlsFir {
         for k in 0..e.len() {
             regressors.rotate_right(1);
             regressors[0] = e[k];
-            // What was before the record is not known: the regressors are whole from here on.
+            // The signals before the record are not known: the regressors are complete from here on.
             if k + 1 >= self.nb {
                 equations.add(lambda, &regressors, &[u[k]]);
             }

@@ -32,7 +32,7 @@ settings! {
         /// Smallest factor of P
         #[setting(bounds(Bounds::UpTo(0.0, 1.0)))]
         pub least: f64 = 0.1,
-        /// Power of the ratio of what is not explained; 0 leaves P alone
+        /// Power of the ratio of the unexplained parts; 0 leaves P unchanged
         #[setting(bounds(Bounds::NonNegative))]
         pub power: f64 = 4.0,
     }

@@ -176,8 +176,8 @@ fn silence_and_samples_beyond_the_record_are_refused_by_all() {
 #[test]
 fn what_is_no_recursion_says_what_it_is_and_where_it_runs() {
     for (typed, words) in [
-        ("wavelet", "what was before"),
-        ("lpv", "lpv-subspace is no recursion"),
+        ("wavelet", "data after each time as before it"),
+        ("lpv", "lpv-subspace is not a recursion"),
         ("rls-fir", "--method rls --structure fir"),
         ("LPV-subspace", "the whole record"),
     ] {

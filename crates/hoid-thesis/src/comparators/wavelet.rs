@@ -55,7 +55,7 @@ impl Comparator for WaveletRatio {
             name: NAME,
             help: "ratio of the wavelet transforms of u and e at the lines",
             source: "Thompson et al. 2004",
-            told: "the lines of the forcing function; as much of anything after as of what was before",
+            told: "the lines of the forcing function; as much data after each time as before it",
         }
     }
 

@@ -2,7 +2,7 @@
 //!
 //! The recordings of the text are of three subjects in a simulator and are not public. Its procedure can be applied to
 //! virtual people with known parameters: three different subjects, seven runs in each of C1 to C6, of which the last
-//! five are evaluated; and to recordings of one's own. For each run ([`procedure`]):
+//! five are evaluated; and to the user's own recordings. For each run ([`procedure`]):
 //!
 //! 1. Batch fits of the first and the last three eighths, [0, 30.72] and [51.20, 81.92] s of the text, ARX by OLS and
 //!    BJ(m* = 1) by PEM, with every delay of a range. In each span the delay with the highest VAF is the best; the

@@ -212,7 +212,7 @@ fn of_text(name: &str, facts: &ConditionSettings) -> Result<Condition, String> {
     }
 }
 
-/// Whether an element is like a double integrator near the crossover, as s2.
+/// Whether an element resembles a double integrator near the crossover, like s2.
 fn is_double(element: &str) -> Result<bool, String> {
     let element: ContinuousTransferFunction = element.parse().map_err(|error| format!("{error}"))?;
     let step = 1e-3_f64;

@@ -27,7 +27,7 @@ pub(super) fn items() -> Vec<Item> {
             all.push(Item::of_study(
                 format!("H.{}-average", 2 * i + k + 1),
                 format!("Average and median of recursive estimates, {what} parameters, condition {condition}, P_n = {LEVEL}"),
-                "Average (dark) over the runs at each time, as the text has it, and median (light). An ordinate that hides the average cuts it.",
+                "Average (dark) over the runs at each time, as in the text, and median (light). The average is cut where it exceeds the range of the ordinate.",
                 "recursive",
                 move |item, results| make(item, results, condition, rows),
             ));

@@ -34,7 +34,7 @@ pub struct StudyEntry {
     pub directory: String,
     /// Number of estimates.
     pub estimates: u64,
-    /// Duration, s; none if the study already existed.
+    /// Duration, s; `None` if the study already existed.
     pub seconds: Option<f64>,
 }
 

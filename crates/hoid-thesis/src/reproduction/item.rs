@@ -8,7 +8,7 @@ use hoid_study::Results;
 use super::table_builder::TableBuilder;
 use crate::ThesisError;
 
-/// Name of the claims among tables and figures.
+/// Name that selects the claims, among those of the tables and figures.
 pub const CLAIMS: &str = "claims";
 
 /// Results of the named plans, by name.
@@ -38,12 +38,12 @@ type MakeRuns = Arc<dyn Fn(&Watch<'_>) -> Result<Vec<String>, ThesisError> + Sen
 pub(super) struct Watch<'a> {
     /// Called with a number of completed estimates.
     pub done: &'a (dyn Fn(u64) + Sync),
-    /// Whether it goes on.
+    /// Whether the reproduction continues.
     pub goes_on: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl Watch<'_> {
-    /// Nothing follows it, and it goes on.
+    /// No output, and the reproduction continues.
     pub const NONE: Watch<'static> = Watch {
         done: &|_| (),
         goes_on: &|| true,
@@ -58,7 +58,7 @@ pub struct Item {
     pub title: String,
     /// Notes for the reader.
     pub caption: String,
-    /// The plan whose results it shows; none if nothing is simulated.
+    /// The plan whose results it shows; `None` if nothing is simulated.
     pub plan: Option<&'static str>,
     pub(super) shared: Option<SharedRuns>,
     make: Maker,
@@ -76,7 +76,7 @@ type Drawing<G> = fn(&str, &str, &G) -> String;
 /// The figure and the numbers of an item.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ItemOutput {
-    /// The figure; none for a table.
+    /// The figure; `None` for a table.
     pub svg: Option<String>,
     /// Its numbers, or the table itself.
     pub data: OutputTable,

@@ -57,7 +57,7 @@ fn item(name: String, condition: &'static str, m0: usize, shown: Shown) -> Item 
             "Mean of VAF (eq. 39, simulated output) over the runs",
         ),
         Shown::VafDifference => (
-            "VAF of Box-Jenkins less that of ARX models",
+            "VAF of Box-Jenkins minus that of ARX models",
             "Mean of the difference (eq. 40) over the runs, both models with the same delay",
         ),
         Shown::Bias => (

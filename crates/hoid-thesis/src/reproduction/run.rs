@@ -37,9 +37,9 @@ pub struct Reproduction {
     pub only: Vec<String>,
     /// Replications of each cell.
     pub replications: u64,
-    /// Number of threads; none for one per core.
+    /// Number of threads; `None` for one per core.
     pub jobs: Option<usize>,
-    /// Directory or manifest of recorded people: their experiment takes the place of everything else.
+    /// Directory or manifest of recorded people: their experiment replaces everything else.
     pub recordings: Option<PathBuf>,
 }
 
@@ -81,7 +81,7 @@ pub struct ReproductionSummary {
     pub drawn_s: f64,
 }
 
-/// Runs the reproduction in a directory; none if `goes_on` has stopped it, in which case a further
+/// Runs the reproduction in a directory; `None` if `goes_on` has stopped it, in which case a further
 /// call continues.
 ///
 /// # Errors
@@ -256,7 +256,7 @@ fn test_claims(studies: &Studies, index: &mut IndexPage, directory: &Path) -> Re
     Ok(index.tally())
 }
 
-/// Runs a named plan, or reads its existing results; none if it was stopped.
+/// Runs a named plan, or reads its existing results; `None` if it was stopped.
 fn study(
     named: &NamedPlan,
     wanted: &Reproduction,

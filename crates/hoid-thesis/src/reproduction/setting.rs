@@ -51,14 +51,14 @@ pub(super) fn items() -> Vec<Item> {
         Item::new(
             "fig-3",
             "Power spectrum of the forcing function",
-            "One-sided power of each sinusoid, A^2/2, at its frequency: the spectrum has nothing in between.",
+            "One-sided power of each sinusoid, A^2/2, at its frequency: the spectrum is zero in between.",
             None,
             |item, _| spectrum(item),
         ),
         Item::new(
             "fig-4",
             "Error gain K_e in conditions C1 to C6",
-            "Conditions that share their states lie on each other before and after the change, so that slow and fast ones are in panels of their own.",
+            "Conditions that share their states lie on each other before and after the change, so that slow and fast ones are in separate panels.",
             None,
             |item, _| schedules(item),
         ),

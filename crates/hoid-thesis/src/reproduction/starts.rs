@@ -14,10 +14,12 @@ pub(super) fn items() -> Vec<Item> {
         .map(|start| {
             Item::of_study(
                 format!("F.{start}"),
-                format!("Bias from start IC{start} less that from the base start, Box-Jenkins with m* = m0, condition C1"),
-                "Deviation of the relative bias of each run from that of the same run searched from the base of Table 6.1, in percentage \
-                 points. A line at zero: both searches found the same minimum, except for the tolerance of the search. Above each panel stands \
-                 the largest deviation of its runs.",
+                format!(
+                    "Bias from start IC{start} minus that from the base start, Box-Jenkins with m* = m0, condition C1"
+                ),
+                "Deviation of the relative bias of each run from that of the same run searched from the base of Table \
+                 6.1, in percentage points. A line at zero: both searches found the same minimum, except for the \
+                 tolerance of the search. The largest deviation of its runs is given above each panel.",
                 "initial-conditions",
                 move |item, results| make(item, results, start),
             )

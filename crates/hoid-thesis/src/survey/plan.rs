@@ -35,7 +35,7 @@ impl SurveyPlan {
             .map_err(|error: toml::de::Error| wrong("its table", error.message().to_owned(), "TOML".to_owned()))?;
         if let Some(key) = table.keys().find(|key| *key != "comparators") {
             return Err(wrong(
-                "a key next to it",
+                "another key",
                 key.clone(),
                 "[[comparators]] alone".to_owned(),
             ));

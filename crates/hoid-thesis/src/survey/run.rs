@@ -30,7 +30,7 @@ pub struct MethodErrors {
     pub cell: u64,
     /// Name of the method in the plan.
     pub name: String,
-    /// Information used in addition to e and u; empty for none.
+    /// Information used in addition to e and u; empty if there is none.
     pub told: &'static str,
     /// Errors by run; the reason if the method failed.
     pub runs: Vec<Result<Errors, String>>,

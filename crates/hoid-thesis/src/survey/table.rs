@@ -90,7 +90,7 @@ pub fn survey_tables(plan: &SurveyPlan, found: &[MethodErrors]) -> String {
         .map(|(name, of)| format!("- *{name}*: {}.", of.about().told))
         .collect();
     format!(
-        "{text}\n\\* is reported more than e, u and n_k:\n\n{}\n{each}",
+        "{text}\n\\* needs more than e, u and n_k:\n\n{}\n{each}",
         told.join("\n")
     )
 }

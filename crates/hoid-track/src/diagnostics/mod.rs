@@ -2,8 +2,8 @@
 //!
 //! A trace depends on its start and on its rows. All findings of [`hoid_ident::diagnostics`] about the start fit
 //! count, as doubts at most: the recursion may leave it. A change inside the start span is a note for methods that
-//! forget and a doubt for the others. Of the rows in which the estimate moves, at most [`ROWS`] are examined, at equal
-//! distances:
+//! forget and a doubt for the others. Of the rows in which the estimate is updated, at most [`ROWS`] are examined, at
+//! equal distances:
 //!
 //! | kind | observation |
 //! |---|---|
@@ -35,10 +35,10 @@
 //! | `no-answer` | e does not answer to u |
 //! | `not-finite` | an estimate that is not a number |
 //!
-//! `operators` judges the operators of the rows, `recording` what the guard, the head and the end of the record show,
-//! `structure` the form of the operator, `steadiness` whether it is the same throughout, `moment` one sample. Where the
-//! response is known at the end, a gain and a lead that are open, or a lead below zero, are notes: they are one way to
-//! report the response, which may not be theirs.
+//! `operators` judges the operators of the rows, `recording` the actions of the guard and the head and end of the
+//! record, `structure` the form of the operator, `steadiness` its constancy, and `moment` a single sample. If the
+//! response is known at the end, a gain and a lead that are undetermined, or a lead below zero, give only notes: gain
+//! and lead are one description of the response, which may have another form.
 
 mod moment;
 mod operators;
@@ -124,8 +124,8 @@ impl Trace {
                 all.push(Finding::doubt(
                     "start-explains-little",
                     format!(
-                        "the start fit explains {vaf:.0} % of u (VAF of the simulation, expected {LEAST_START_VAF:.0} % or more); \
-                         take a longer span, or another"
+                        "the start fit explains {vaf:.0} % of u (VAF of the simulation, expected {LEAST_START_VAF:.0} \
+                         % or more); use a longer span, or another"
                     ),
                 ));
             }
@@ -148,16 +148,16 @@ impl Trace {
             Finding::note(
                 "supposed",
                 format!(
-                    "{} at the end: not determined by the record, what is there is the prior before it, or one of \
-                     several that predict u as well",
+                    "{} at the end: not determined by the record; the value is that of the prior, or one of several \
+                     that predict u equally well",
                     open.join(", ")
                 ),
             )
         })
     }
 
-    /// Rows in which the estimate moves, at equal distances, including the last. A method that starts itself has no
-    /// estimate before its first one.
+    /// Rows in which the estimate is updated, at equal distances, including the last. A method that starts by itself
+    /// has no earlier estimate.
     fn rows_judged(&self) -> Vec<usize> {
         let from = self.updated_from_s() - self.sample_time().s() / 2.0;
         let mut first = self.times_s().partition_point(|t| *t < from);
@@ -189,7 +189,7 @@ impl Trace {
             .filter_map(|(i, name)| Some((name, grown(i)?)))
             .max_by(|a, b| a.1.total_cmp(&b.1))?;
         let remedy = match self.options().method.memories() {
-            Some(_) => " for the memory in use; take a longer one",
+            Some(_) => " for the memory in use; use a longer one",
             None => "",
         };
         Some(Finding::doubt(
@@ -208,7 +208,7 @@ impl Trace {
             let share = 100.0 * counts.skipped as f64 / samples;
             all.push(Finding::doubt(
                 "faults",
-                format!("{share:.0} % of the samples are faults in e or u, at which the estimate stays"),
+                format!("{share:.0} % of the samples are faults in e or u, at which the estimate is held"),
             ));
         }
         let last = self.times_s().last().copied().unwrap_or(f64::NAN);
@@ -222,8 +222,8 @@ impl Trace {
             all.push(Finding::doubt(
                 "steps-shortened",
                 format!(
-                    "{:.0} % of the steps were made shorter to stay stable or within bounds: the estimate is not where the data \
-                     want it",
+                    "{:.0} % of the steps were shortened to stay stable or within bounds: the estimate is not where \
+                     the data would put it",
                     100.0 * counts.shortened as f64 / moved
                 ),
             ));

@@ -89,7 +89,7 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
             all.push(Finding::doubt(
                 "delay-at-bound",
                 format!(
-                    "in {:.0} % of the rows the delay rests at an end of its range {low} to {high} s; widen it",
+                    "in {:.0} % of the rows the delay is at an end of its range {low} to {high} s; widen it",
                     100.0 * at_end
                 ),
             ));
@@ -107,7 +107,7 @@ fn sign_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
         Finding::doubt(
             "gain-sign",
             format!(
-                "K_e is positive in {:.0} % of the rows and negative in {:.0} %: look whether the sign of e or u changes",
+                "K_e is positive in {:.0} % of the rows and negative in {:.0} %: check whether the sign of e or u changes",
                 100.0 * positive,
                 100.0 * negative
             ),
@@ -122,9 +122,9 @@ fn lead_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
         Finding::doubt(
             "negative-lead",
             format!(
-                "the lead T_L is negative in {:.0} % of the rows, by two standard errors of K_e and of K_e_dot: a gain and a \
-                 lead are not the form of this person, who may have a lag; K_e, T_L and K_e_dot are none of their parameters \
-                 then, only the response is theirs (hoid identify finds the form)",
+                "the lead T_L is negative in {:.0} % of the rows, by two standard errors of K_e and of K_e_dot: this \
+                 person does not have the form of a gain and a lead and may have a lag; K_e, T_L and K_e_dot are then \
+                 not parameters of the person, only the response is valid (hoid identify finds the form)",
                 100.0 * negative
             ),
         )
@@ -151,7 +151,7 @@ fn gains_over_rows(rows_with: &ShareOfRows<'_>, remembers: bool) -> Option<Findi
     let no_gain = rows_with(&|o| is_open(&o.k_e) && !is_open(&o.k_e_dot));
     let no_lead = rows_with(&|o| is_open(&o.k_e_dot) && !is_open(&o.k_e));
     if no_gain > MOST {
-        let remedy = if remembers { "; take a longer memory" } else { "" };
+        let remedy = if remembers { "; use a longer memory" } else { "" };
         return Some(Finding::doubt(
             "undetermined-parameter",
             format!(
@@ -164,8 +164,8 @@ fn gains_over_rows(rows_with: &ShareOfRows<'_>, remembers: bool) -> Option<Findi
         Finding::note(
             "undetermined-parameter",
             format!(
-                "in {} of the rows no lead is distinguished from zero, and the gain is: they answer like a gain, and T_L and K_e_dot are \
-                 none of their parameters",
+                "in {} of the rows the gain differs from zero by two standard errors and the lead does not: the person \
+                 responds as a gain, and T_L and K_e_dot are not parameters of the person",
                 percent(no_lead)
             ),
         )

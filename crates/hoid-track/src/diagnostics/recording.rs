@@ -1,5 +1,5 @@
-//! Findings of the recording about a trace: what the guard did, an idle head, and whether the last row follows the
-//! last seconds.
+//! Findings of the recording about a trace: the actions of the guard, an idle head, and whether the last row agrees
+//! with the last seconds.
 
 use hoid_ident::diagnostics::{is_open, leads_backwards, operator_step};
 use hoid_model::{Finding, Record};
@@ -48,7 +48,7 @@ impl Trace {
         let steps = of(&|f| f.kind == GuardKind::Step);
         if !steps.is_empty() {
             let words = format!(
-                "{} jumps that stayed, taken as they came ({})",
+                "{} lasting jumps, used as recorded ({})",
                 steps.len(),
                 named(&steps)
             );
@@ -98,12 +98,12 @@ impl Trace {
     }
 
     /// Compares the last seconds of the record with the last row: the delay may have changed, or the estimate may not
-    /// have come back. A finding is a step of [`operator_step`] that is [`UNLIKELY`], given its own error and that of
+    /// have returned. A finding is a step of [`operator_step`] that is [`UNLIKELY`], given its own error and that of
     /// the row; for a delay in whole samples, a step beyond one and a half samples.
     pub(super) fn not_followed(&self, record: &Record) -> Option<Finding> {
         let row = self.len().checked_sub(1)?;
         let operator = self.operator(row).ok()?;
-        // Gain and lead that approximate another form have another response than the estimate.
+        // Gain and lead that approximate another form have a response other than that of the estimate.
         if self.response_is_known && (is_open(&operator.k_e) || leads_backwards(&operator)) {
             return None;
         }
@@ -135,8 +135,8 @@ impl Trace {
                 let p_value = step.p_value(own.unwrap_or(0.0), grid);
                 if p_value < UNLIKELY && worst.as_ref().is_none_or(|(known, _)| p_value < *known) {
                     let words = format!(
-                        "the last {length:.0} s ask for another {name} than the last row, by {}: the person changed in a way \
-                         that the estimate does not follow, or it has not come back; start it again there",
+                        "the last {length:.0} s require a {name} that differs from the last row by {}: the person \
+                         changed in a way that the estimate does not follow, or it has not recovered; restart it there",
                         step.by
                     );
                     worst = Some((p_value, words));
@@ -166,8 +166,8 @@ impl Trace {
             Finding::doubt(
                 "many-changes",
                 format!(
-                    "{changes} changes are declared in {length:.0} s: a person who changes so often is rare, a remnant that grows \
-                     with the error, gaps that were filled and steps of a sensor are not; look at e and u there"
+                    "{changes} changes are declared in {length:.0} s: people rarely change so often, but a remnant \
+                     that grows with the error, filled gaps and steps of a sensor are common; look at e and u there"
                 ),
             )
         })

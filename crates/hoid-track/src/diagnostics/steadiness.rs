@@ -66,7 +66,7 @@ impl Trace {
     }
 
     /// Finding of a response that varies otherwise than the trace reports. A method that forgets, or that models how
-    /// people drift, does not assume that they are constant between changes.
+    /// people drift, does not assume a constant person between changes.
     pub(super) fn unsteady_finding(&self, record: &Record) -> Option<Finding> {
         self.options().method.lag_of_basis_s()?;
         let unlikely = |found: &Unsteady| match found.course {
@@ -96,12 +96,12 @@ impl Trace {
             ),
             Course::Sway(period) => (
                 "swaying",
-                format!("their {name} sways by {size} with a period of about {period:.0} s (p = {p:.0e})"),
+                format!("their {name} oscillates by {size} with a period of about {period:.0} s (p = {p:.0e})"),
             ),
         };
         Some(Finding::doubt(
             kind,
-            format!("{words}; bands hold what is the same throughout, and are too narrow here"),
+            format!("{words}; the bands assume a constant person and are too narrow here"),
         ))
     }
 
@@ -116,8 +116,8 @@ impl Trace {
         Some(Finding::doubt(
             "no-answer",
             format!(
-                "e does not answer to u, as it does in a loop (the latest u explains {:.1} % of what is new in e): look whether u and e \
-                 are of the same run",
+                "e does not respond to u, as it does in a loop (the latest u explains {:.1} % of the innovations of \
+                 e): check whether u and e are from the same run",
                 100.0 * found.share
             ),
         ))

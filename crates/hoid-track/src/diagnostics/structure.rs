@@ -2,8 +2,8 @@
 //!
 //! The basis of people can estimate the numerator, corrections of the poles and of the delay, and a level; together
 //! they span the six signals of its filter. The last of these filtered once more by the lag gives a correction of the
-//! lag, for the case that only the lag is wrong. The test asks whether earlier errors, since the last change, carry
-//! more information about u ([`hoid_ident::diagnostics::residual_response()`]).
+//! lag, in case only the lag is wrong. The test asks whether earlier errors, since the last change, carry more
+//! information about u ([`hoid_ident::diagnostics::residual_response()`]).
 
 use hoid_core::adaptive::basis::{Basis, Point, Signals};
 use hoid_ident::diagnostics::{ResidualResponse, residual_response};
@@ -29,9 +29,9 @@ impl Trace {
             Finding::doubt(
                 "structure",
                 format!(
-                    "structure missed: the errors before carry more information about u than the operator at the end does, with any gains \
-                     and corrections (p = {:.1e}, {:.1} % of the innovations); its parameters are those of the nearest \
-                     person that the method knows",
+                    "structure missed: past errors explain more of u than the final operator does, with any gains and \
+                     corrections (p = {:.1e}, {:.1} % of the innovations); its parameters are those of the nearest \
+                     person that the method can represent",
                     found.p_value,
                     100.0 * found.share
                 ),

@@ -124,7 +124,7 @@ impl Guard {
     }
 }
 
-/// Returns the kind and the channel of a trouble.
+/// Returns the kind and the channel of a fault.
 fn named(trouble: Trouble) -> (GuardKind, usize) {
     match trouble {
         Trouble::FrozenInput => (GuardKind::Frozen, 0),

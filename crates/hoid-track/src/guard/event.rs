@@ -46,11 +46,11 @@ pub enum GuardAction {
     Accepted,
     /// The estimate stays constant from here on.
     Paused,
-    /// The estimate, which had stayed constant, moves again.
+    /// The estimate, which had stayed constant, is updated again.
     Resumed,
-    /// The estimate moves again, from its state before the span.
+    /// The estimate is updated again, from its state before the span.
     Restarted,
-    /// The estimate moves again, from the start of the recursion.
+    /// The estimate is updated again, from the start of the recursion.
     Relearnt,
 }
 

@@ -1,4 +1,4 @@
-//! Held-back samples, and what happens to them afterwards: interpolated, or taken as recorded.
+//! Held-back samples, and their later treatment: interpolated, or taken as recorded.
 
 use hoid_core::guard::profile::CHANNELS;
 
@@ -78,7 +78,7 @@ impl Guard {
         }
     }
 
-    /// True for an excursion of u, ended by sample x at a place of the ring, that a hand can make: it leaves by a jump
+    /// True for an excursion of u, ended by sample x at an index of the ring, that a hand can make: it leaves by a jump
     /// and returns over several samples.
     fn is_pulse(&self, place: usize, held: u32, size: f64, x: f64, largest_move: f64) -> bool {
         let Some(last) = place.checked_sub(1).map(|k| self.ring[k].values[1]) else {
@@ -131,8 +131,7 @@ impl Guard {
                 ..sample
             };
             // e acts only after the delay, so that the current innovation does not contain it. A tenth of a second of
-            // interpolated u moves an estimate by less than stopping the clock of births of a bank of hypotheses for
-            // as long.
+            // interpolated u changes an estimate less than suspending the births of a bank of hypotheses for that time.
             outcome = Some(if raw.moves {
                 recursion.step(taken)
             } else {
@@ -186,7 +185,7 @@ impl Guard {
         }
         // e jumps with its target and moves as before, while the person responds only after the delay.
         let ring = &self.ring[..self.in_ring];
-        // More is held than there is only if the saved numbers were changed.
+        // More samples are held back than exist only if the saved numbers were changed.
         let first = self.in_ring.saturating_sub(held as usize);
         let behind = ring[first..].iter().map(|raw| raw.values[0]);
         let is_target = c == 0 && !ring.iter().any(|raw| raw.held[1]) && self.channels_before[0].moves_as_usual(behind);

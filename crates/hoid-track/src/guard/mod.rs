@@ -18,9 +18,9 @@
 //! step is within the normal moves of u, is a pulse and is taken as recorded.
 //!
 //! **Restoring.** The numbers of a recursion are few ([`hoid_core::state`]). They are stored when a sample is first
-//! held back, every [`SOUND_EVERY`] blocks without trouble (the last two are kept; the one that is older than the time
-//! in which the rules detect a trouble is used), and at the start. The ring of samples that may have to be taken again
-//! is [`LONGEST_S`] long. Memory is bounded, and nothing is allocated once the snapshots have their size.
+//! held back, every [`SOUND_EVERY`] blocks without a fault (the last two are kept; the one that is older than the time
+//! in which the rules detect a fault is used), and at the start. The ring of samples that may have to be taken again is
+//! [`LONGEST_S`] long. Memory is bounded, and nothing is allocated once the snapshots have their size.
 //!
 //! **Filters have settled** after the delay and [`SETTLE_S`]: the slowest poles of people's neuromuscular systems
 //! (omega zeta of 2 to 4 rad/s) leave less than 2 % after that time.
@@ -114,9 +114,9 @@ struct Pause {
     channel: usize,
     first: u64,
     size: f64,
-    /// True if the last block had a trouble.
+    /// True if a fault was found in the last block.
     bad_block: bool,
-    /// Number of consecutive samples without trouble.
+    /// Number of consecutive samples without a fault.
     good: u64,
     /// Number of samples of a larger level, of a misfit or of swapped channels.
     doubtful: u64,

@@ -8,9 +8,9 @@ use hoid_ident::{
 /// Whether a guard is in front of a recursion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GuardChoice {
-    /// It does.
+    /// A guard is in front of the recursion.
     Yes,
-    /// The samples reach the recursion as they come.
+    /// The samples reach the recursion unchanged.
     No,
 }
 
@@ -33,10 +33,10 @@ impl Value for GuardChoice {
 }
 
 settings! {
-    /// Whether samples and spans that no tracking makes are kept from the recursion.
+    /// Whether samples and spans that no tracking produces are kept from the recursion.
     pub struct GuardOptions {
-        /// Guard: outliers of e and u are held back, spans that no tracking makes are left out, and the estimate starts
-        /// again after them
+        /// Guard: outliers of e and u are held back, spans that no tracking produces are excluded, and the estimate
+        /// restarts after them
         #[setting(default("yes"))]
         pub guard: Option<GuardChoice> = None,
     }

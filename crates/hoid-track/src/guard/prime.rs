@@ -2,8 +2,8 @@
 //!
 //! For each mean of a block ([`hoid_core::guard::profile`]) the median over all blocks is taken, and for each
 //! difference the largest of three estimates of its 99 % quantile: its own, and those that follow from the 50 and 95 %
-//! quantiles for Gaussian errors. A few outliers in the span change neither; heavy tails count. Samples at which a
-//! signal stays constant are left out of the quantiles, as during a run ([`hoid_core::guard::channel`]); the rests of
+//! quantiles for Gaussian errors. A few outliers in the span change neither; heavy tails are included. Samples at which
+//! a signal stays constant are left out of the quantiles, as during a run ([`hoid_core::guard::channel`]); the rests of
 //! u are learnt too.
 
 use hoid_core::guard::{

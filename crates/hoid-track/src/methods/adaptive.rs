@@ -1,14 +1,14 @@
-//! The recursion in the basis that people share ([`hoid_core::adaptive`]) after the face of a recursion: the defaults
-//! for people, in seconds.
+//! The recursion in the basis that people share ([`hoid_core::adaptive`]), with the interface of a recursion and with
+//! defaults for people, in seconds.
 //!
 //! It needs no start fit: it starts with the defaults for people ([`hoid_core::adaptive::default`]). The delay starts
-//! at that of nk, .2 s where nothing is specified, and at half a sample more, for an error that is held.
+//! at that of nk (.2 s if nothing is specified), plus half a sample for an error that is held.
 //!
-//! **What is known of the person** before the first sample is `prior`: the default, next to nothing, some parameters,
-//! or an earlier fit, whose estimate and covariance it starts with (`starting_point`).
+//! **Prior knowledge of the person** before the first sample is set by `prior`: the default, almost none, some
+//! parameters, or an earlier fit, from whose estimate and covariance the recursion starts (`starting_point`).
 //!
-//! **What it reports.** The gain and lead that are nearest to the gains of the basis
-//! ([`AdaptiveFilter::operator`]). The polynomials are the hold of that, with the delay of nk.
+//! **Reported estimate.** The gain and lead that are nearest to the gains of the basis ([`AdaptiveFilter::operator`]).
+//! The polynomials are the hold of this operator, with the delay of nk.
 
 mod starting_point;
 
@@ -44,18 +44,18 @@ use crate::{
 settings! {
     /// Options of the recursion in the basis that people share.
     pub struct AdaptiveOptions {
-        /// False alarms in an hour that are accepted: a lower number finds fewer changes, later
+        /// Accepted false alarms per hour: a lower number detects fewer changes, and later
         #[setting(unit("1/h"), bounds(Bounds::PositiveFinite))]
         pub false_alarms: f64 = 1.0,
-        /// Standard deviations beyond which an innovation moves the estimate no further
+        /// Limit on innovations, in standard deviations
         #[setting(bounds(Bounds::Positive), default("8"))]
         pub limit: Option<f64> = None,
-        /// Time that is read again and again; 0 for a recursion that reads each sample once, as a microcontroller does
+        /// Length of the record that is read repeatedly; 0 for a recursion that reads each sample once, as on a
+        /// microcontroller
         #[setting(unit("s"), bounds(Bounds::NonNegative))]
         pub replay: f64 = defaults::REPLAYED_S,
-        /// Prior knowledge of the person before the first sample: population, none, NAME=CENTRE:SPREAD of omega_nm,
-        /// zeta_nm, tau_e, T_I (the spread is relative), or an earlier fit of them, a file that hoid identify --json
-        /// has printed
+        /// Prior knowledge of the person: population, none, NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_I
+        /// (relative spread), or an earlier fit (file of hoid identify --json)
         #[setting(default("population"))]
         pub prior: PersonPrior = PersonPrior::Population,
     }
@@ -69,7 +69,7 @@ impl RecursiveMethod for AdaptiveOptions {
     fn about(&self) -> About {
         About {
             name: "adaptive",
-            help: "gains in a basis that people share, with a noise model of its own; starts without a fit",
+            help: "gains in a basis common to people, with its own noise model; needs no start fit",
             source: "McRuer and Jex 1967; Magill 1965; Chow 1960; White 1980; the book, page The default tracker",
             structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
             defaults: &[],
@@ -109,8 +109,8 @@ impl RecursiveMethod for AdaptiveOptions {
             return Err(bad_option(
                 "the start of adaptive",
                 start.to_owned(),
-                "a prior in its place: it starts from the defaults for people, from next to nothing (prior = none) or from an \
-                 earlier fit of the person; rpem, physical and rls take a start",
+                "a prior in its place: it starts from the defaults for people, from almost no knowledge (prior = none) \
+                 or from an earlier fit of the person; rpem, physical and rls take a start",
             ));
         }
         Ok(())
@@ -135,7 +135,7 @@ impl RecursiveMethod for AdaptiveOptions {
 
     fn memory_as_text(&self) -> Option<String> {
         Some(format!(
-            "since the last change where nothing changes; a change is declared so that {} false alarm{} an hour may be expected",
+            "since the last change where nothing changes; a change is declared with {} expected false alarm{} per hour",
             self.false_alarms,
             if self.false_alarms == 1.0 { "" } else { "s" }
         ))
@@ -150,7 +150,7 @@ impl RecursiveMethod for AdaptiveOptions {
     }
 
     fn spread_before(&self) -> Option<[f64; DYNAMICS]> {
-        // What a fit determined is known, whatever the data show.
+        // Parameters that a fit determined are known, whatever the data show.
         let known = self.prior.fit().is_some();
         let StartingPoint { point, spread } = StartingPoint::of(&self.prior, 0.0, false, SampleTime::HUNDREDTH).ok()?;
         (!known).then_some([spread[0] * point.omega, spread[1] * point.zeta, spread[2]])
@@ -222,7 +222,7 @@ impl AdaptiveRecursion {
         Ok(made)
     }
 
-    /// True for a response of an estimate: that of no gains at all has no size in dB and no phase.
+    /// True for the response of an estimate: if all gains are zero, it has no size in dB and no phase.
     fn answers(&self, [re, im]: [f64; 2]) -> bool {
         self.model.has_started() && (re != 0.0 || im != 0.0)
     }
@@ -233,8 +233,8 @@ impl AdaptiveRecursion {
         self.reported.set_noise(self.model.d());
     }
 
-    /// K_e, K_e_dot, omega, zeta and tau before the last change, and by how much they changed: by nothing
-    /// for what did not.
+    /// K_e, K_e_dot, omega, zeta and tau before the last change, and the amounts by which they changed: zero for those
+    /// that did not.
     fn of_change(&self) -> [[Estimate; PARAMETERS]; 2] {
         let detector = self.model.detector();
         let map = self.model.gain_and_lead();
@@ -267,7 +267,7 @@ impl AdaptiveRecursion {
 
 fn unusable(what: &str) -> IdentError {
     IdentError::BadStart {
-        reason: format!("the basis of people cannot be made for {what}; check nk and the sample time"),
+        reason: format!("the basis cannot be computed for {what}; check nk and the sample time"),
     }
 }
 
@@ -347,7 +347,7 @@ impl Recursion for AdaptiveRecursion {
             Some(error) if error > 0.0 => by[i].value / error,
             _ => 0.0,
         };
-        // What did not change is what it was.
+        // Parameters that did not change keep their values.
         let new = |i: usize| match by[i].value == 0.0 {
             true => old[i],
             false => Estimate {

@@ -126,7 +126,7 @@ impl Method {
             false => Err(bad(
                 "prior",
                 source,
-                "the method adaptive, which alone starts with a fit",
+                "the method adaptive, the only one that starts with a fit",
             )),
         }
     }

@@ -28,7 +28,7 @@ settings! {
 
 /// The default of the guard against windup, as text.
 const WINDUP_GUARD: &str =
-    "off for arx with a covariance and exponential forgetting (the text's recursion), else as for physical";
+    "off for arx with a covariance and exponential forgetting (the recursion of the thesis), else as for physical";
 
 impl RecursiveMethod for RlsOptions {
     fn about(&self) -> About {
@@ -46,7 +46,7 @@ impl RecursiveMethod for RlsOptions {
         }
     }
 
-    /// The text's 256 samples at 100 Hz.
+    /// The 256 samples of the thesis at 100 Hz.
     fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Seconds(2.56)
     }
@@ -59,7 +59,7 @@ impl RecursiveMethod for RlsOptions {
         Err(bad(
             "the structure of rls",
             format!("{} with {o}", setup.structure),
-            "arx or fir; take rpem for structures with C, D or F",
+            "arx or fir; use rpem for structures with C, D or F",
         ))
     }
 
@@ -76,7 +76,7 @@ impl RecursiveMethod for RlsOptions {
         Some(&self.gain)
     }
 
-    /// Off under the settings of the text, which has ARX models.
+    /// Off with the settings of the thesis, which has ARX models.
     fn windup_guard(&self, structure: Structure) -> Option<WindupGuard> {
         match structure {
             Structure::Arx => self.gain.windup_guard(self.limit()),
@@ -88,7 +88,7 @@ impl RecursiveMethod for RlsOptions {
         self.guard.guard
     }
 
-    /// None, as in the text.
+    /// None, as in the thesis.
     fn limit(&self) -> f64 {
         self.gain.limit_or(f64::INFINITY)
     }

@@ -52,7 +52,7 @@ impl RecursiveMethod for RpemOptions {
                 ("guard", "no"),
                 (
                     "windup_guard",
-                    "off for bj with a covariance, exponential forgetting and limit inf (the text's recursion), else as for physical",
+                    "off for bj with a covariance, exponential forgetting and limit inf (the recursion of the thesis), else as for physical",
                 ),
             ],
         }
@@ -67,7 +67,7 @@ impl RecursiveMethod for RpemOptions {
             Some(_) if !setup.structure.has_input() => Err(bad(
                 "the range of the delay",
                 format!("with {}, which has no input", setup.structure),
-                "a structure with an input, as bj",
+                "a structure with an input, such as bj",
             )),
             _ => Ok(()),
         }
@@ -90,7 +90,7 @@ impl RecursiveMethod for RpemOptions {
         Some(&self.gain)
     }
 
-    /// Off under the settings of the text, which has Box-Jenkins models.
+    /// Off with the settings of the thesis, which has Box-Jenkins models.
     fn windup_guard(&self, structure: Structure) -> Option<WindupGuard> {
         match structure {
             Structure::BoxJenkins => self.gain.windup_guard(self.limit()),

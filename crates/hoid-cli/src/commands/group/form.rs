@@ -36,9 +36,9 @@ impl Finished<'_> {
             let in_loop: Vec<usize> = (0..table.parameters).chain([last]).collect();
             let parameters: Vec<usize> = [0, 1].into_iter().chain(table.parameters..last).collect();
             page.push_str(&format!(
-                "\nOperators, each of all runs of a person in a condition\n{}\n{}\n\
-                 Value \u{b1} standard error by the scatter between runs. What the data do not determine is in \
-                 parentheses, or beyond a bound (> is a limit of 95 %). In brackets: intervals of 95 %, Student's.\n",
+                "\nOperators, each from all runs of a person in a condition\n{}\n{}\n\
+                 Value \u{b1} standard error from the scatter between runs. Values that the data do not determine are \
+                 in parentheses, or beyond a bound (> is a limit of 95 %). In brackets: Student's 95 % intervals.\n",
                 columns_of(&table, &in_loop),
                 columns_of(&table, &parameters),
             ));
@@ -51,7 +51,7 @@ impl Finished<'_> {
         } else if let Some(first) = self.pages.first() {
             let count = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
             page.push_str(&format!(
-                "Report: {first}; {} and {} next to it, named by -v.\n",
+                "Report: {first}; {} and {} in the same directory, listed with -v.\n",
                 count(self.pages.len() - 1, "page"),
                 count(self.tables.len(), "table")
             ));

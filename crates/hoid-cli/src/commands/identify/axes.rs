@@ -9,7 +9,7 @@ use crate::{args::IdentifyArgs, commands::reading, error::CliError, json, output
 pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let ResolvedRequest::Operator(identification) = request::asked(args)? else {
         return Err(CliError::Usage(
-            "--pair belongs to the structure operator, without --noise remnant and --change sigmoid".to_owned(),
+            "--pair is for the structure operator, without --noise remnant and --change sigmoid".to_owned(),
         ));
     };
     let others = [
@@ -20,7 +20,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     ];
     if let Some((_, option)) = others.into_iter().find(|(given, _)| *given) {
         return Err(CliError::Usage(format!(
-            "{option} belongs to one axis: give --input and --output"
+            "{option} applies to one axis: give --input and --output"
         )));
     }
     check_axes(&identification, &args.pair).map_err(CliError::of_options)?;

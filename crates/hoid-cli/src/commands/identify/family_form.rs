@@ -172,8 +172,8 @@ impl FamilyReport<'_> {
         let named = fit.operator(0).parameters.iter().find(|p| p.name == "tau_e");
         let Some((tau, straight)) = named.zip(fit.delay_if_straight_s(0)) else {
             return match fit.intersample {
-                Intersample::Zoh => "tau_e is that of an error that is held between its samples.\n".to_owned(),
-                _ => "tau_e is that of an error that runs straight between its samples.\n".to_owned(),
+                Intersample::Zoh => "tau_e applies to an error that is held between its samples.\n".to_owned(),
+                _ => "tau_e applies to an error that is linear between its samples.\n".to_owned(),
             };
         };
         let half = straight - tau.value;
@@ -181,8 +181,8 @@ impl FamilyReport<'_> {
             return String::new();
         }
         format!(
-            "tau_e is that of an error that is held for a sample; of one that was logged from what is faster or continuous it is {} s \
-             (--intersample foh).\n",
+            "tau_e applies to an error that is held for a sample; for one that was logged from a faster or continuous \
+             signal it is {} s (--intersample foh).\n",
             text::significant(straight)
         )
     }
@@ -216,7 +216,7 @@ impl FamilyReport<'_> {
         match all.as_slice() {
             [] => String::new(),
             all => format!(
-                "Errors are those of {runs}. For the person, whose gain varies by some {:.0} % beyond: {}.\n",
+                "The errors apply to {runs}. For the person, whose gain varies by a further {:.0} % or so: {}.\n",
                 100.0 * fit.run_to_run,
                 all.join(", ")
             ),
@@ -255,7 +255,7 @@ impl FamilyReport<'_> {
             if fit.lines.is_some() {
                 let at_lines = fit.loop_measures_at_lines(element);
                 page.push_str(&format!(
-                    "Open loop by the fit at the lines: {}\n",
+                    "Open loop from the fit at the lines: {}\n",
                     measures(at_lines.as_ref())
                 ));
             }
@@ -310,7 +310,8 @@ impl FamilyReport<'_> {
             ClusterKind::Blocks => format!("{} blocks of the records", fit.clusters),
         };
         page.push_str(&format!(
-            "Errors by the scatter of {clusters}: variances {:.2} times those of white residuals. Intervals of 95 %, Student's.\n",
+            "Errors from the scatter of {clusters}: variances {:.2} times those of white residuals. Student's 95 % \
+             intervals.\n",
             fit.inflation
         ));
         let quality = self.identified.quality()?;

@@ -144,7 +144,8 @@ impl SigmoidReport<'_> {
         page.push_str(&interval("G", "1/s", fit.rate_interval()));
         let c = fit.comparison();
         page.push_str(&format!(
-        "Against the operator that does not change: 2 ln of the likelihood ratio {:.1} for {} parameters more, BIC {} by {:.1}.\n",
+        "Compared with the operator that does not change: 2 ln of the likelihood ratio {:.1} for {} more parameters, \
+         BIC {} by {:.1}.\n",
         c.likelihood_ratio,
         c.extra_parameters,
         if c.bic_difference > 0.0 { "lower" } else { "higher" },
@@ -184,8 +185,9 @@ impl SigmoidReport<'_> {
             }
             if coloured {
                 page.push_str(
-                "They are not white: a noise model that is too small can pass for a change; try --orders nd=2 or more.\n",
-            );
+                    "They are not white: a noise model that is too small can look like a change; try --orders nd=2 or \
+                 more.\n",
+                );
             }
         }
         page.push_str(&text::settings(settings));

@@ -248,7 +248,7 @@ impl Columns {
                 reference: place("f_t"),
             }),
             (e, u) => Err(CliError::Stream(format!(
-                "the header has the columns {}, expected {}; choose by --input and --output{}",
+                "the header has the columns {}, expected {}; choose with --input and --output{}",
                 cells.join(", "),
                 self.names(),
                 self.hint(cells, (e.is_none(), u.is_none()))
@@ -429,7 +429,7 @@ mod tests {
             (Some(1.0), Some(2.0), 3.0, 4.0)
         );
         let message = |header: &str| default_columns().read(header).unwrap_err().to_string();
-        assert!(message("t,y,z").ends_with("choose by --input and --output"));
+        assert!(message("t,y,z").ends_with("choose with --input and --output"));
         assert!(message("t,err,Stick [V]").ends_with("--output, as --input \"err\" --output \"Stick [V]\""));
         assert!(message("t,e,stick").ends_with("--output, as --output \"stick\""));
         let mut alone = Columns::new("e", "u", false, 1e6);

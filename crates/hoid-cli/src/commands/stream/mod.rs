@@ -39,8 +39,8 @@ const PATIENCE: Duration = Duration::from_secs(1);
 pub fn run(args: &StreamArgs) -> Result<(), CliError> {
     if args.lsl_in.is_some() || args.lsl_out.is_some() {
         return Err(CliError::Usage(
-            "--lsl-in, --lsl-out: this program does without liblsl; streams of LabStreamingLayer are tracked in Python, by \
-             pyhoid.lsl.stream(IN, OUT, pyhoid.Tracker(sample_time=0.01)) (pip install \"pyhoid[lsl]\")"
+            "--lsl-in, --lsl-out: this program does not include liblsl; streams of LabStreamingLayer are tracked in \
+             Python, with pyhoid.lsl.stream(IN, OUT, pyhoid.Tracker(sample_time=0.01)) (pip install \"pyhoid[lsl]\")"
                 .to_owned(),
         ));
     }
@@ -49,12 +49,13 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
     let decimation = args.rate.of(asked.counts_samples());
     if asked.method.smooths() {
         return Err(CliError::Usage(
-            "--smooth belongs to hoid track: a stream has no future samples".to_owned(),
+            "--smooth is for hoid track: a stream has no future samples".to_owned(),
         ));
     }
     if args.warm_up.is_some() && asked.method.starts_itself() {
         return Err(CliError::Usage(format!(
-            "--warm-up is for a start fit, and {} has none: it speaks at once; drop it, or name --method physical",
+            "--warm-up is for a start fit, and {} has none: it estimates from the start; drop it, or choose --method \
+             physical",
             asked.method
         )));
     }
@@ -63,8 +64,8 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
     let plan = live.plan();
     if args.recursion.start.is_some() && !plan.is_settled() {
         return Err(CliError::Usage(
-            "--start leaves no warm-up to search nk and orders on; give --nk and --orders as single numbers, as --nk 29 \
-             --orders nd=1"
+            "--start leaves no warm-up to search nk and orders on; give --nk and --orders as single numbers, such as \
+             --nk 29 --orders nd=1"
                 .to_owned(),
         ));
     }

@@ -223,21 +223,21 @@ impl Session {
         };
         if let Some(hz) = other.filter(|_| self.rate.is_none()) {
             let words = format!(
-                "up to t = {t} s the times go at {hz:.4} Hz and --fs reports {fs} Hz: delay, lead and frequency of the estimate \
-                 are scaled by that; give the rate of the times to --fs, or correct t"
+                "up to t = {t} s the times run at {hz:.4} Hz, but --fs is {fs} Hz: delay, lead and frequency of the \
+                 estimate are scaled accordingly; give the rate of the times with --fs, or correct t"
             );
             warn(&words);
             self.rate = Some(Finding::doubt("sampling-rate", words));
         } else if hurried {
             warn(&format!(
-                "at t = {t} s the lines run ahead of --fs {fs}: t advances by less than {} s a line",
+                "at t = {t} s the lines run ahead of --fs {fs}: t advances by less than {} s per line",
                 self.sample_time.s()
             ));
         }
     }
 
-    /// Discards the innovation, which belongs to one sample: in a decimated stream the last one remains for several
-    /// lines.
+    /// Discards the innovation, which is that of a single sample: in a decimated stream the last one remains for
+    /// several lines.
     fn forget_innovation(&mut self) {
         if self.live.decimated().is_none() {
             self.innovation = None;
@@ -300,7 +300,7 @@ impl Session {
             fault,
             finding: self.rate.as_ref(),
         };
-        let unwritable = |e| CliError::Stream(format!("a line of the output cannot be made: {e}"));
+        let unwritable = |e| CliError::Stream(format!("a line of the output cannot be formatted: {e}"));
         standing.write(buffer).map_err(unwritable)
     }
 
@@ -309,8 +309,8 @@ impl Session {
         let c = self.counts;
         if c.samples == 0 && c.dropped > 0 {
             return Err(CliError::NotDetermined(format!(
-                "no line of the stream was a sample, {} dropped; expected e,u or t,e,u with decimal points, or an object of JSON; \
-                 what was wrong is in the lines of the output",
+                "no line of the stream was a sample, {} dropped; expected e,u or t,e,u with decimal points, or an \
+                 object of JSON; the errors are in the lines of the output",
                 text::counted(c.dropped, "line")
             )));
         }
@@ -326,7 +326,7 @@ impl Session {
     pub fn summary(&self) -> String {
         let c = self.counts;
         let mut text = format!(
-            "{} samples: {} skipped for a fault in e or u ({} of them missing), {} made shorter; {} dropped.",
+            "{} samples: {} skipped for a fault in e or u ({} of them missing), {} shortened; {} dropped.",
             c.samples,
             c.skipped,
             c.bridged,
@@ -335,7 +335,7 @@ impl Session {
         );
         if c.held > 0 || c.restarts > 0 {
             text.push_str(&format!(
-                " {} held back by the guard; the estimate was started again {}.",
+                " {} held back by the guard; the estimate was restarted {}.",
                 text::counted(c.held, "sample"),
                 text::counted(c.restarts, "time")
             ));

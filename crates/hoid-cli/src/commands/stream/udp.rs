@@ -36,7 +36,7 @@ impl Udp {
     pub fn bind(places: &UdpPlaces) -> Result<Self, CliError> {
         let socket = UdpSocket::bind(places.input).map_err(|error| {
             CliError::Stream(format!(
-                "{} cannot be listened on: {error}; is another stream there?",
+                "cannot listen on {}: {error}; is another stream using it?",
                 places.input
             ))
         })?;
@@ -44,7 +44,8 @@ impl Udp {
         if places.input.ip().is_unspecified() && places.input.port() == places.output.port() && own(places.output.ip())
         {
             return Err(CliError::Stream(format!(
-                "{} is an address of this computer, and answers there would come back as samples; name another port for them",
+                "{} is an address of this computer, and answers there would come back as samples; choose another port \
+                 for them",
                 places.output
             )));
         }

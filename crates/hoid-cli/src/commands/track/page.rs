@@ -90,7 +90,7 @@ fn covariance(tracked: &Tracked) -> String {
         rows.add_row(vec![format!("{p} I"), format!("{vaf:.2}"), taken.to_owned()]);
     }
     format!(
-        "\nStart covariance by what the trace explains of {file} ({:.2} to {:.2} s):\n{rows}\n",
+        "\nStart covariance by how much of {file} the trace explains ({:.2} to {:.2} s):\n{rows}\n",
         choice.span_s.0, choice.span_s.1
     )
 }
@@ -212,14 +212,14 @@ fn changes(tracked: &Tracked) -> String {
 fn counts(tracked: &Tracked) -> String {
     let c = tracked.trace.counts();
     let mut text = format!(
-        "{} samples; {} skipped for a fault in e or u; {} made shorter to stay stable or within bounds.\n",
+        "{} samples; {} skipped for a fault in e or u; {} shortened to stay stable or within bounds.\n",
         c.samples,
         c.skipped,
         text::counted(c.shortened, "step")
     );
     if c.held > 0 || c.restarts > 0 {
         text.push_str(&format!(
-            "{} held back by the guard; the estimate was started again {}.\n",
+            "{} held back by the guard; the estimate was restarted {}.\n",
             text::counted(c.held, "sample"),
             text::counted(c.restarts, "time")
         ));

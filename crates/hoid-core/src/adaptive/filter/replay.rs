@@ -1,11 +1,11 @@
 //! Replays: the recursion reads the stored record again and replaces the live candidate.
 //!
-//! Next to the live candidate a second one, the trial, reads the record from the start of the memory, [`REPLAYED`] samples
-//! per new sample, until it has caught up. It uses the basis at the current estimate, the noise model of the residuals,
-//! and the dispersion of the innovations. When it has caught up it becomes the live candidate, and the next trial starts.
-//! The estimate is therefore, a few seconds late, that of a prediction error method over all stored data, iterated as in a
-//! Gauss-Newton search (L. Ljung, *System Identification*, 1999, section 10.2), at a bounded cost per sample and with the
-//! same digits on every machine.
+//! In parallel with the live candidate, a second candidate, the trial, reads the record from the start of the memory,
+//! [`REPLAYED`] samples per new sample, until it has caught up. It uses the basis at the current estimate, the noise
+//! model of the residuals, and the dispersion of the innovations. When it has caught up it becomes the live candidate,
+//! and the next trial starts. The estimate is therefore, a few seconds late, that of a prediction error method over all
+//! stored data, iterated as in a Gauss-Newton search (L. Ljung, *System Identification*, 1999, section 10.2), at a
+//! bounded cost per sample and with the same digits on every machine.
 //!
 //! Every second trial starts at another point, against local minima. It is repeated [`STAGES`] times from its result, and
 //! replaces the live candidate only if its evidence is better by [`TAKEOVER_NATS`].

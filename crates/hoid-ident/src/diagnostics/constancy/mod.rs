@@ -9,22 +9,22 @@
 //! `r(t) = psi(t)' w(t)`, `w = v - a` in A and `-a` elsewhere, `a = G^-1 G_A v`
 //!
 //! and the statistic of the Lagrange multiplier (D. W. K. Andrews, *Econometrica* 61 (1993) 821-856) is
-//! `T = U / sqrt V`, `U = sum r eps`, whose sup over all A is judged. With blocks c and their `g_c = sum psi eps`,
+//! `T = U / sqrt V`, `U = sum r eps`, whose supremum over all A is tested. With blocks c and their `g_c = sum psi eps`,
 //! `G_c = sum psi psi'` everything follows from `h_c = w_c' g_c` and `R_c = w_c' G_c w_c`: `U = sum h_c`,
-//! `R = sum R_c`, and the change itself is `delta = U/R`. Exact information in A, and not a share of time, since no one
-//! is excited evenly.
+//! `R = sum R_c`, and the change itself is `delta = U/R`. The exact information in A is used instead of a share of
+//! time, since the excitation is not uniform in time.
 //!
-//! **V is the largest** of three. By the model, `sigma^2 R`. By the scatter of blocks of 2 s about
-//! the change that is tested, `sum (h_c - delta R_c)^2 n/(n-2)`, which holds whatever the residuals
-//! are within a block: the misfit of a person's remnant is correlated over some tenths of a second
-//! (K.-Y. Liang and S. L. Zeger, *Biometrika* 73 (1986) 13-22; about the change, since a change must
-//! not hide itself). And by the median of this scatter over all A, since that of a few blocks is
-//! small by chance at times. Between runs people vary: `share^2 size^2 sum_runs (r'psi'v)^2` is added.
+//! **V is the largest** of three. The first is that of the model, `sigma^2 R`. The second is the scatter of blocks of 2
+//! s about the tested change, `sum (h_c - delta R_c)^2 n/(n-2)`, which holds whatever the residuals are within a block:
+//! the misfit of a person's remnant is correlated over some tenths of a second (K.-Y. Liang and S. L. Zeger,
+//! *Biometrika* 73 (1986) 13-22; about the change, since a change must not mask itself). The third is the median of
+//! this scatter over all A, since the scatter of a few blocks may be small by chance. Between runs people vary:
+//! `share^2 size^2 sum_runs (r'psi'v)^2` is added.
 //!
-//! **Level.** T is held against Student's distribution with n - 2 degrees of freedom. The p-value of
-//! the sup is the smaller of Bonferroni's and of that of continuous time ([`critical`]); directions
-//! and records are counted. The delay and the other parameters are judged apart, each on the level
-//! [`LEVEL`]. Where the operator is known the directions are its parameters, else coefficients.
+//! **Level.** T is compared with Student's distribution with n - 2 degrees of freedom. The p-value of the sup is the
+//! smaller of Bonferroni's and of that of continuous time ([`critical`]); directions and records are counted. The delay
+//! and the other parameters are tested separately, each at the level [`LEVEL`]. If the operator is known the directions
+//! are its parameters, otherwise coefficients.
 //!
 //! | file | contents |
 //! |---|---|
@@ -83,8 +83,8 @@ impl Constancy<'_> {
         Some(Finding::doubt(
             "stretch",
             format!(
-                "the stretch from {:.0} s to {to}{record} carries the fit: without it {} standard errors elsewhere; look at \
-                 the recording there",
+                "the fit depends on the stretch from {:.0} s to {to}{record}: without it the estimate differs in {} \
+                 standard errors; look at the recording there",
                 time(found.from),
                 moves.join(", ")
             ),
@@ -102,7 +102,7 @@ impl Constancy<'_> {
             Finding::doubt(
                 "not-constant",
                 format!(
-                    "the person is not constant: {}; fit the parts apart, or take --change sigmoid or a tracker",
+                    "the person is not constant: {}; fit the parts separately, or use --change sigmoid or a tracker",
                     words.join(", and ")
                 ),
             )
@@ -113,7 +113,7 @@ impl Constancy<'_> {
         let at_s = change.at as f64 * self.sample_time_s;
         let place = match (records, change.at) {
             (0 | 1, _) => format!("about {at_s:.0} s after the start"),
-            (_, 0) => format!("in record {} next to the others", change.record + 1),
+            (_, 0) => format!("in record {} compared with the others", change.record + 1),
             _ => format!("about {at_s:.0} s after the start of record {}", change.record + 1),
         };
         format!(

@@ -7,9 +7,9 @@
 //!
 //! with the columns of J the directions that are tested (the jackknife of a group, to first order: B. Efron, *The
 //! Jackknife, the Bootstrap and Other Resampling Plans*, 1982, chapter 3). By chance a block of n moves a parameter by
-//! about `1/sqrt n` of its standard error. A block is reported if it moves a parameter by [`MOVED`] of them, and by as
-//! much relative to all the others together, `sqrt(sum delta^2)`: the sum of squares over all blocks is the variance of
-//! the estimate, and that block alone makes it several times the stated variance.
+//! about `1/sqrt n` of its standard error. A block is reported if it moves a parameter by [`MOVED`] standard errors,
+//! and by as much relative to all the other blocks together, `sqrt(sum delta^2)`: the sum of squares over all blocks is
+//! the variance of the estimate, and that block alone makes it several times the stated variance.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -91,7 +91,7 @@ fn a_run_unlike_the_others_is_named_and_equal_runs_are_not() {
     assert_eq!(not_constant(&box_jenkins(&records), &records), None);
     records.push(simulated(Condition::C2, 5));
     let words = not_constant(&box_jenkins(&records), &records).unwrap().message;
-    assert!(words.contains("in record 3 next to the others"), "{words}");
+    assert!(words.contains("in record 3 compared with the others"), "{words}");
 }
 
 /// Numbers between -1/2 and 1/2.

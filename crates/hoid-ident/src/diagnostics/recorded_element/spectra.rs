@@ -13,7 +13,7 @@ use crate::{
 const DISTURBANCES: [&str; 3] = ["d", "f_d", "disturbance"];
 /// Frequencies of the test, rad/s: those at which people move u.
 const BAND_RAD_S: (f64, f64) = (0.3, 12.0);
-/// Number of frequencies above which more of a record, and further records, add nothing.
+/// Number of frequencies that suffices: further samples of a record, and further records, are not used.
 pub(super) const MOST_FREQUENCIES: usize = 1000;
 
 /// Names of the channels that enter the loop from outside.

@@ -1,6 +1,6 @@
 //! Products of eps and the columns of psi, for one record in each lane.
 //!
-//! A column that is the previous one delayed by one sample needs no pass of its own: `sum x(t-1) y(t-1)` over a span is
+//! A column that is the previous one delayed by one sample needs no separate pass: `sum x(t-1) y(t-1)` over a span is
 //! `sum x(t) y(t)` except for the samples at both ends, as in [`crate::linalg::products`].
 
 use hoid_lanes::Number;

@@ -4,9 +4,9 @@
 //! `x_k h(t-k)` to w and subtracts `x_k g(t-k)` from the residuals. The columns `g(t-k)` over the residuals are
 //! orthogonalised by the Cholesky factor of their products, twice, as once leaves the rounding errors of nearly
 //! parallel columns (Y. Yamamoto et al., *Electronic Trans. Numerical Analysis* 44 (2015) 306-326). As they are shifts
-//! of one signal, the first matrix takes nf products. The criterion alone has an orthonormal basis by Gram and Schmidt
-//! ([`crate::criterion::initial_state_responses`]), the same except for rounding; it is used for a lane with dependent
-//! columns.
+//! of one signal, the first matrix takes nf products. The unbatched criterion computes an orthonormal basis by
+//! Gram-Schmidt ([`crate::criterion::initial_state_responses`]), which is the same except for rounding; it is used for
+//! a lane with dependent columns.
 
 use hoid_lanes::Number;
 

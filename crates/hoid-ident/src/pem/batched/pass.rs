@@ -7,12 +7,12 @@
 //!
 //! The columns of psi are shifts of `x_b`, `-v` and `-x_f`. A recursion over t has a latency per sample, which eight
 //! records in parallel hide. All signals of a span of samples are computed and multiplied before the next span, so that
-//! they remain in the first-level cache; only the record itself is read from further away. The first of these spans
+//! they remain in the first-level cache; only the record itself is read from slower memory. The first of these spans
 //! extends as far as the free responses do, because the initial states must be known before w is filtered again.
 //!
-//! Every operation acts on each lane separately, and samples that one lane needs longer than another are zero in the
-//! latter: the result of a lane is bitwise independent of the registers and of the other lanes. The sums over time have
-//! another order than those of the criterion alone: they differ from it by rounding.
+//! Every operation acts on each lane separately, and where one lane needs more samples than another, the shorter one is
+//! padded with zeros: the result of a lane is bitwise independent of the registers and of the other lanes. The sums
+//! over time are taken in a different order from the unbatched criterion and differ from it by rounding.
 
 use hoid_lanes::LaneTask;
 use hoid_lanes::Number;
@@ -108,7 +108,8 @@ impl LaneTask for Pass<'_> {
                 inside = states.components(zero, &columns, signals, counted);
                 columns.add_row(zero, signals, counted, 1.0, products);
             }
-            // In spans of the same samples whatever the length of the first: its length is that of the slowest lane.
+            // The later spans contain the same samples whatever the length of the first span, which is that of the
+            // slowest lane.
             let mut done = counted;
             while done < history + count {
                 let next = if done == counted && from == begin {

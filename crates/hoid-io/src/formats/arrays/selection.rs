@@ -3,7 +3,7 @@
 //! A name is a path (`data.run(3).e`), or its end if only one path has that end (`run(3).e`, or
 //! `e`); a path equal to the name takes precedence. `run(1).e` also matches the only element
 //! `run.e`. The time is `t`, or `time`, in the structure of the output or the nearest enclosing
-//! one. The other arrays next to the output become channels if they have the same length.
+//! one. The other arrays in the structure of the output become channels if they have the same length.
 
 use std::ops::Range;
 
@@ -125,7 +125,7 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
     }
     if !left_out.is_empty() {
         notes.push(format!(
-            "left out, for they are not columns of {rows} numbers: {}",
+            "left out, because they are not columns of {rows} numbers: {}",
             list(&left_out)
         ));
     }

@@ -36,7 +36,7 @@ pub(super) fn made_plain(bytes: &mut Vec<u8>) -> Vec<String> {
     let text = above.as_deref().unwrap_or(text);
     if let Some(tabs) = between_tabs(text) {
         *bytes = tabs.into_bytes();
-        notes.push(String::from("blanks divide its columns"));
+        notes.push(String::from("its columns are separated by blanks"));
     } else if let Some((lines, without)) = without_preamble(text) {
         *bytes = without.into_bytes();
         notes.push(format!("lines above the header are left out: {lines}"));
@@ -70,8 +70,7 @@ fn is_number(cell: &str) -> bool {
     )
 }
 
-/// Replaces blanks by tabs in a table separated by blanks, with as many words in the header as
-/// numbers in each line.
+/// Replaces blanks by tabs in a table separated by blanks, if the header has as many words as each line has numbers.
 fn between_tabs(text: &str) -> Option<String> {
     let mut lines = text.lines().filter(|line| !is_aside(line));
     let header = lines.next()?;
@@ -94,13 +93,13 @@ fn between_tabs(text: &str) -> Option<String> {
     })
 }
 
-/// Units by which a line of units is recognised; its others may be any short words.
+/// Units by which a line of units is recognised; its other entries may be any short words.
 const UNITS: [&str; 24] = [
     "s", "sec", "ms", "us", "µs", "min", "deg", "°", "rad", "mrad", "deg/s", "rad/s", "m", "mm", "cm", "ft", "m/s",
     "v", "mv", "ma", "n", "nm", "%", "hz",
 ];
 
-/// The unit that a cell below the header names, without brackets; none if it names something else.
+/// The unit that a cell below the header names, without brackets; `None` if it names something else.
 fn unit(cell: &str) -> Option<&str> {
     let cell = unquoted(cell);
     let inside = [('[', ']'), ('(', ')')]

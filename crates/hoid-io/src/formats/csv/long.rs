@@ -1,8 +1,8 @@
-//! A long text of plain numbers, read block by block: neither its bytes nor the columns that were not asked for are held
-//! in memory, and reading ends after the requested span.
+//! A long text of plain numbers, read block by block: neither its bytes nor the columns that were not requested are
+//! kept in memory, and reading ends after the requested span.
 //!
 //! The first lines are read as any table is, with their names, units and notes. All rows after them must be plain
-//! ([`super::plain`]); where one is not, there is no table here, and the whole text is read by [`super::table`].
+//! ([`super::plain`]); if a row is not, no table is returned, and the whole text is read by [`super::table`].
 //!
 //! Reading ends early, after the requested span ([`super::span_end`]).
 
@@ -21,14 +21,14 @@ use crate::wording::shown;
 
 /// Shorter files are read as a whole, bytes.
 const LONG: u64 = 16 << 20;
-/// Bytes in which header and first rows are.
+/// Bytes that contain the header and the first rows.
 const HEAD: usize = 256 << 10;
 /// Bytes of the first block; each next one is twice as long, up to [`LARGEST`].
 const BLOCK: usize = 1 << 20;
 const LARGEST: usize = 32 << 20;
-/// Places in the rest of a file at which the time is examined.
+/// Number of positions in the rest of a file at which the time is examined.
 const PROBES: u32 = 64;
-/// Bytes read at such a place: more than a line has.
+/// Bytes read at such a position: more than a line has.
 const PROBE: usize = 64 << 10;
 
 /// The table of a long text; `None` if it is short, or something in it is more than plain numbers.
@@ -60,7 +60,7 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
     };
     let separator = parsed.separator;
     let names: Vec<String> = parsed.columns.iter().map(|column| column.name.clone()).collect();
-    // What is missing is reported by the reader of whole texts, with all columns that there are.
+    // Missing columns are reported by the reader of whole texts, together with all existing columns.
     let known: Vec<&str> = names.iter().map(String::as_str).collect();
     if check_selected(&known, options, file).is_err() {
         return Ok(None);
@@ -79,7 +79,7 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
     let parts = text.length as f64 / text.at as f64;
     let rows = if end.is_some() { 0.0 } else { parsed.rows as f64 * parts };
     for (column, _) in parsed.columns.iter_mut().zip(&wanted).filter(|(_, wanted)| **wanted) {
-        // A file of holes may be longer than any memory; its rows are not.
+        // A sparse file may be longer than any memory; its rows are not.
         let _ = column.values.try_reserve((rows as usize).saturating_sub(parsed.rows));
     }
     let mut may_end = end.is_some();
@@ -122,7 +122,7 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
     Ok(Some(selected(table, |at, _| wanted.get(at) == Some(&true))))
 }
 
-/// A file that is read from its start to its end.
+/// A file that is read from start to end.
 struct Text {
     file: File,
     /// Position of the next byte.
@@ -136,7 +136,7 @@ struct Text {
 }
 
 impl Text {
-    /// The first lines, read as any table; `None` if they are not of a table of numbers with a point.
+    /// The first lines, read as any table; `None` if they are not those of a table of numbers with a decimal point.
     fn head(&mut self, file: &str) -> io::Result<Option<Parsed>> {
         let mut bytes = self.bytes(0, HEAD)?;
         let Some(line) = bytes.iter().rposition(|byte| *byte == b'\n') else {
@@ -184,7 +184,7 @@ impl Text {
         }
     }
 
-    /// Some bytes of the file, wherever it is read.
+    /// Some bytes of the file, independent of the reading position.
     fn bytes(&mut self, from: usize, most: usize) -> io::Result<Vec<u8>> {
         self.file.seek(SeekFrom::Start(from as u64))?;
         let mut bytes = Vec::with_capacity(most);
@@ -192,7 +192,7 @@ impl Text {
         Ok(bytes)
     }
 
-    /// Values of a column at places from here to the end, in their order; NaN where there is none.
+    /// Values of a column at positions from here to the end, in order; NaN where there is none.
     fn probed(&mut self, column: usize, separator: u8) -> io::Result<Vec<f64>> {
         let here = self.at;
         let from = here.saturating_sub(self.buffer.len().saturating_sub(self.lines));
@@ -200,7 +200,7 @@ impl Text {
         let rest = self.length.saturating_sub(from) as f64;
         let value = |text: &mut Self, part: f64| -> io::Result<f64> {
             let bytes = text.bytes(from.saturating_add((rest * part) as usize), PROBE)?;
-            // A place is in the middle of a line; the next one is whole.
+            // A position is in the middle of a line; the next line is complete.
             let line = bytes.split(|byte| *byte == b'\n').nth(1).unwrap_or_default();
             let row = nth_row(line, 0, separator);
             let cell = row.as_ref().and_then(|(_, row)| row.get(column)).unwrap_or_default();
@@ -223,7 +223,7 @@ impl Text {
     }
 }
 
-/// The file again, where a message needs a line or a cell.
+/// The file, read again if a message needs a line or a cell.
 struct LongSource<'a> {
     file: &'a str,
     path: PathBuf,

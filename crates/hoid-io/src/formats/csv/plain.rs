@@ -1,9 +1,10 @@
 //! Fast reader for rows of plain numbers, as nearly all rows of a recording are.
 //!
 //! A row is plain if each of its cells is empty or a number with a decimal point, with at most
-//! blanks around it, and those of columns that were not asked for any text without quotes. Any other row (texts, quotes, comments, too many or too few cells) ends the
-//! run, and is read by the full CSV reader ([`super::table`]). The numbers are the same, correctly
-//! rounded by both (D. Lemire, *Software: Practice and Experience* 51 (2021) 1700-1727).
+//! blanks around it, and cells of columns that were not requested contain any text without quotes. Any other row
+//! (texts, quotes, comments, too many or too few cells) ends the run, and is read by the full CSV reader
+//! ([`super::table`]). The numbers are the same, correctly rounded by both (D. Lemire, *Software: Practice and
+//! Experience* 51 (2021) 1700-1727).
 //!
 //! A long text is read in parallel in parts that end at a line break. Each part reports how far it
 //! was plain; everything after the first row that was not is discarded.

@@ -1,8 +1,8 @@
 //! The end of a span in a long text, after which no row is read.
 //!
 //! A time after the span is not enough: in a file of trials the time starts again, and the span may be in a later
-//! one. The times of the rest are therefore probed at some places; they increase to the end of the file, or all of it
-//! is read.
+//! one. The times of the rest are therefore probed at some positions; unless they increase up to the end of the file,
+//! all of it is read.
 
 use super::table::Parsed;
 use crate::record::ReadOptions;
@@ -17,7 +17,7 @@ pub(super) enum SpanEnd {
     Time { column: usize, from: f64, to: f64 },
 }
 
-/// No message is made of the first rows.
+/// No message is created from the first rows.
 struct Nowhere<'a>(&'a str);
 
 impl Source for Nowhere<'_> {
@@ -38,7 +38,7 @@ impl SpanEnd {
     /// The end of the requested span, from the first rows; `None` if all rows are needed.
     pub(super) fn of(head: &Parsed, file: &str, options: &ReadOptions) -> Option<Self> {
         let to_s = options.span_s.1?;
-        // A value between two of a sparse column, and a trial, may need rows after the span.
+        // A value between two values of a sparse column, and a trial, may need rows after the span.
         if !options.sparse.is_empty() || options.trial.is_some() {
             return None;
         }
@@ -67,7 +67,7 @@ impl SpanEnd {
             }
             (_, None) => None,
             (_, Some((column, (t, written)))) => {
-                // t is the written time moved and in another unit.
+                // t is the written time, shifted and in another unit.
                 let (&[first, .., last], &[written, .., last_written]) = (&*t.values, &*written.values) else {
                     return None;
                 };
@@ -101,8 +101,8 @@ impl SpanEnd {
         }
     }
 
-    /// True if no row after those read so far belongs to the span: the time increases in them and on to the times that
-    /// were probed in the rest, NaN where there is none.
+    /// True if no row after those read so far is in the span: the time increases in them and on to the times that were
+    /// probed in the rest, NaN where there is none.
     pub(super) fn is_last(&self, read: &Parsed, probed: &[f64]) -> bool {
         let Some(column) = self.time_column() else {
             return true;

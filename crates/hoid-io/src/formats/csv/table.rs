@@ -296,7 +296,7 @@ impl Rows<'_> {
     }
 }
 
-/// Lines before the last one with which the length of its numbers is compared.
+/// Number of lines before the last with which the length of its last number is compared.
 const COMPARED: usize = 8;
 
 /// Detects a truncated last number: the last line has no line end, and its last cell is at least
@@ -319,8 +319,8 @@ fn cut_number(source: &CsvSource<'_>, last: usize) -> Option<String> {
     let is_longer = |row: usize| last_cell(row).is_some_and(|cell| cell.contains('.') && cell.len() > length);
     (compared..last).all(is_longer).then(|| {
         format!(
-            "the file ends without the end of its last line, whose last number ({}) is shorter than those above it: it may be \
-             cut; leave that line out with --to",
+            "the last line of the file has no line end, and its last number ({}) is shorter than those above it: it \
+             may be truncated; exclude that line with --to",
             shown(cut)
         )
     })
@@ -375,7 +375,7 @@ fn told_apart(names: Vec<String>, notes: &mut Vec<String>) -> Vec<String> {
         .collect();
     if !renamed.is_empty() {
         notes.push(format!(
-            "several columns have one name and are called {}",
+            "several columns have the same name and are called {}",
             list(&renamed)
         ));
     }
@@ -543,19 +543,19 @@ mod tests {
         assert!(notes(text.trim_end()).is_empty());
         let found = notes(&text[..text.len() - 4]);
         assert!(
-            found[0].contains("(-0.5)") && found[0].contains("may be cut"),
+            found[0].contains("(-0.5)") && found[0].contains("may be truncated"),
             "{found:?}"
         );
         let found = message(&text.as_bytes()[..text.len() - 9]);
         assert!(
-            found.contains("run.csv is cut in line 21, its last: 2 of 3 values"),
+            found.contains("run.csv is truncated in line 21, its last: 2 of 3 values"),
             "{found}"
         );
         // In the middle of a file it is not a truncation.
         assert!(message(b"t,e,u\n0,1\n1,2,3").contains("line 2: 2 values, expected 3"));
         let table = parse(b"t,e,u\n0,1,2\n1,2,-", "run.csv").unwrap();
         let error = table.bad_value(2, 1, 0..2).to_string();
-        assert!(error.contains("line 3") && error.contains("cut there"), "{error}");
+        assert!(error.contains("line 3") && error.contains("truncated there"), "{error}");
     }
 
     #[test]

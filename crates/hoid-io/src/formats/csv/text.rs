@@ -66,7 +66,7 @@ pub(crate) fn is_aside(line: &str) -> bool {
     line.trim().is_empty() || line.starts_with('#')
 }
 
-/// True for what names a unit: a short word, and no index or number.
+/// True for the name of a unit: a short word that is not an index or a number.
 pub(super) fn is_unit(text: &str) -> bool {
     (1..=12).contains(&text.chars().count())
         && !text.contains(' ')
@@ -82,7 +82,7 @@ pub(crate) fn separator(header: &str) -> u8 {
     };
     let plain: Vec<u8> = header.bytes().filter(is_plain).collect();
     let count = |separator: &u8| plain.iter().filter(|byte| *byte == separator).count();
-    // Of equal ones the last counts.
+    // Of equally frequent separators the last is used.
     [b'\t', b';', b','].into_iter().max_by_key(count).unwrap_or(b',')
 }
 
@@ -105,7 +105,7 @@ pub(crate) fn refuse_blanks(header: &str, first: Option<&str>, file: &str) -> Re
 /// has a point, with which a comma may separate thousands.
 ///
 /// Where commas separate cells, numbers with commas are quoted, `"0,02"`. A comma before three digits may then separate thousands,
-/// as spreadsheets write them, so that one of the commas must be before another number of digits.
+/// as spreadsheets write them, so that at least one comma must be followed by a different number of digits.
 pub(crate) fn has_decimal_commas(text: &str, separator: u8) -> bool {
     let quoted = separator == b',';
     if quoted

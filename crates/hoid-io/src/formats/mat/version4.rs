@@ -28,7 +28,7 @@ pub(super) fn read(bytes: &[u8], budget: &mut Budget, file: &str) -> Result<Vec<
 fn variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
     let header = bytes
         .get(..HEADER)
-        .ok_or_else(|| format!("the file is cut: it ends after {} bytes", bytes.len()))?;
+        .ok_or_else(|| format!("the file is truncated: it ends after {} bytes", bytes.len()))?;
     let number = |at: usize, big_endian: bool| {
         let bytes = header
             .chunks_exact(4)
@@ -69,7 +69,7 @@ fn variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
     });
     let ends = || {
         let there = bytes.len();
-        format!("the file is cut, or a size is wrong: {rows} x {columns} numbers end after {there} bytes")
+        format!("the file is truncated, or a size is wrong: {rows} x {columns} numbers end after {there} bytes")
     };
     let named = bytes.get(HEADER..).and_then(|named| named.split_at_checked(name));
     let (text, data) = named.ok_or_else(ends)?;

@@ -88,7 +88,7 @@ struct VariablePath<'a> {
 impl Reader<'_> {
     fn variable(&mut self, elements: &mut Elements<'_>) -> Result<(), Stop> {
         // At top level an element that extends beyond the file is the result of truncation.
-        let cut = |found: String| format!("the file is cut, or a length is wrong: {found}");
+        let cut = |found: String| format!("the file is truncated, or a length is wrong: {found}");
         let element = elements.next().map_err(cut)?;
         let top = VariablePath {
             parent: "",

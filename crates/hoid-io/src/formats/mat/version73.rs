@@ -47,7 +47,7 @@ impl Reader<'_> {
     fn damaged(&self, place: &str, error: &Error) -> IoError {
         let what = error.to_string();
         let cut = if what.contains("unexpected EOF") {
-            "the file is cut, or a length is wrong: "
+            "the file is truncated, or a length is wrong: "
         } else {
             ""
         };
@@ -59,7 +59,7 @@ impl Reader<'_> {
             true => IoError::Unsupported {
                 file,
                 found,
-                remedy: "save it with -v7, or by h5py with libver=\"v114\" and gzip",
+                remedy: "save it with -v7, or with h5py, libver=\"v114\" and gzip",
             },
             false => IoError::Damaged { file, found },
         }
@@ -161,7 +161,7 @@ impl Reader<'_> {
                 Value::Unread(String::from("complex numbers"))
             }
             DType::Compound(_) => return self.table(dataset, (parent, path)),
-            _ => Value::Unread(String::from("something else than numbers")),
+            _ => Value::Unread(String::from("something other than numbers")),
         };
         self.push(parent, path, value)
     }
@@ -170,14 +170,14 @@ impl Reader<'_> {
     fn table(&mut self, dataset: &Dataset, (parent, path): (&str, &str)) -> Result<(), IoError> {
         let kind = dataset.datatype().map_err(|error| self.damaged(path, &error))?;
         let Datatype::Compound { size, members } = kind else {
-            return self.push(parent, path, Value::Unread(String::from("records of no known type")));
+            return self.push(parent, path, Value::Unread(String::from("records of an unknown type")));
         };
         let bytes = dataset.read_raw().map_err(|error| self.damaged(path, &error))?;
         let (bytes, size) = (Rc::new(bytes), size as usize);
         for member in &members {
             let value = match records::field(&bytes, size, member) {
                 Some(numbers) => Value::Array(Array::vector(numbers)),
-                None => Value::Unread(String::from("something else than numbers")),
+                None => Value::Unread(String::from("something other than numbers")),
             };
             self.push(path, &format!("{path}.{}", member.name), value)?;
         }

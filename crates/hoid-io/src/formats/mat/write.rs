@@ -114,5 +114,5 @@ fn compressed(file: &mut dyn Write, element: &[u8]) -> io::Result<()> {
 }
 
 fn too_long() -> io::Error {
-    io::Error::other("a variable of more than 4 GB, which .mat does not take; write Parquet")
+    io::Error::other("a variable of more than 4 GB, which .mat does not support; write Parquet")
 }

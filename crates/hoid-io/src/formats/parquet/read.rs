@@ -64,7 +64,7 @@ fn check_ends(bytes: &[u8], file: &str) -> Result<(), IoError> {
     } else if !bytes.ends_with(MAGIC) {
         return Err(IoError::Damaged {
             file: file(),
-            found: String::from("it is cut, for its end is missing, which reports where the columns stand"),
+            found: String::from("it is truncated: its end, which gives the positions of the columns, is missing"),
         });
     } else {
         return Ok(());
@@ -85,7 +85,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
     if rows > MOST_ROWS {
         return Err(IoError::Unsupported {
             file: file.to_owned(),
-            found: format!("holds {rows} rows, where {MOST_ROWS} are the most"),
+            found: format!("holds {rows} rows, expected at most {MOST_ROWS}"),
             remedy: "write it in parts",
         });
     }
@@ -122,7 +122,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
             let values = u64::try_from(chunk.num_values()).unwrap_or(0);
             let Some(stated) = pages::unpacked(pages, chunk.compression(), values) else {
                 return Err(damaged(format!(
-                    "{}: a page is longer than it reports, or does not report how long it is",
+                    "{}: a page is longer than it states, or does not state its length",
                     place()
                 )));
             };
@@ -172,8 +172,8 @@ struct ColumnPath<'a> {
 }
 
 impl ColumnPath<'_> {
-    /// Reads the values by their logical type or, in older files, the converted type, which the
-    /// crate provides if there is one.
+    /// Reads the values by their converted type, which the crate also derives from a logical type where there is an
+    /// equivalent, and otherwise by their logical type.
     fn data(&mut self, column: &ColumnDescriptor) -> Result<Data, IoError> {
         use ConvertedType as C;
         let unit = 10_f64.powi(column.type_scale());
@@ -236,8 +236,8 @@ impl ColumnPath<'_> {
         let metadata = self.reader.metadata().row_group(group);
         let chunk = metadata.column(self.index);
         match chunk.compression() {
-            Compression::ZSTD(_) => return Err(refused("is compressed by Zstandard")),
-            Compression::BROTLI(_) => return Err(refused("is compressed by Brotli")),
+            Compression::ZSTD(_) => return Err(refused("is compressed with Zstandard")),
+            Compression::BROTLI(_) => return Err(refused("is compressed with Brotli")),
             Compression::LZO => return Err(refused("is compressed by LZO")),
             _ if chunk.file_path().is_some() => return Err(refused("keeps its values in another file")),
             _ => {}

@@ -79,7 +79,7 @@ pub(super) fn streams(bytes: &[u8]) -> Result<(Vec<Stream>, Option<usize>), Stri
     let mut known: HashMap<u32, usize> = HashMap::new();
     while !rest.rest.is_empty() {
         let at = bytes.len().saturating_sub(rest.rest.len());
-        let ends = || format!("the chunk at byte {at} is cut, or its length is wrong");
+        let ends = || format!("the chunk at byte {at} is truncated, or its length is wrong");
         let is_length = matches!(rest.rest, [1 | 4 | 8, ..]);
         let Some(taken) = rest.length().and_then(|length| rest.take(length)) else {
             if is_length && !streams.is_empty() {
@@ -159,7 +159,8 @@ impl Stream {
         let read = self.stamps.len();
         if let Some(stated) = footer.samples.filter(|n| *n != read as u64) {
             return Err(format!(
-                "stream {} ({}): its footer counts {stated} samples and {read} are there: the file lost a part",
+                "stream {} ({}): its footer states {stated} samples, but {read} are present: part of the file is \
+                 missing",
                 self.id,
                 shown(&self.header.name)
             ));
@@ -175,8 +176,8 @@ impl Stream {
             let slack_s = self.nominal_step_s().max(1e-5 * stated.abs()).max(1e-6);
             if (stated - found).abs() > slack_s {
                 return Err(format!(
-                    "stream {} ({}): its footer states that the {what} sample is at {stated} s, and it is at {found} s: \
-                     the file lost a part",
+                    "stream {} ({}): its footer states that the {what} sample is at {stated} s, but it is at {found} \
+                     s: part of the file is missing",
                     self.id,
                     shown(&self.header.name)
                 ));

@@ -43,17 +43,17 @@ pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
     let parts = synchronise(&mut times, &stream.offsets);
     let name = shown(&stream.header.name);
     let resets = match parts {
-        0 => String::from("no clock offsets were recorded: its time stamps are taken for those of the recorder"),
+        0 => String::from("no clock offsets were recorded: its time stamps are taken as those of the recorder"),
         1 => format!("clock aligned by a line through {} offsets", stream.offsets.len()),
         parts => format!(
-            "clock aligned by {parts} lines through {} offsets, for it was set again",
+            "clock aligned by {parts} lines through {} offsets, because it was reset",
             stream.offsets.len()
         ),
     };
     let nominal_hz = stream.header.nominal_hz;
     if nominal_hz <= 0.0 || stream.header.can_drop {
         notes.push(format!(
-            "stream {name}: {resets}; its time stamps are kept, for they are not even"
+            "stream {name}: {resets}; its time stamps are kept, because they are not even"
         ));
         return times;
     }
@@ -61,8 +61,8 @@ pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
     let (parts, effective_hz) = straighten(&mut times, longest, stream.nominal_step_s());
     if let Some(hz) = effective_hz.filter(|hz| (hz / nominal_hz - 1.0).abs() > OFF) {
         notes.push(format!(
-            "stream {name}: its time stamps go at {hz:.4} Hz where {nominal_hz} Hz are stated: samples are lost evenly, or \
-             the stated rate is wrong"
+            "stream {name}: its time stamps run at {hz:.4} Hz, but {nominal_hz} Hz is stated: samples are lost evenly, \
+             or the stated rate is wrong"
         ));
     }
     let found = effective_hz.map_or_else(String::new, |hz| format!(", {hz:.4} Hz found"));

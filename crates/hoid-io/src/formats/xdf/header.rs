@@ -41,7 +41,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header, String> {
     };
     let count = number("channel_count", needed("channel_count")?)?;
     if !(0.0..=MOST_CHANNELS as f64).contains(&count) {
-        return Err(format!("it has {count} channels, where {MOST_CHANNELS} are the most"));
+        return Err(format!("it has {count} channels, expected at most {MOST_CHANNELS}"));
     }
     let nominal_hz = number("nominal_srate", needed("nominal_srate")?)?;
     if !(nominal_hz >= 0.0 && nominal_hz.is_finite()) {

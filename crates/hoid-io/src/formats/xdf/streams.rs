@@ -31,8 +31,8 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
     let mut notes = Vec::new();
     notes.extend(cut.map(|at| {
         format!(
-            "the file is cut at byte {at} of {}: the samples before it are read, and the {} bytes after it are not; copy the \
-             file again where its original is whole",
+            "the file is truncated at byte {at} of {}: the samples before it are read, and the {} bytes after it are \
+             not; copy the file again if the original is complete",
             bytes.len(),
             bytes.len().saturating_sub(at)
         )
@@ -44,14 +44,14 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
         })?;
         if let Some(why) = &stream.unread_footer {
             notes.push(format!(
-                "stream {}: {why}; its {} samples are read, and whether they are all is not known",
+                "stream {}: {why}; its {} samples are read, but it is not known whether they are all",
                 shown(&stream.header.name),
                 stream.stamps.len()
             ));
         } else if let (None, Some(first), Some(last)) = (&stream.footer, stream.stamps.first(), stream.stamps.last()) {
             notes.push(format!(
-                "stream {} has no footer: the file was cut short, or its recorder never closed it; {} samples over {:.3} s \
-                 are there, and what came after them is lost",
+                "stream {} has no footer: the file was cut short, or its recorder never closed it; {} samples over \
+                 {:.3} s are present, and any after them are lost",
                 shown(&stream.header.name),
                 stream.stamps.len(),
                 last - first
@@ -224,7 +224,7 @@ mod tests {
         for (bad, said) in [
             (
                 footer(50.0, 59.99, 1001),
-                "its footer counts 1001 samples and 1000 are there",
+                "its footer states 1001 samples, but 1000 are present",
             ),
             (footer(49.0, 59.99, 1000), "the first sample is at 49 s"),
             (footer(50.0, 61.0, 1000), "the last sample is at 61 s"),
@@ -269,11 +269,11 @@ mod tests {
         let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/xdf/tracking.xdf");
         let bytes = std::fs::read(file).unwrap();
         let whole = read(&bytes, "a.xdf").unwrap();
-        assert!(!whole.notes.iter().any(|note| note.contains("is cut")));
+        assert!(!whole.notes.iter().any(|note| note.contains("is truncated")));
         for left in [bytes.len() - 3, bytes.len() / 2] {
             let notes = read(&bytes[..left], "a.xdf").unwrap().notes;
             assert!(
-                notes[0].contains("the file is cut at byte") && notes[0].contains("are read"),
+                notes[0].contains("the file is truncated at byte") && notes[0].contains("are read"),
                 "{notes:?}"
             );
         }

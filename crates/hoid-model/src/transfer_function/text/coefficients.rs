@@ -2,7 +2,7 @@
 
 use super::ratio::Ratio;
 
-pub(super) const EXAMPLES: &str = "write it as 90/(s(s+6)), or as 90/1,6,0 by descending powers of s";
+pub(super) const EXAMPLES: &str = "write it as 90/(s(s+6)), or as 90/1,6,0 in descending powers of s";
 
 /// Numerator and denominator, with commas in at least one of them.
 pub(super) fn coefficients(text: &str) -> Result<Ratio, String> {

@@ -62,8 +62,8 @@ impl Reader {
         let all = self.sum()?;
         match self.next() {
             None => Ok(all),
-            Some(')') => self.refuse("no ')' that was not opened"),
-            Some('=' | 'z' | 'p' | 'x') => self.refuse("an expression in s alone"),
+            Some(')') => self.refuse("no ')' without a '('"),
+            Some('=' | 'z' | 'p' | 'x') => self.refuse("an expression in s only"),
             Some(_) => self.refuse("a number, s, a parenthesis, or one of + - * / ^"),
         }
     }
@@ -115,8 +115,8 @@ impl Reader {
                 Some('s' | '(' | 'e') => {
                     if divided {
                         return self.refuse(
-                            "a sign: after a divisor it is not clear whether it is divided by this too; \
-                             1/(s(s+6)) divides by both, 1/s*(s+6) by s alone",
+                            "a sign: it is not clear whether this is also part of the divisor; 1/(s(s+6)) divides by \
+                             both, 1/s*(s+6) by s only",
                         );
                     }
                     product = product.times(&self.power()?);

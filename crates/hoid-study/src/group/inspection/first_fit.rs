@@ -42,7 +42,7 @@ pub fn evidence(record: &Record) -> FirstFit {
                 evidence.push(Evidence::new(
                     "[analysis]",
                     "nd",
-                    format!("of the first run BIC chooses nd = {chosen}, with a dead time of {dead_time:.3} s"),
+                    format!("for the first run BIC chooses nd = {chosen}, with a dead time of {dead_time:.3} s"),
                 ));
             }
             Err(reason) => evidence.push(Evidence::new(
@@ -54,7 +54,7 @@ pub fn evidence(record: &Record) -> FirstFit {
     }
     let words = match FamilyEstimator::default().fit(std::slice::from_ref(record)) {
         Ok(fit) => format!(
-            "of the first run alone the form is {} ({})",
+            "for the first run alone the form is {} ({})",
             fit.form, fit.verdict.level
         ),
         Err(reason) => format!("the first run cannot be fitted: {reason}"),

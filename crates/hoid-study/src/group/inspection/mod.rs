@@ -88,7 +88,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -
         };
         let table = format!("[conditions.{}]", key_of(condition));
         let settings = look_at(&seen, condition, &table, known, &mut evidence, &mut spans);
-        // A run without a condition name has no table of its own.
+        // A run without a condition name has no table in the manifest.
         if !condition.is_empty() && settings != ConditionSettings::default() {
             manifest.conditions.insert(condition.clone(), settings);
         }
@@ -172,7 +172,7 @@ fn key_of(name: &str) -> String {
 #[must_use]
 pub fn commented(text: &str, evidence: &[Evidence]) -> String {
     let mut written = String::from(
-        "# Made by `hoid group init` from names and contents of the files: look it through, then\n\
+        "# Made by `hoid group init` from names and contents of the files: review it, then\n\
          #   hoid group . --out results\n",
     );
     let comment = |written: &mut String, table: &str, key: &str| {

@@ -67,7 +67,7 @@ pub struct Mixture {
 /// Number of delays on either side of the likeliest that are proposed as alternatives that may have been true
 /// throughout.
 const NEIGHBOURS: usize = 3;
-/// Least probability of a hypothesis, relative to the likeliest: none is lost for ever.
+/// Least probability of a hypothesis, relative to the likeliest, so that no hypothesis is lost permanently.
 const LEAST_PROBABILITY: f64 = 1e-12;
 
 impl<const M: usize> Bank<M> {
@@ -222,7 +222,7 @@ impl<const M: usize> Bank<M> {
         }
     }
 
-    /// Creates hypotheses of the delays next to the likeliest, if there are none.
+    /// Creates hypotheses of the delays adjacent to the likeliest, if there are none.
     fn spawn_neighbouring_delays(&mut self) {
         let Some((slot, parent)) = self.parent() else { return };
         let delay = self.prior.delay;
@@ -271,8 +271,8 @@ impl<const M: usize> Bank<M> {
         }
     }
 
-    /// Returns the likeliest hypothesis, and its slot. One of a recent change of omega_nm and zeta_nm has no children:
-    /// the transient effect of a change of the gains on them is not handed on.
+    /// Returns the likeliest hypothesis, and its slot. A hypothesis of a recent change of omega_nm and zeta_nm has no
+    /// children, so that the transient effect of a change of the gains on these parameters is not inherited.
     fn parent(&self) -> Option<(usize, Hypothesis)> {
         let (mut likeliest, mut highest) = (None, 0.0);
         for (slot, h) in self.hypotheses.iter().enumerate() {

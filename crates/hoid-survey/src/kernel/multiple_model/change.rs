@@ -39,7 +39,7 @@ pub struct Change {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChangeDetector {
     log_odds: f64,
-    /// Whether a change was declared, one of the neuromuscular system, and one of the delay.
+    /// Whether a change was declared, and whether one of the neuromuscular system or of the delay.
     declared: bool,
     declared_neuromuscular: bool,
     declared_delay: bool,

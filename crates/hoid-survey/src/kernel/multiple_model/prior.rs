@@ -1,4 +1,4 @@
-//! Prior of an operator: how often it changes, by how much, and which parameters.
+//! Prior of an operator: rate and size of its changes, and the parameters that change.
 //!
 //! Times are in samples. Changes of the gains are relative to
 //! `g = sqrt(K_e^2 + omega_c^2 K_e_dot^2)`, the gain of the operator's lead term at the crossover frequency omega_c:

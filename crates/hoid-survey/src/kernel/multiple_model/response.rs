@@ -7,8 +7,8 @@
 //! `x'(t) = b0' e(t) + b1' e(t-1) - f1' x(t-1) - f2' x(t-2) - f1 x'(t-1) - f2 x'(t-2)`,
 //!
 //! where `'` is the derivative with respect to omega_nm or zeta_nm. The filters are linearised about a point
-//! `[omega, zeta]`. When it moves, their states move along its derivative: a filter whose past belongs to another
-//! point would have a kink there, which the whitening filter, a difference of high order, amplifies above the noise.
+//! `[omega, zeta]`. When it moves, their states move along its derivative: a filter with the past of another point
+//! would have a kink there, which the whitening filter, a difference of high order, amplifies above the noise.
 
 use hoid_core::held_operator::held_operator;
 

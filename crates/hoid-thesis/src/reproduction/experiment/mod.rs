@@ -100,23 +100,24 @@ pub(super) fn items() -> Vec<Item> {
         (
             "table-3".to_owned(),
             "Model parameters n_k* and T_n* used in each run and model structure (virtual people)".to_owned(),
-            "Mean of those of the best fits of [0, 30.72] and [51.20, 81.92] s, condition C4; the true n_k of the subject alongside.",
+            "Mean of the values of the best fits of [0, 30.72] and [51.20, 81.92] s, condition C4; the true n_k of the subject alongside.",
         ),
         |item, runs| tables::delays(item, runs, &["C4".to_owned()]),
     )];
     all.extend(figures_of(
         &runs,
         "virtual people",
-        "Three virtual subjects, mean (dark) and median (light) over the last five of seven runs at each time; the text has the mean. Dashed \
-         in colour: batch fits of [0, 30.72] and [51.20, 81.92] s, the mean; dashed black: the simulated operator, the mean over the runs.",
+        "Three virtual subjects, mean (dark) and median (light) over the last five of seven runs at each time; the \
+         text shows the mean. Dashed in colour: batch fits of [0, 30.72] and [51.20, 81.92] s, the mean; dashed black: \
+         the simulated operator, the mean over the runs.",
     ));
     all.into_iter().map(|item| item.sharing(&shared)).collect()
 }
 
 /// Items of recorded people.
 pub(super) fn recorded_items(people: RecordedPeople) -> Vec<Item> {
-    const DELAYS: &str =
-        "Mean of those of the best fits of the first and the last three eighths of a run; those of each alongside.";
+    const DELAYS: &str = "Mean of the values of the best fits of the first and the last three eighths of a run; those of each \
+         alongside.";
     let name = people.name().to_owned();
     let runs = Runs::new(people);
     let shared = runs.shared("The experiment with recorded people");
@@ -154,9 +155,9 @@ pub(super) fn recorded_items(people: RecordedPeople) -> Vec<Item> {
     all.extend(figures_of(
         &runs,
         &name,
-        "Recorded people, mean (dark) and median (light) over the last five runs of each at each time; the text has the \
-         mean. Thick dots: batch fits of the first and the last three eighths of a run, the mean; vertical dots: the change \
-         of the controlled element. An ordinate that hides outliers cuts them; the data have all.",
+        "Recorded people, mean (dark) and median (light) over the last five runs of each at each time; the text shows \
+         the mean. Thick dots: batch fits of the first and the last three eighths of a run, the mean; vertical dots: \
+         the change of the controlled element. Outliers beyond the range of an ordinate are cut; the data contain all.",
     ));
     all.into_iter().map(|item| item.sharing(&shared)).collect()
 }

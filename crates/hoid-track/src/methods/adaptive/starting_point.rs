@@ -80,8 +80,8 @@ impl StartingPoint {
                 let Some((omega, zeta)) = fit.operator.neuromuscular() else {
                     return Err(no_place(
                         fit,
-                        "it has no neuromuscular system, and the basis of people has one; identify the person with \
-                         --neuromuscular yes",
+                        "it has no neuromuscular system, which the basis of this method requires; identify the person \
+                         with --neuromuscular yes",
                     ));
                 };
                 let all = fit.operator.form().coordinates(true);
@@ -126,8 +126,8 @@ pub(super) fn initial_estimate(
         return Err(no_place(
             fit,
             &format!(
-                "the form {} is {:.0} % away from what the basis of people can be; identify with a form that has a lag, as \
-                 --form lead-lag",
+                "the form {} is {:.0} % away from the nearest operator of the basis; identify with a form that has a \
+                 lag, such as --form lead-lag",
                 fit.operator.form(),
                 100.0 * misfit
             ),
@@ -214,8 +214,8 @@ struct Nearest {
 }
 
 impl Nearest {
-    /// Increase of the covariance of the state such that the response is nowhere better known than from the fit: gains
-    /// of one lag cannot represent how an unknown lag varies with frequency.
+    /// Increase of the covariance of the state such that the response is at no frequency better known than from the
+    /// fit: gains of one lag cannot represent how an unknown lag varies with frequency.
     fn lost(&self, fit: &FittedOperator, coordinates: &[Coordinate], columns: &[[f64; STATES]]) -> f64 {
         let p = coordinates.len();
         let sizes = |g: &[Complex64]| -> [f64; 2] {
