@@ -32,8 +32,7 @@ pub type Field<E, T> = fn(&mut E) -> &mut T;
 
 /// Returns the option for the noise model of an operator, which determines the estimator.
 pub fn noise<E: 'static>(set: impl Fn(&mut E, &Setting, &str) -> Result<(), IdentError> + 'static) -> BatchOption<E> {
-    let help =
-        "Noise model: autoregression (ar), with moving average nc (arma), or remnant of order m (remnant)";
+    let help = "Noise model: autoregression (ar), with moving average nc (arma), or remnant of order m (remnant)";
     let setting = Setting::new("noise", Kind::Choice(&["ar", "arma", "remnant"]), help).default("ar");
     BatchOption::new(setting, set)
 }
@@ -237,12 +236,8 @@ pub fn search_method<E: 'static>(field: Field<E, SearchOptions>) -> BatchOption<
 
 /// Returns the options for the termination of the search.
 pub fn search_ends<E: 'static>(default: SearchOptions, field: Field<E, SearchOptions>) -> [BatchOption<E>; 2] {
-    let steps = Setting::new(
-        "max_iterations",
-        Kind::Count,
-        "Maximum search steps from each start",
-    )
-    .default(&default.max_iterations.to_string());
+    let steps = Setting::new("max_iterations", Kind::Count, "Maximum search steps from each start")
+        .default(&default.max_iterations.to_string());
     let tolerance = "Relative decrease of the loss for convergence";
     let tolerance = Setting::new("tolerance", Kind::Number, tolerance)
         .default(&format!("{:e}", default.tolerance))

@@ -77,8 +77,7 @@ impl BatchOptions for Polynomials {
 /// Orders and delay.
 fn searched() -> Vec<BatchOption<Polynomials>> {
     let default = "the operator's: bj nb=2,nd=1..4,nf=2; arx na=2,nb=2";
-    let nk =
-        "Delay of b0 in samples (29) or dead time in s (0.28s), or a range (20..40, 0.1s..0.4s) to search";
+    let nk = "Delay of b0 in samples (29) or dead time in s (0.28s), or a range (20..40, 0.1s..0.4s) to search";
     let criterion = "Criterion that selects among searched candidates";
     vec![
         BatchOption::new(shared::orders(default), |how: &mut Polynomials, option, text| {

@@ -221,8 +221,7 @@ fn role() -> Setting {
 }
 
 fn run_to_run(default: f64) -> Setting {
-    let help =
-        "Run-to-run variation of a person's gain, relative to it; included in the error bars for fewer than five records";
+    let help = "Run-to-run variation of a person's gain, relative to it; included in the error bars for fewer than five records";
     Setting::new("run_to_run", Kind::Number, help)
         .default(&default.to_string())
         .bounds(Bounds::AtLeast(0.0))
