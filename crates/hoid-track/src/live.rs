@@ -218,7 +218,8 @@ impl Live {
         if let Some(decimator) = &mut self.decimator {
             let wrong = || IdentError::BadStart {
                 reason: "the saved tracker has another rate, or was changed or truncated since; save it \
-                         again".to_owned(),
+                         again"
+                    .to_owned(),
             };
             let (length, all) = opened(numbers).and_then(<[f64]>::split_last).ok_or_else(wrong)?;
             let (stage, of_decimator) = all.split_at_checked(*length as usize).ok_or_else(wrong)?;

@@ -34,11 +34,7 @@ impl SurveyPlan {
             .parse()
             .map_err(|error: toml::de::Error| wrong("its table", error.message().to_owned(), "TOML".to_owned()))?;
         if let Some(key) = table.keys().find(|key| *key != "comparators") {
-            return Err(wrong(
-                "another key",
-                key.clone(),
-                "[[comparators]] alone".to_owned(),
-            ));
+            return Err(wrong("another key", key.clone(), "[[comparators]] alone".to_owned()));
         }
         let each = table.get("comparators").and_then(Value::as_array).into_iter().flatten();
         let comparators = each

@@ -47,11 +47,7 @@ impl Trace {
         }
         let steps = of(&|f| f.kind == GuardKind::Step);
         if !steps.is_empty() {
-            let words = format!(
-                "{} lasting jumps, used as recorded ({})",
-                steps.len(),
-                named(&steps)
-            );
+            let words = format!("{} lasting jumps, used as recorded ({})", steps.len(), named(&steps));
             all.push(Finding::note("steps-in-signals", words));
         }
         let spans = of(&|f| !matches!(f.kind, GuardKind::Outlier | GuardKind::Step));
