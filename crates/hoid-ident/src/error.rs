@@ -25,7 +25,7 @@ pub enum IdentError {
     },
     /// Records that were sampled differently cannot share a discrete model.
     #[error(
-        "record {label} has the sample time {found} s, the first record {expected} s; resample them to one rate, such as with --new-fs {rate}, or fit them separately",
+        "record {label} has the sample time {found} s, the first record {expected} s; resample them to one rate, for example with --new-fs {rate}, or fit them separately",
         rate = lower_rate(*found, *expected)
     )]
     MixedSampling {

@@ -59,7 +59,9 @@ impl QualityIssueKind {
                 "interpolate with --resample, or replace t by the sampling frequency with --fs if only t is wrong"
             }
             Self::Clock => "give the true sampling frequency with --fs if t is wrong",
-            Self::Drift => "interpolate with --resample if t is right, or count the samples with --fs",
+            Self::Drift => {
+                "interpolate with --resample if t is right, or replace t by the sampling frequency with --fs"
+            }
             Self::Stalled => "exclude the rows with --mask stalled or --from and --to",
             Self::Saturated => "exclude the rows with --mask saturated; a bias remains, see the page on record files",
             Self::Quantised => "nothing; it adds noise of variance step^2 / 12",

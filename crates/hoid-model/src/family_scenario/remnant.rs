@@ -236,7 +236,7 @@ impl RemnantPart {
             return Err(ModelError::Operator {
                 reason:
                     "a part of the remnant follows u and is intermittent: u is larger while it is present, so that \
-                         its strength would differ from the requested one; split it into two parts"
+                     its strength would differ from the requested one; split it into two parts"
                         .to_owned(),
             });
         }

@@ -75,7 +75,7 @@ impl FittedOperator {
             if !of_fit.is_empty() && !here.is_empty() && of_fit != here {
                 return wrong(format!(
                     "{} was identified with {signal} in {of_fit}, but here {signal} is in {here}: its gains differ \
-                     here; scale one of them, such as with --scale {signal}={here}:{of_fit}",
+                     here; scale one of them, for example with --scale {signal}={here}:{of_fit}",
                     self.source
                 ));
             }

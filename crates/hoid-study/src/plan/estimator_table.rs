@@ -58,7 +58,7 @@ impl TryFrom<String> for OrderRange {
         let ends = text.split_once("..").and_then(|(a, b)| Some((number(a)?, number(b)?)));
         match ends {
             Some((low, high)) if low <= high => Ok(Self(low, high)),
-            _ => Err("expected a range as 0..8"),
+            _ => Err("expected a range such as 0..8"),
         }
     }
 }

@@ -36,7 +36,7 @@ pub struct Summary {
 
 impl Summary {
     /// Parses
-    /// `8192 samples: 5 skipped for a fault in e or u (5 of them missing), 0 steps made shorter; 2 lines dropped.`
+    /// `8192 samples: 5 skipped for a fault in e or u (5 of them missing), 0 steps shortened; 2 lines dropped.`
     pub fn of(said: &str) -> Self {
         let line = said
             .lines()

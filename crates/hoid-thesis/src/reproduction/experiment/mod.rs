@@ -116,8 +116,8 @@ pub(super) fn items() -> Vec<Item> {
 
 /// Items of recorded people.
 pub(super) fn recorded_items(people: RecordedPeople) -> Vec<Item> {
-    const DELAYS: &str = "Mean of the values of the best fits of the first and the last three eighths of a run; those of each \
-         alongside.";
+    const DELAYS: &str = "Mean of the values of the best fits of the first and the last three eighths of a run; \
+                          those of each alongside.";
     let name = people.name().to_owned();
     let runs = Runs::new(people);
     let shared = runs.shared("The experiment with recorded people");
