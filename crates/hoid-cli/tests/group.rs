@@ -248,8 +248,8 @@ fn init_looks_at_the_files_and_says_what_it_saw() {
         ("# the tracking error, by its name", "input = "),
         ("# d has", "excitation = "),
         ("# e follows from u through the controlled element", "offset_samples = "),
-        ("# of the first run BIC chooses nd", "nd = "),
-        ("# of the first run alone the form is", "form = "),
+        ("# for the first run BIC chooses nd", "nd = "),
+        ("# for the first run alone the form is", "form = "),
     ] {
         let at_evidence = text.find(evidence).unwrap_or_else(|| panic!("{evidence}: {text}"));
         let next = text[at_evidence..].lines().nth(1).unwrap();

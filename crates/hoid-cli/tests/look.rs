@@ -222,7 +222,7 @@ fn a_delay_in_seconds_is_nk() {
     };
     assert_eq!(track(&["--nk", "29"]), track(&["--delay", ".28"]));
     for (wrong, says) in [
-        (&["--delay", ".28", "--nk", "29"][..], "give one of them"),
+        (&["--delay", ".28", "--nk", "29"][..], "give only one of them"),
         (&["--delay", "-1"], "expected"),
         (&["--delay", ".4...3"], "as 0.1..0.4"),
         (&["--delay", "inf"], "as 0.1..0.4"),

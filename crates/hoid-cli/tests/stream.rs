@@ -465,7 +465,7 @@ fn a_warm_up_that_fails_goes_on_until_there_is_something_to_fit() {
     let (lines, _) = answers(&arguments, &(input + &",\n".repeat(101) + "0.1,0.2\n"));
     let last = &lines.last().unwrap()["warm_up"];
     assert!(
-        last["collected"] == 1 && last["reason"].as_str().unwrap().contains("restarted"),
+        last["collected"] == 1 && last["reason"].as_str().unwrap().contains("started again"),
         "{last}"
     );
 }

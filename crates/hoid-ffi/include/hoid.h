@@ -58,7 +58,7 @@ typedef struct {
    */
   const char *name;
   /*
-   Its unit, empty for none; it stays.
+   Its unit, empty if there is none; it stays.
    */
   const char *unit;
   /*

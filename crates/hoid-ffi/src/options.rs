@@ -282,7 +282,7 @@ mod tests {
             (
                 "adaptive",
                 "{\"prior\": {\"parameters\": []}}",
-                "no form of an operator",
+                "no operator form",
             ),
         ] {
             let failure = live(method, options).err().unwrap();

@@ -134,7 +134,7 @@ fn a_given_frequency_wins_over_t() {
     let read = desk.read(text, &with(50.0)).unwrap();
     assert_eq!(read.record.times_s(), [5.0, 5.02, 5.04]);
     assert!(
-        read.notes[0].contains("the given sampling frequency of 50 Hz counts"),
+        read.notes[0].contains("the given sampling frequency of 50 Hz is used"),
         "{:?}",
         read.notes
     );

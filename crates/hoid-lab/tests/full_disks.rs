@@ -220,7 +220,7 @@ fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
     fill(&ballast);
     let said = person.track(1, 500..4000).unwrap_err();
     let told =
-        "run-01_ticks.csv: No space left on device (os error 28). The run was ended and does not count; make room";
+        "run-01_ticks.csv: No space left on device (os error 28). The run was ended and does not count; free space";
     assert!(said.contains(told), "{said}");
     // Messages of the page in the meantime are ignored, and the pages see that no run is in progress.
     person.track(1, 3000..3100).unwrap();

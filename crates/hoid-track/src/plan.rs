@@ -304,6 +304,6 @@ mod tests {
             )
         };
         let refused = TrackPlan::new(options, default, Criterion::Bic, ts).unwrap_err();
-        assert!(refused.to_string().contains("one model"), "{refused}");
+        assert!(refused.to_string().contains("single model"), "{refused}");
     }
 }

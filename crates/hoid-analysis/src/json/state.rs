@@ -85,6 +85,6 @@ mod tests {
         for text in ["", "0123", &whole[..whole.len() - 4], &whole.replacen("2", "3", 1)] {
             assert!(read::<Vec<f64>>(text).is_err(), "{text}");
         }
-        assert!(read::<String>(&whole).unwrap_err().contains("another version"));
+        assert!(read::<String>(&whole).unwrap_err().contains("a version other than"));
     }
 }

@@ -5,12 +5,8 @@
 //! section 2.6). The common form is the simplest within 2 of the least sum. A form that the data of most people leave
 //! open is not considered: its parameters would not be determined.
 
-use std::path::Path;
-
 use hoid_model::{Finding, Form};
-use hoid_study::group::{FormEvidence, Manifest};
-
-use super::{CompareError, Comparing, GroupEstimates, Quantity, group_estimates::forms};
+use hoid_study::group::FormEvidence;
 
 /// Difference of sums of criteria that counts as no evidence.
 const NO_EVIDENCE: f64 = 2.0;
@@ -52,41 +48,6 @@ pub(super) fn common_form(people: &[&[FormEvidence]]) -> Option<CommonForm> {
     let least = sums.iter().map(|of| of.criterion).fold(f64::INFINITY, f64::min);
     let near = sums.into_iter().filter(|of| of.criterion - least <= NO_EVIDENCE);
     near.min_by_key(|of| (of.form.simplicity(), of.form))
-}
-
-impl Comparing {
-    /// Estimates of recordings: the runs are analysed by `analyse` into directories below `directory`, and if parameters
-    /// are compared and people differ in their form, once more in the common form.
-    ///
-    /// `analyse` runs [`hoid_study::group::run_group`] on the manifest, into the directory; a completed directory is
-    /// not analysed again.
-    ///
-    /// # Errors
-    /// Those of `analyse`, and of [`GroupEstimates::read`].
-    pub fn estimates_of<E: From<CompareError>>(
-        &self,
-        manifest: &Manifest,
-        directory: &Path,
-        mut analyse: impl FnMut(&Manifest, &Path) -> Result<(), E>,
-    ) -> Result<GroupEstimates, E> {
-        let mut estimates_in = |manifest: &Manifest, name: &str| -> Result<GroupEstimates, E> {
-            let place = directory.join(name);
-            analyse(manifest, &place)?;
-            Ok(GroupEstimates::read(&place)?)
-        };
-        let estimates = estimates_in(manifest, "group")?;
-        let of_one_form = |quantity: &Quantity| !quantity.is_of_any_form();
-        if !self.of.iter().any(of_one_form) || forms(estimates.cells.iter()).len() < 2 {
-            return Ok(estimates);
-        }
-        let Some(common) = estimates.common_form() else {
-            return Ok(estimates);
-        };
-        let mut in_form = manifest.clone();
-        common.form.name().clone_into(&mut in_form.analysis.form);
-        let parameters = estimates_in(&in_form, &format!("group-{}", common.form.name()))?;
-        Ok(estimates.with_parameters_of(parameters, common))
-    }
 }
 
 impl CommonForm {

@@ -13,7 +13,7 @@
 //! | [`GroupEstimates`] | estimates of a group for each person, from its directory or its JSON |
 //! | [`Quantity`] | quantities to compare |
 //! | [`Factor`] | differences between conditions, or between people; `contrast`: the weights of conditions |
-//! | [`CommonForm`] | the form in which parameters of all people are compared |
+//! | [`CommonForm`] | the form in which parameters of all people are compared; `recordings`: the analysis of recordings in it |
 //! | [`Comparing`] | comparison of a group; `learning`: runs as a covariate |
 //! | [`Comparison`] | the result, its JSON and back; `sentence`: each difference for a paper |
 
@@ -30,6 +30,7 @@ mod group_estimates;
 mod learning;
 mod meta_regression;
 mod quantity;
+mod recordings;
 mod sentence;
 
 pub use adjust::holm;

@@ -119,7 +119,7 @@ fn scales_and_units() {
     let in_deg = Record::of_output(ts, Channel::new("u", "deg", vec![1.0])).unwrap();
     let contradicted = scaled("u", "rad:deg".parse().unwrap());
     let message = contradicted.apply(in_deg).unwrap_err().to_string();
-    assert!(message.contains("in deg by its file"), "{message}");
+    assert!(message.contains("in deg according to its file"), "{message}");
 }
 
 #[test]

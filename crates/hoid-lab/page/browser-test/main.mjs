@@ -312,7 +312,7 @@ const steps = {
       await page.evaluate(operator, { injected: true });
       await heading(page, "The run was ended early");
       assert.ok((await page.evaluate(() => window.hoidLab.run.next)) < 60_000, "the run went on to its end");
-      await page.getByText(/No space left on device.*make room on the disk/).waitFor();
+      await page.getByText(/No space left on device.*free space on the disk/).waitFor();
       await picture(page, "full-disk");
       rmSync(ballast);
       await startRun(page);

@@ -537,7 +537,7 @@ mod tests {
             lag(&[pair("K", 1.0)])
                 .unwrap_err()
                 .to_string()
-                .contains("T_I is lacking")
+                .contains("T_I is missing")
         );
         assert!(lag(&[pair("K", 1.0), pair("T_I", -2.0)]).is_err());
         assert!(lag(&[pair("K", 1.0), pair("T_I", 2.0), pair("T_L", 1.0)]).is_err());
