@@ -279,11 +279,7 @@ mod tests {
             ("rpem", "{\"controlled_element\": \"9/\"}", "coefficients"),
             ("multiple-model", "{\"smooth\": true}", "no future samples"),
             ("adaptive", "{\"prior\": \"nowhere.json\"}", "nowhere.json"),
-            (
-                "adaptive",
-                "{\"prior\": {\"parameters\": []}}",
-                "no operator form",
-            ),
+            ("adaptive", "{\"prior\": {\"parameters\": []}}", "no operator form"),
         ] {
             let failure = live(method, options).err().unwrap();
             assert!(failure.text.contains(reason), "{options}: {}", failure.text);
