@@ -472,7 +472,7 @@ fn what_is_no_parquet_says_so() {
     assert!(footer.contains("run.parquet is damaged: EOF"), "{footer}");
     let zstd = read_table(&fixture("zstd")).unwrap_err().to_string();
     assert!(
-        zstd.contains("column t, row group 1 is compressed by Zstandard") && zstd.contains("Snappy"),
+        zstd.contains("column t, row group 1 is compressed with Zstandard") && zstd.contains("Snappy"),
         "{zstd}"
     );
     // Truncated anywhere, it is refused.
