@@ -101,7 +101,7 @@ def test_what_is_wrong_is_said(e: Any, message: str) -> None:
         ({"instruments": "f_t"}, "instruments belongs to method"),
         ({"method": "iv4", "structure": "bj"}, "fits the structure arx"),
         ({"start": {"f1": 1.0}, "nk": 29, "nd": 1}, "start lacks"),
-        ({"start": {"f1": 1.0}}, "one model"),
+        ({"start": {"f1": 1.0}}, "single model"),
         ({"fix": {"d1": "x"}}, "d1: a number"),
         ({"fix": {"q7": 0.0}, "nk": 29, "nd": 1}, "q7"),
         ({"bound": {"b0": (1, 0)}, "nk": 29, "nd": 1}, "bound: found b0"),

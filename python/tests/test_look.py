@@ -60,7 +60,7 @@ def test_a_delay_in_seconds_is_nk() -> None:
     assert pyhoid.identify(record, "bj", nd=1, delay=(0.27, 0.29)).orders["nk"] == 29
     by_samples = pyhoid.track(record, "rpem", nd=1, nk=29)
     assert pyhoid.track(record, "rpem", nd=1, delay=0.28)["b0"][-1] == by_samples["b0"][-1]
-    with pytest.raises(pyhoid.OptionError, match="give one of them"):
+    with pytest.raises(pyhoid.OptionError, match="give only one of them"):
         pyhoid.identify(record, "bj", nk=29, delay=0.28)
     with pytest.raises(pyhoid.OptionError, match="0 s or more"):
         pyhoid.track(record, "rpem", delay=(-0.1, 0.3))

@@ -184,7 +184,7 @@ def test_what_is_fitted_is_told_from_the_options(runs: list[pyhoid.Record]) -> N
     assert isinstance(pyhoid.identify(record, nk=29, nd=1), pyhoid.Fit)
     assert isinstance(pyhoid.identify(record, method="sriv", nk=29), pyhoid.Fit)
     for name in ("operator", "family", "grey-box", "grey_box"):
-        earlier = pytest.warns(DeprecationWarning, match="operator now")
+        earlier = pytest.warns(DeprecationWarning, match="is now called operator")
         with nullcontext() if name == "operator" else earlier:
             person = pyhoid.identify(record, name, form="lead", nd=2)
         assert isinstance(person, pyhoid.OperatorFit) and person.form == "lead"

@@ -72,7 +72,7 @@ def test_damaged_pickles_are_refused(fit: pyhoid.Fit, c1: pyhoid.Record) -> None
     empty = pyhoid.Fit.__new__(pyhoid.Fit)
     place = state["text"].index('"state": "') + 200
     changed = state["text"][:place] + "A" + state["text"][place + 1 :]
-    with pytest.raises(pyhoid.DataError, match="cut or changed"):
+    with pytest.raises(pyhoid.DataError, match="truncated or changed"):
         empty.__setstate__({**state, "text": changed})
     less = {key: value for key, value in state.items() if key != "records"}
     with pytest.raises(pyhoid.DataError, match="not a pickle of a Fit"):
