@@ -248,7 +248,7 @@ const steps = {
     const cells = lines[5000].split(",");
     lines[5000] = [cells[0], cells[1], String(Number(cells[2]) + 1e-9)].join(",");
     writeFileSync(join(session, ticks), lines.join("\n"));
-    await show(/e of 1 ticks is not that of the controlled element, first at tick 4999/, "replay-corrupted");
+    await show(/e of 1 ticks does not match the controlled element, first at tick 4999/, "replay-corrupted");
     writeFileSync(join(session, ticks), text);
   },
 
