@@ -7,7 +7,6 @@ use hoid::design::compare::{Comparing, Comparison, Difference, GroupEstimates, V
 use hoid::model::numbers::{self, with_uncertainty};
 use hoid::report::{PaperTable, comparison_figure};
 use hoid::study::{RunOptions, group::Manifest};
-use tempfile::TempDir;
 
 use super::{figure, group::analysed, output_paths, paper_table};
 use crate::{args::CompareArgs, error::CliError, json, output, table::Rows, text};
@@ -64,12 +63,14 @@ pub fn run(args: &CompareArgs) -> Result<(), CliError> {
 /// Analyses recordings below the directory of the results, or in one that is removed again.
 fn of_recordings(comparing: &Comparing, path: &Path, args: &CompareArgs) -> Result<GroupEstimates, CliError> {
     let manifest = Manifest::read(path)?;
-    let removed = match args.out {
-        Some(_) => None,
-        None => Some(tempfile::tempdir().map_err(no_room)?),
+    let removed;
+    let directory = match &args.out {
+        Some(out) => out.as_path(),
+        None => {
+            removed = tempfile::tempdir().map_err(no_room)?;
+            removed.path()
+        }
     };
-    let directory = removed.as_ref().map(TempDir::path).or(args.out.as_deref());
-    let directory = directory.unwrap_or(Path::new("."));
     // With --out the runs that were analysed for another comparison stay.
     let options = RunOptions {
         jobs: args.jobs.map(usize::from),
@@ -77,7 +78,14 @@ fn of_recordings(comparing: &Comparing, path: &Path, args: &CompareArgs) -> Resu
         ..RunOptions::default()
     };
     comparing.estimates_of(&manifest, directory, |manifest, place| {
-        analysed(manifest, path, place, &options).map(|_| ())
+        match analysed(manifest, path, place, &options) {
+            // There is no --resume here: what was analysed stays with --out, and is removed without it.
+            Err(CliError::Stopped(_)) => Err(CliError::Stopped(
+                "the comparison was stopped; with --out the same command continues with the runs that were analysed"
+                    .to_owned(),
+            )),
+            outcome => outcome.map(|_| ()),
+        }
     })
 }
 

@@ -5,13 +5,9 @@
 //! section 2.6). The common form is the simplest within 2 of the least sum. A form that the data of most people leave
 //! open is not considered: its parameters would not be determined.
 
+use hoid_ident::family::{LEAST_WEIGHT, NO_EVIDENCE};
 use hoid_model::{Finding, Form};
 use hoid_study::group::FormEvidence;
-
-/// Difference of sums of criteria that counts as no evidence.
-const NO_EVIDENCE: f64 = 2.0;
-/// Akaike weight of a form below which it has none in averages, and the difference of criteria that belongs to it.
-const NO_WEIGHT: f64 = 0.02;
 
 /// A form for all, with its evidence.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,7 +22,7 @@ pub struct CommonForm {
 
 /// True if the data leave the form open: it has no weight, although its criterion is near the least.
 fn is_open(of: &FormEvidence) -> bool {
-    of.weight == 0.0 && of.criterion < -2.0 * NO_WEIGHT.ln()
+    of.weight == 0.0 && of.criterion < -2.0 * LEAST_WEIGHT.ln()
 }
 
 /// The simplest form within 2 of the least sum of criteria; `None` if no form has a criterion for all.
@@ -56,11 +52,10 @@ impl CommonForm {
         Finding::note(
             "common-form",
             format!(
-                "parameters are those of the form {} for all, the form of most evidence over {} fits (sum of criteria {:.1} above the best of each: {})",
+                "parameters are those of the form {} for all, the form of most evidence over {} fits (sum of criteria {:.1} above the best of each: {best})",
                 self.form.name(),
                 self.cells,
                 self.criterion,
-                best
             ),
         )
     }

@@ -31,9 +31,9 @@ pub struct FormFigures {
 }
 
 /// Difference of Akaike's criterion that counts as no evidence.
-const NO_EVIDENCE: f64 = 2.0;
+pub const NO_EVIDENCE: f64 = 2.0;
 /// Weight below which a form is left out: its contribution to a mean is less than the error of the mean.
-const LEAST_WEIGHT: f64 = 0.02;
+pub const LEAST_WEIGHT: f64 = 0.02;
 /// Largest number of forms that are averaged.
 const MOST_FORMS: usize = 4;
 

@@ -94,7 +94,7 @@ mod sensitivity;
 
 pub use agreement::{Agreement, AgreementMethod, AgreementPair, AgreementRow};
 pub use channel::{ChannelFit, ChannelForm, ChannelResponse, ChannelRole, SeenChannel};
-pub use choice::FormFigures;
+pub use choice::{FormFigures, LEAST_WEIGHT, NO_EVIDENCE};
 pub use clusters::ClusterKind;
 pub use instrumental::InstrumentalFit;
 pub use intersample::Intersample;
