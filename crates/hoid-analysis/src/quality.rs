@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | `stick-at-its-end` | u at a limit of its range in more than 5 % of the samples | the intended output beyond the limit is unknown: gain and margins are biased |
 //! | `resting-stick` | u comes back to one value, exactly, in 10 % of the samples or more ([`Rest`]) | a dead zone, or control in pulses: a note, as the operator is the linear part of the response |
-//! | `coarse` | e in steps of more than .05, u of more than .15 of its deviation | rounding is not a remnant: intervals and bands are too narrow |
+//! | `coarse` | e in steps of more than .05, u of more than .15 of its deviation | rounding errors do not behave like a remnant, so intervals and bands are too narrow |
 //! | `bridged` | a gap of more than .25 s on a straight line | the line counts as tracking |
 //! | `held` | a value of a sparse column held for more than .25 s | what happened in between is unknown |
 //!

@@ -9,9 +9,9 @@
 //! All are entire in (s, q): complex, real and double poles, and poles at the origin, are cases of the same functions,
 //! evaluated in different ways to avoid cancellation:
 //!
-//! - small poles: the relation between the Phi_j downwards from `Phi_j = 1/j!` (Clenshaw's
-//!   summation), and together with it the same for the slopes `D_j = dPhi_j/ds`,
-//!   `D_j = Phi_{j+1} + s D_{j+1} - q D_{j+2}`. No division, and no elementary function;
+//! - small poles: backward recursion for the Phi_j from `Phi_j = 1/j!` (Clenshaw's summation), and the corresponding
+//!   recursion for the slopes `D_j = dPhi_j/ds`, `D_j = Phi_{j+1} + s D_{j+1} - q D_{j+2}`. No division, and no
+//!   elementary function;
 //! - other poles: with `h = s/2`, `x = h^2 - q`, `E = e^h`, `C = cosh sqrt x`,
 //!   `S = sinh sqrt x/sqrt x`, `G = dS/dx = (C - S)/(2x)`, `Phi_1 = E S`,
 //!   `q Phi_2 = 1 - E C + h E S`, `D_2 = E G`; for real poles that are far apart by the differences

@@ -44,6 +44,9 @@ pub fn divide_from(d: &[f64], x: &mut [f64], from: usize) {
             };
             divide_by_second_order_in_place(filter, &mut x[from..]);
         }
+        [d1, d2, d3] => divide_in_registers([d1, d2, d3], x, from),
+        [d1, d2, d3, d4] => divide_in_registers([d1, d2, d3, d4], x, from),
+        [d1, d2, d3, d4, d5] => divide_in_registers([d1, d2, d3, d4, d5], x, from),
         _ => {
             for t in from..x.len() {
                 let mut y = x[t];
@@ -53,6 +56,23 @@ pub fn divide_from(d: &[f64], x: &mut [f64], from: usize) {
                 x[t] = y;
             }
         }
+    }
+}
+
+/// The same for a short D, with the past output in registers. The oldest output is subtracted first, so that only the
+/// last difference waits for the sample before.
+fn divide_in_registers<const N: usize>(d: [f64; N], x: &mut [f64], from: usize) {
+    let mut past: [f64; N] = core::array::from_fn(|i| from.checked_sub(i + 1).map_or(0.0, |t| x[t]));
+    for value in &mut x[from..] {
+        let mut y = *value;
+        for i in (0..N).rev() {
+            y -= d[i] * past[i];
+        }
+        for i in (1..N).rev() {
+            past[i] = past[i - 1];
+        }
+        past[0] = y;
+        *value = y;
     }
 }
 
@@ -183,7 +203,7 @@ mod tests {
 
     #[test]
     fn division_undoes_multiplication_for_every_order() {
-        let d = [-0.7, 0.31, -0.12, 0.05];
+        let d = [-0.7, 0.31, -0.12, 0.05, -0.02, 0.01];
         let x = wave(200);
         for n in 0..=d.len() {
             let mut y = vec![0.0; x.len()];
@@ -200,7 +220,7 @@ mod tests {
 
     #[test]
     fn a_division_in_parts_is_the_division() {
-        let d = [-0.7, 0.31, -0.12, 0.05];
+        let d = [-0.7, 0.31, -0.12, 0.05, -0.02, 0.01];
         for n in 0..=d.len() {
             let mut whole = wave(200);
             divide_in_place(&d[..n], &mut whole);

@@ -31,7 +31,7 @@ const LEAST_PEOPLE: usize = 3;
 /// Share of the prior above which the data carry no information.
 const ALL_PRIOR: f64 = 0.9;
 
-/// Estimate of a person from all people.
+/// Estimate for one person, pooled with all people.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PooledPerson {
     /// Name of the person.

@@ -408,8 +408,8 @@ hoid_status hoid_tracker_counts(const hoid_tracker *tracker, hoid_counts *counts
 hoid_status hoid_tracker_sample_time(const hoid_tracker *tracker, double *sample_time);
 
 /*
- The text after the last status of this thread that was not HOID_OK, empty before the first. It
- stays until the next one.
+ The text after the last status of this thread that was not HOID_OK, empty before the first. The
+ pointer stays valid until the next status of this thread that is not HOID_OK.
  */
 const char *hoid_last_error(void);
 

@@ -63,8 +63,8 @@ pub(crate) unsafe fn bytes<'a>(pointer: *const u8, length: usize, what: &str) ->
             format!("{what}: no memory has {length} bytes"),
         ));
     }
-    // SAFETY: not null, and no longer than a slice may be; that there are this many is the
-    // contract.
+    // SAFETY: the pointer is not null and the length is valid for a slice; the caller guarantees that `length` bytes
+    // are readable.
     Ok(unsafe { slice::from_raw_parts(pointer, length) })
 }
 

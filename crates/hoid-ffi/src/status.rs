@@ -107,8 +107,8 @@ fn remember(text: &str) {
     let _ = LAST.try_with(|last| *last.borrow_mut() = text);
 }
 
-/// The text after the last status of this thread that was not HOID_OK, empty before the first. It
-/// stays until the next one.
+/// The text after the last status of this thread that was not HOID_OK, empty before the first. The
+/// pointer stays valid until the next status of this thread that is not HOID_OK.
 #[unsafe(no_mangle)]
 pub extern "C" fn hoid_last_error() -> *const c_char {
     const EMPTY: &CStr = c"";

@@ -1,6 +1,6 @@
 //! The estimator by the prediction error method and its options.
 //!
-//! The options, their check, and the calls that fit. The method itself is in [`crate::pem`].
+//! Options, their validation, and the functions that fit. The method itself is in [`crate::pem`].
 
 use std::collections::BTreeMap;
 

@@ -116,7 +116,7 @@ pub struct State {
     pub open: Vec<String>,
     /// Runs that ended.
     pub done: Vec<Done>,
-    /// Names of the conditions of all runs that are to be, and which of them is next.
+    /// Names of the conditions of all planned runs; `next` is the index of the next one.
     pub planned: Vec<String>,
     /// See `planned`.
     pub next: Option<usize>,

@@ -33,7 +33,7 @@ pub struct HeldSystem {
 }
 
 impl HeldSystem {
-    /// Creates the system `num(s)/den(s)` from coefficients by descending powers of s, with den monic and num of no
+    /// Creates the system `num(s)/den(s)` from coefficients in descending powers of s, with den monic and num of no
     /// higher degree; `late` is delta/Ts.
     ///
     /// # Errors

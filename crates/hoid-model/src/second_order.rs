@@ -147,7 +147,7 @@ impl HeldStates {
 }
 
 /// Zero-order hold of a system with a direct feedthrough d in addition to the strictly proper part:
-/// `d + (b0 s + b1)/(s^2 + a1 s + a2)`, numerator and denominator by descending powers.
+/// `d + (b0 s + b1)/(s^2 + a1 s + a2)`, numerator and denominator in descending powers.
 ///
 /// The held system has the numerator `d + (d f1 + b0_d) q^-1 + (d f2 + b1_d) q^-2`.
 ///
@@ -176,7 +176,7 @@ pub fn hold_biproper(
     Ok(([d, d * held.f1 + held.b0, d * held.f2 + held.b1], [held.f1, held.f2]))
 }
 
-/// Inverse of [`hold_biproper`]: returns numerator and monic denominator by descending powers of s.
+/// Inverse of [`hold_biproper`]: returns numerator and monic denominator in descending powers of s.
 ///
 /// # Errors
 /// As [`HeldSecondOrder::inverse_zoh`].

@@ -267,7 +267,7 @@ impl fmt::Display for Orders {
     }
 }
 
-/// Returns theta in the order of these names, with every coefficient given once.
+/// Returns theta in the order of these names. Each coefficient must be given.
 ///
 /// # Errors
 /// The problem, as the end of a sentence that starts with the name of the option.

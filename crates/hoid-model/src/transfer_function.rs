@@ -6,7 +6,7 @@ use num_complex::Complex64;
 
 use crate::{ModelError, SampleTime, polynomial};
 
-/// `H(s) = num(s) / den(s) e^{-s tau}`, coefficients by descending powers of s.
+/// `H(s) = num(s) / den(s) e^{-s tau}`, coefficients in descending powers of s.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ContinuousTransferFunction {
     num: Vec<f64>,
@@ -62,12 +62,12 @@ impl ContinuousTransferFunction {
         Ok(self)
     }
 
-    /// Numerator by descending powers of s, without leading zeros.
+    /// Numerator in descending powers of s, without leading zeros.
     pub fn num(&self) -> &[f64] {
         &self.num
     }
 
-    /// Monic denominator by descending powers of s.
+    /// Monic denominator in descending powers of s.
     pub fn den(&self) -> &[f64] {
         &self.den
     }
@@ -98,7 +98,7 @@ fn without_leading_zeros(p: &[f64]) -> &[f64] {
     &p[p.iter().position(|&c| c != 0.0).unwrap_or(p.len())..]
 }
 
-/// `H(z) = num(z^-1) / den(z^-1)`, coefficients by ascending powers of `z^-1`, `den[0] = 1`. A pure delay of n samples
+/// `H(z) = num(z^-1) / den(z^-1)`, coefficients in ascending powers of `z^-1`, `den[0] = 1`. A pure delay of n samples
 /// is represented by n leading zeros in `num`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiscreteTransferFunction {
@@ -132,12 +132,12 @@ impl DiscreteTransferFunction {
         }
     }
 
-    /// Numerator by ascending powers of `z^-1`.
+    /// Numerator in ascending powers of `z^-1`.
     pub fn num(&self) -> &[f64] {
         &self.num
     }
 
-    /// Denominator by ascending powers of `z^-1`, `den[0] = 1`.
+    /// Denominator in ascending powers of `z^-1`, `den[0] = 1`.
     pub fn den(&self) -> &[f64] {
         &self.den
     }

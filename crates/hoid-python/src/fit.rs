@@ -218,7 +218,7 @@ impl PyFit {
         matrix(py, c.to_vec(), columns).map(Some)
     }
 
-    /// A, B, C, D and F by ascending powers of q^-1.
+    /// A, B, C, D and F in ascending powers of q^-1.
     ///
     /// A, C, D and F start with 1, B with the zeros of its delay.
     #[getter]

@@ -30,7 +30,7 @@
 //! | `options`, `shared_options`, `memory`, `forgetting` | [`TrackOptions`]: what is to be tracked, and how |
 //! | `person_prior` | [`PersonPrior`]: the prior knowledge of a person before the first sample |
 //! | `request`, `plan` | [`TrackRequest`]: what is requested; [`TrackPlan`]: orders that are still open, searched on the start span |
-//! | `setup`, `start`, `start_noise`, `gain` | what a recursion is built of: structure, start, way of forgetting |
+//! | `setup`, `start`, `start_noise`, `gain` | components of a recursion: structure, start, forgetting |
 //! | `kernel`, `recursion` | RLS and RPEM of the real-time kernel; what every recursion does |
 //! | `predictor`, `history`, `reported` | signals and reports for methods that are not of the kernel |
 //! | `response` | [`Response`]: gain and phase of an estimate at a frequency |

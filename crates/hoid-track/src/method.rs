@@ -111,8 +111,8 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         false
     }
 
-    /// True for a method with a model of how the person changes, and without memory: it estimates physical parameters
-    /// with the noise model of a batch fit, which stays constant.
+    /// True for a method that models how the person changes and has no memory length: it estimates physical parameters
+    /// and keeps the noise model of a batch fit.
     fn is_model_of_change(&self) -> bool {
         false
     }

@@ -175,7 +175,7 @@ impl Trace {
         whole.iter().all(|c| c.is_finite()).then_some(whole)
     }
 
-    /// True for a row before the first estimate of a method that starts itself: its numbers are not an estimate.
+    /// True for a row before the first estimate of a method that needs no start fit; such a row holds no estimate.
     pub fn is_before_the_first(&self, row: usize) -> bool {
         self.options.method.starts_itself() && self.covariance(row).is_none()
     }

@@ -261,7 +261,8 @@ pub(super) fn contrasts(factors: &[Resolved], group: &GroupEstimates) -> Result<
     Ok(all)
 }
 
-/// Returns the mean over the conditions of b minus the mean over those of a.
+/// Returns the weight of each condition in the difference: the mean over the conditions of b minus the mean over those
+/// of a.
 fn difference(conditions: &[String], a: &Members, b: &Members) -> BTreeMap<String, f64> {
     let mut weights = BTreeMap::new();
     for (level, sign) in [(a, -1.0), (b, 1.0)] {

@@ -1,4 +1,4 @@
-//! Factors: the differences between conditions, or between people.
+//! Factors: the variables in which conditions or people differ.
 //!
 //! A factor has levels, and a level has members: conditions (`axis:roll=C1_roll,C2_roll;pitch=C1_pitch,C2_pitch`) or
 //! people (`training:yes=P1,P4;no=P2,P3`). It varies **within** people if each person is in all of its levels, and

@@ -10,7 +10,7 @@
 //! the same source); if the delay leaves less, the crossover frequency with the largest margin, of at least 15 deg.
 //!
 //! **Neuromuscular system and delay**: the medians of [`OperatorPrior::population`], and one spread to each side for
-//! people who differ from the typical person. Each of them adapts the gain again.
+//! people who differ from the typical person. The gain is adapted separately for each of these people.
 
 use hoid_ident::family::OperatorPrior;
 use hoid_model::{

@@ -59,7 +59,7 @@ impl FromStr for Sought {
 pub struct DifferenceRequest {
     /// The difference.
     pub sought: Sought,
-    /// The probability with which it is to be found.
+    /// The required probability of finding it.
     pub power: f64,
     /// The level of the test.
     pub alpha: f64,
@@ -70,7 +70,7 @@ pub struct DifferenceRequest {
     pub run_to_run: f64,
 }
 
-/// Probability with which a difference is to be found.
+/// Required probability of finding a difference.
 pub const POWER: f64 = 0.8;
 /// Level of the test.
 pub const ALPHA: f64 = 0.05;
@@ -122,7 +122,7 @@ pub struct DifferencePlan {
     pub between_source: String,
     /// Numbers of people in the table.
     pub people: Vec<usize>,
-    /// Numbers of runs with their power.
+    /// Rows of the table: number of runs, people needed, and power for each number of people.
     pub rows: Vec<RunsAndPeople>,
     /// Index of the row of the answer.
     pub answer: usize,

@@ -50,13 +50,58 @@ pub(super) fn whiten_on(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: us
     divide_from(c, y, from);
 }
 
-/// `y(t) += sum_i d_i x(t - first_lag - i)` from index `from` on.
+/// `y(t) += sum_i d_i x(t - first_lag - i)` from index `from` on. Four lags in a pass read and write y once.
 fn add_lags(d: &[f64], first_lag: usize, x: &[f64], y: &mut [f64], from: usize) {
-    for (i, &di) in d.iter().enumerate() {
-        let lag = first_lag + i;
-        let start = from.max(lag);
-        if start < x.len() {
-            add_scaled(&mut y[start..], di, &x[start - lag..x.len() - lag]);
+    let (fours, rest) = d.as_chunks::<4>();
+    let mut lag = first_lag;
+    for d in fours {
+        // Up to the sample at which all four lags are inside x, one lag at a time.
+        let whole = from.max(lag + 3).min(y.len());
+        for (i, &di) in d.iter().enumerate() {
+            add_lag(di, lag + i, x, &mut y[..whole], from);
+        }
+        if whole < y.len() {
+            let before = |i: usize| &x[whole - lag - i..];
+            let earlier = before(0).iter().zip(before(1)).zip(before(2)).zip(before(3));
+            for (y, (((x0, x1), x2), x3)) in y[whole..].iter_mut().zip(earlier) {
+                *y = (((*y + d[0] * x0) + d[1] * x1) + d[2] * x2) + d[3] * x3;
+            }
+        }
+        lag += 4;
+    }
+    for (i, &di) in rest.iter().enumerate() {
+        add_lag(di, lag + i, x, y, from);
+    }
+}
+
+/// `y(t) += d x(t - lag)` from index `from` on.
+fn add_lag(d: f64, lag: usize, x: &[f64], y: &mut [f64], from: usize) {
+    let start = from.max(lag);
+    if start < y.len() {
+        add_scaled(&mut y[start..], d, &x[start - lag..]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lags_in_fours_are_lags_one_by_one() {
+        let signal = |n: usize, k: f64| (0..n).map(|t| (k * t as f64).sin()).collect::<Vec<f64>>();
+        for n in [1, 3, 5, 6, 40] {
+            let x = signal(n, 0.7);
+            for lags in 0..12 {
+                let d = signal(lags, 1.3);
+                for (first_lag, from) in [(1, 0), (2, 1), (2, 7), (1, 30)] {
+                    let (mut fours, mut ones) = (signal(n, 0.2), signal(n, 0.2));
+                    add_lags(&d, first_lag, &x, &mut fours, from);
+                    for (i, &di) in d.iter().enumerate() {
+                        add_lag(di, first_lag + i, &x, &mut ones, from);
+                    }
+                    assert_eq!(fours, ones, "{n} {lags} {first_lag} {from}");
+                }
+            }
         }
     }
 }

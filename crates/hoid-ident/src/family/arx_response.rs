@@ -18,6 +18,8 @@ const FEWEST: usize = 4;
 pub(super) const MOST_GAINS: usize = 60;
 /// Share of the innovations in the power of u below which there may be no noise.
 const PROMISING: f64 = 1e-3;
+/// Ratio of two innovation variances above which a difference of their degrees of freedom and first samples is excluded.
+const OF_DEGREES: f64 = 4.0;
 /// Orders of A of an operator: the neuromuscular system, and up to two lags.
 const OWN_ORDERS: (usize, usize) = (2, 4);
 /// Number of coefficients of B beyond the order of A: as many as that, one for a part of a sample of the delay, one for
@@ -44,7 +46,7 @@ impl ArxResponse {
     /// # Errors
     /// The errors of the regression with the fewest coefficients.
     pub fn of(records: &[Record]) -> Result<Self, IdentError> {
-        regressed(records, false, MOST_GAINS)
+        regressed(records, false, MOST_GAINS).map(|(found, _)| found)
     }
 
     /// The same for almost no noise; `None` if there is more. A u without noise does not determine the coefficients of A
@@ -52,20 +54,27 @@ impl ArxResponse {
     /// without noise is exactly a model of its own order, with the whole samples of its own delay: of both kinds, the
     /// model with the smallest innovations.
     pub fn without_noise(records: &[Record], longest_delay_s: f64) -> Option<Self> {
-        let high = regressed(records, true, MOST_GAINS).ok()?;
+        let (high, of_high) = regressed(records, true, MOST_GAINS).ok()?;
         if high.innovations > PROMISING {
             return None;
         }
+        // A model whose regressors are among those of the high order leaves at least as much as that.
+        let hopeless = |orders: &Orders| {
+            let last = |orders: &Orders| orders.nk + orders.nb;
+            let contained = orders.na <= of_high.na && orders.nk >= of_high.nk && last(orders) <= last(&of_high);
+            contained && high.innovations > OF_DEGREES * NONE
+        };
         let longest = (longest_delay_s / records[0].sample_time().s()).ceil() as usize;
         let own = (OWN_ORDERS.0..=OWN_ORDERS.1)
             .flat_map(|na| (0..=longest).map(move |nk| (na, nk)))
             .filter_map(|(na, nk)| {
                 let mut orders = Structure::Arx.operator_orders(nk);
                 (orders.na, orders.nb) = (na, na + FURTHER_GAINS);
-                with_level(orders).fit(records).ok()
+                (!hopeless(&orders)).then_some(orders)
             })
+            .filter_map(|orders| with_level(orders).fit(records).ok())
             .map(|fit| Self::of_fit(records, &fit));
-        let least = own.fold(high, |least, own| {
+        let least = own.fold(high.clone(), |least, own| {
             if own.innovations < least.innovations {
                 own
             } else {
@@ -120,7 +129,8 @@ fn gains(records: &[Record]) -> usize {
 }
 
 /// Repeats the regression with half as many coefficients, of A only or of both, until the records determine them.
-fn regressed(records: &[Record], of_a_alone: bool, most_gains: usize) -> Result<ArxResponse, IdentError> {
+/// Returns the orders too.
+fn regressed(records: &[Record], of_a_alone: bool, most_gains: usize) -> Result<(ArxResponse, Orders), IdentError> {
     let mut orders = Structure::Arx.operator_orders(1);
     (orders.na, orders.nb) = first_orders(records, 1, most_gains);
     loop {
@@ -137,7 +147,7 @@ fn regressed(records: &[Record], of_a_alone: bool, most_gains: usize) -> Result<
         };
         match fewer {
             Some(fewer) if found.is_err() => (orders.na, orders.nb) = fewer,
-            _ => return found.map(|fit| ArxResponse::of_fit(records, &fit)),
+            _ => return found.map(|fit| (ArxResponse::of_fit(records, &fit), orders)),
         }
     }
 }

@@ -19,7 +19,8 @@ use super::clusters::{freedom, quantile};
 
 /// Halvings of a bracket.
 const HALVINGS: usize = 80;
-/// Number of widths of all intervals beyond which Student's distribution has less than a hundredth of a tail.
+/// Distance from the intervals, in widths of their union, beyond which Student's distribution leaves less than a
+/// hundredth of [`TAIL`].
 const FAR: f64 = 50.0;
 /// Probability in each tail.
 const TAIL: f64 = 0.025;

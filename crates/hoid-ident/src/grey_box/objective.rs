@@ -5,7 +5,7 @@
 //! `psi_eta' psi_eta = J' psi' psi J`, both summed over the records. nk changes with tau_e, but the first residual that
 //! counts does not: the loss is a function of eta only.
 
-use std::{fmt, sync::Arc};
+use std::{fmt, ops::Range, sync::Arc};
 
 use crate::{
     IdentError, InitialState,
@@ -13,7 +13,7 @@ use crate::{
         Criterion, Data, Workspace,
         further_input::{FurtherInput, InputOrders},
     },
-    linalg::least_squares::dot,
+    linalg::least_squares::{add_scaled, dot},
     optimize::Linearisation,
     optimize::{Minimum, Objective, SearchOptions, minimise},
 };
@@ -203,6 +203,21 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         self.layout.map(eta, record, held).ok()
     }
 
+    /// Returns the runs of successive records whose parameters have the same places in eta: they have the same
+    /// polynomials.
+    fn of_same_places(&self) -> impl Iterator<Item = Range<usize>> {
+        let records = 0..self.data.len();
+        let mut next = records.start;
+        std::iter::from_fn(move || {
+            let start = next;
+            let places = (start < records.end).then(|| self.layout.positions(start))?;
+            next = (start + 1..records.end)
+                .find(|record| self.layout.positions(*record) != places)
+                .unwrap_or(records.end);
+            Some(start..next)
+        })
+    }
+
     /// Sets the gains that are best for the other parameters, and returns the sum of squares there: the residual is
     /// affine in K_e and K_e_dot. Only for one set of parameters common to all records, with K_e_dot as coordinate.
     pub fn best_gains(&self, eta: &mut [f64], workspace: &mut Workspace) -> Option<f64> {
@@ -315,31 +330,33 @@ const NEAR_BORDER: f64 = 1e-6;
 impl<P: Parametrisation> Objective for PhysicalCriterion<'_, P> {
     fn is_feasible(&self, eta: &[f64]) -> bool {
         eta.iter().all(|v| v.is_finite())
-            && (0..self.data.len()).all(|record| {
-                self.polynomials(eta, record)
-                    .is_some_and(|p| self.of_record(&p, record).is_feasible(&p.theta))
+            && self.of_same_places().all(|records| {
+                self.polynomials(eta, records.start)
+                    .is_some_and(|p| self.of_record(&p, records.start).is_feasible(&p.theta))
             })
     }
 
     fn linearise(&self, eta: &[f64], workspace: &mut Workspace) -> Linearisation {
         let p = eta.len();
-        let mut total = Linearisation {
-            sum_of_squares: 0.0,
-            descent: vec![0.0; p],
-            gram: vec![0.0; p * p],
-        };
-        for record in 0..self.data.len() {
-            let Some(polynomials) = self.polynomials(eta, record) else {
+        let mut total = Linearisation::empty(p);
+        for records in self.of_same_places() {
+            let Some(polynomials) = self.polynomials(eta, records.start) else {
                 // Only for an eta that is not feasible.
                 total.sum_of_squares = f64::NAN;
                 return total;
             };
-            let of_theta = self
-                .of_record(&polynomials, record)
-                .linearise(&polynomials.theta, workspace);
-            total.sum_of_squares += of_theta.sum_of_squares;
-            let positions = self.layout.positions(record);
             let n = polynomials.theta.len();
+            let mut of_theta = Linearisation::empty(n);
+            for record in records.clone() {
+                let own = self
+                    .of_record(&polynomials, record)
+                    .linearise(&polynomials.theta, workspace);
+                of_theta.sum_of_squares += own.sum_of_squares;
+                add_scaled(&mut of_theta.descent, 1.0, &own.descent);
+                add_scaled(&mut of_theta.gram, 1.0, &own.gram);
+            }
+            total.sum_of_squares += of_theta.sum_of_squares;
+            let positions = self.layout.positions(records.start);
             let columns = &polynomials.columns;
             for (i, &place) in positions.iter().enumerate() {
                 total.descent[place] += dot(&columns[i], &of_theta.descent);

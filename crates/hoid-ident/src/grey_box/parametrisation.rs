@@ -66,7 +66,8 @@ pub(crate) trait Parametrisation: Clone {
     fn delay_of(&self, record: usize) -> usize;
     /// Returns the time between two samples.
     fn sample_time(&self) -> SampleTime;
-    /// Delay at which sample 0 starts, in samples: the model of a smooth error responds half a sample later.
+    /// Delay in samples at which the interval of zero whole samples starts: -0.5 where e is interpolated (the response
+    /// is half a sample later), 0 by default.
     fn first_sample_begins(&self) -> f64 {
         0.0
     }
@@ -78,7 +79,8 @@ pub(crate) trait Parametrisation: Clone {
     fn further(&self) -> Vec<InputOrders> {
         Vec::new()
     }
-    /// Returns the polynomials of one record, with its delays in these samples.
+    /// Returns the polynomials of one record, with its delays in these samples: the same for all records with the same
+    /// places in eta.
     ///
     /// # Errors
     /// [`ModelError`] for an eta without a model.

@@ -1,10 +1,10 @@
 //! The covariance of an estimate by instrumental variables, for a residual of any colour.
 //!
-//! For a residual with the covariance matrix R, independent of Z, `(Z' Phi)^-1 Z' R Z (Phi' Z)^-1`
-//! (T. Söderström and P. Stoica, *Instrumental Variable Methods for System Identification*, 1983,
-//! ch. 5). R is that of a long autoregression `D r = eps` of the residual: `Z' R Z = lambda (H'Z)' (H'Z)`, with H' the
-//! filter 1/D run backwards in time. If the filter has made the residual white, it is Ljung's (15.29),
-//! `lambda (Z'Z)^-1` for Z = Phi.
+//! For a residual with the covariance matrix R, independent of Z, `(Z' Phi)^-1 Z' R Z (Phi' Z)^-1` (T. Söderström and
+//! P. Stoica, *Instrumental Variable Methods for System Identification*, 1983, ch. 5). R is that of a long
+//! autoregression `D r = eps` of the residual: `Z' R Z = lambda (H'Z)' (H'Z)`, with H' the filter 1/D run backwards in
+//! time. If the filter has whitened the residual, this covariance reduces to Ljung's eq. 15.29, `lambda (Z'Z)^-1`, for
+//! Z = Phi.
 
 use hoid_core::filter::{divide_in_place, multiply};
 use hoid_model::polynomial::reflected_inside;

@@ -11,8 +11,8 @@
 //! | automatic | Levenberg-Marquardt, near the minimum with a secant; where it finds no lower loss although the gradient is not zero, it continues in coordinates in which the border of stability is a bound ([`reflection_coefficients`]) |
 //!
 //! **The secant.** Gauss and Newton neglect the part of the second derivative that vanishes for white residuals of the
-//! right model. If the model is not right (a delay that is off by a few samples), they converge only by a constant
-//! factor per step. Near the minimum a matrix S replaces the neglected part, `(H + S) s = g(theta) - g(theta + s)` for
+//! right model. If the model is wrong (for example, with a delay off by a few samples), Gauss-Newton steps converge
+//! only linearly. Near the minimum a matrix S replaces the neglected part, `(H + S) s = g(theta) - g(theta + s)` for
 //! each step s, by symmetric corrections of rank one (J. E. Dennis, D. M. Gay and R. E. Welsch, *ACM Trans.
 //! Mathematical Software* 7 (1981) 348-368, with the correction of C. G. Broyden, *Math. Computation* 21 (1967)
 //! 368-381). It affects only the steps; if a step with it does not decrease the loss, it is repeated without it.

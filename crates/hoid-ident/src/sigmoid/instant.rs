@@ -16,7 +16,7 @@ pub(crate) struct Instant {
     pub by_log_rate: f64,
     /// The parameters of the numerator, the gain first.
     pub values: [f64; MOST_VARYING],
-    /// The numerator divided by its gain, by ascending powers of s.
+    /// The numerator divided by its gain, in ascending powers of s.
     pub shape: [f64; 3],
     /// Derivatives of the shape with respect to the parameters other than the gain.
     pub slopes: [[f64; 3]; 2],

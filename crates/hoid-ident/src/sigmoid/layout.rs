@@ -198,8 +198,8 @@ impl Layout {
             .map_or("", |(_, unit)| unit)
     }
 
-    /// Converts a typed and reported number to an element, or back: except for the logarithm each conversion is its own
-    /// inverse.
+    /// Converts a number as typed by the user to an element of theta. Except for the logarithm, each conversion is its
+    /// own inverse.
     pub fn of_typed(&self, place: usize, value: f64) -> f64 {
         match place {
             _ if place == self.log_rate => value.ln(),

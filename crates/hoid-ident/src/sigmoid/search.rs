@@ -13,8 +13,8 @@ const LOOK: usize = 30;
 /// Distance to the border of a piece, in pieces, below which the next piece is tried.
 const NEAR_BORDER: f64 = 1e-6;
 
-/// Returns the lowest of the minima from these starts, with the name of its start: a few steps from each, then the best
-/// to completion.
+/// Returns the lowest minimum found from these starts and the name of its start. Each start gets a few steps; only the
+/// best search is completed.
 ///
 /// # Errors
 /// [`IdentError::NoFiniteLoss`].

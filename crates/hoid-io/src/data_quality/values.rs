@@ -24,8 +24,8 @@ const STAY: (usize, usize) = (3, 5);
 /// Ratio of the rows at the limit to the average of the next steps.
 const PEAK: usize = 6;
 
-/// Rows after which a channel whose values are different so far counts as one in full precision: hours of a recording. All
-/// its values in order would take longer than reading them.
+/// Rows examined in a long channel (hours of recording). If more than half of their values are distinct, the channel
+/// counts as full precision. Sorting all its values would take longer than reading them.
 const EXAMINED: usize = 1 << 20;
 
 /// A saturation limit of a channel.

@@ -72,7 +72,7 @@ impl Moments {
         column.values.push(seconds(ns, first));
     }
 
-    /// The column contains a number: apparent clock times are text.
+    /// A number was found in the column: its apparent clock times are treated as text.
     pub(crate) fn refuse(&mut self, column: &mut Column) {
         if let Self::From(_) = std::mem::replace(self, Self::No) {
             column.moments = false;

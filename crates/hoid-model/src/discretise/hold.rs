@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::ContinuousTransferFunction;
 
-/// Returns the system after a hold with a delay of a `fraction` of a sample, by ascending powers of `z^-1`; a nonzero
+/// Returns the system after a hold with a delay of a `fraction` of a sample, in ascending powers of `z^-1`; a nonzero
 /// fraction makes the numerator longer by one. `None` if the matrix exponential is not finite.
 pub(super) fn hold(
     h: &ContinuousTransferFunction,
@@ -130,7 +130,7 @@ fn transfer_function_in_delta(row: &DVector<f64>, m: &DMatrix<f64>, column: &DVe
     (num, den)
 }
 
-/// Converts a polynomial by descending powers of `delta = z - 1` to powers of z.
+/// Converts a polynomial in descending powers of `delta = z - 1` to powers of z.
 fn from_delta_to_z(p: &[f64]) -> Vec<f64> {
     let mut result: Vec<f64> = Vec::with_capacity(p.len());
     for &c in p {

@@ -4,7 +4,7 @@ use num_complex::Complex64;
 
 use crate::{ContinuousTransferFunction, polynomial};
 
-/// Maps poles and zeros by `z = e^{s Ts}`, by descending powers of z. `None` if the roots cannot be found.
+/// Maps poles and zeros by `z = e^{s Ts}`, in descending powers of z. `None` if the roots cannot be found.
 pub(super) fn matched(h: &ContinuousTransferFunction, ts: f64) -> Option<(Vec<f64>, Vec<f64>)> {
     let poles = polynomial::roots(h.den())?;
     let leading = h.num()[0];
@@ -24,7 +24,7 @@ pub(super) fn matched(h: &ContinuousTransferFunction, ts: f64) -> Option<(Vec<f6
     Some((num.iter().map(|c| gain * c).collect(), image(&poles, ts)))
 }
 
-/// `prod (z - e^{p Ts})` by descending powers of z.
+/// `prod (z - e^{p Ts})` in descending powers of z.
 fn image(roots: &[Complex64], ts: f64) -> Vec<f64> {
     polynomial::from_roots(&roots.iter().map(|p| (p * ts).exp()).collect::<Vec<_>>())
 }

@@ -96,7 +96,7 @@ fn no_finite_result(h: &ContinuousTransferFunction) -> ModelError {
     }
 }
 
-/// Numerator and denominator, by descending powers of z, after `s = c (z - 1) / q(z)`.
+/// Numerator and denominator, in descending powers of z, after `s = c (z - 1) / q(z)`.
 fn substitute(h: &ContinuousTransferFunction, c: f64, q: [f64; 2]) -> Result<(Vec<f64>, Vec<f64>), ModelError> {
     let order = h.den().len() - 1;
     let den = substitute_in_polynomial(h.den(), order, c, q);
@@ -115,7 +115,7 @@ fn substitute(h: &ContinuousTransferFunction, c: f64, q: [f64; 2]) -> Result<(Ve
     Ok((substitute_in_polynomial(h.num(), order, c, q), den))
 }
 
-/// `q(z)^order p(s)` for p by descending powers of s, of degree `order` or less.
+/// `q(z)^order p(s)` for p in descending powers of s, of degree `order` or less.
 fn substitute_in_polynomial(p: &[f64], order: usize, c: f64, q: [f64; 2]) -> Vec<f64> {
     let mut result = vec![p[0]];
     let mut q_power = vec![1.0];

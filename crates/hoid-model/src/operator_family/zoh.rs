@@ -197,7 +197,7 @@ impl FamilyOperator {
         HeldFamily::of_impulse_response(sample + shift, &impulse, &poles.f)
     }
 
-    /// Returns numerator and monic denominator by ascending powers of `s Ts`.
+    /// Returns numerator and monic denominator in ascending powers of `s Ts`.
     pub(super) fn by_samples(&self, variables: &[Dual], ts: f64) -> (Vector, Vector) {
         let Rational { numerator, .. } = self.form().rational(variables);
         (

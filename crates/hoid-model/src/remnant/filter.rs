@@ -18,9 +18,9 @@ pub struct RemnantFilter {
 /// `C(q^-1)/D(q^-1) eps'`, both monic with all roots inside the unit circle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseModel {
-    /// `[1, c1, ...]` by ascending powers of `q^-1`.
+    /// `[1, c1, ...]` in ascending powers of `q^-1`.
     pub c: Vec<f64>,
-    /// `[1, d1, ..., dm]` by ascending powers of `q^-1`.
+    /// `[1, d1, ..., dm]` in ascending powers of `q^-1`.
     pub d: Vec<f64>,
     /// Standard deviation sigma' of eps'.
     pub innovation_sd: f64,

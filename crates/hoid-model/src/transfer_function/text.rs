@@ -1,6 +1,6 @@
 //! Parsing and formatting of transfer functions in s.
 //!
-//! Two notations are accepted. `NUM/DEN` with commas contains the coefficients by descending powers of s: `90/1,6,0`.
+//! Two notations are accepted. `NUM/DEN` with commas contains the coefficients in descending powers of s: `90/1,6,0`.
 //! Any other text is an expression in s:
 //!
 //! ```text
@@ -111,7 +111,7 @@ fn number(value: f64) -> String {
     }
 }
 
-/// Formats a polynomial by descending powers, `s^2 + 6s - 1`.
+/// Formats a polynomial in descending powers, `s^2 + 6s - 1`.
 fn polynomial_text(p: &[f64]) -> String {
     let mut text = String::new();
     for (c, power) in p.iter().zip((0..p.len()).rev()).filter(|(c, _)| **c != 0.0) {

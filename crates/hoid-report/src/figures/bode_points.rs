@@ -125,7 +125,8 @@ fn half_bar(value: &Estimate) -> f64 {
     value.standard_error.map_or(0.0, |s| Z_95 * s).clamp(0.0, 1e6)
 }
 
-/// Linear interpolation between the points of a curve, the nearest end outside; `None` without a finite value.
+/// Interpolates linearly between the points of a curve and returns the value at the nearest end outside it; `None` if
+/// the value is not finite.
 fn interpolated(omega: &[f64], y: &[f64], at: f64) -> Option<f64> {
     let n = omega.len().min(y.len());
     let above = omega[..n].partition_point(|w| *w <= at);

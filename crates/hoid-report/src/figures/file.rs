@@ -7,7 +7,7 @@ use std::path::Path;
 
 use crate::ReportError;
 
-/// Resolution of a PNG, dots per inch: that which journals require of colour line art. 85 mm are 1004 dots.
+/// Resolution of a PNG in dots per inch, as journals require for colour line art. 85 mm are 1004 dots.
 pub const DPI: f64 = 300.0;
 
 /// Formats in which a figure can be written.

@@ -101,7 +101,7 @@ struct Reason {
 /// The reasons, the most frequent first. Those that differ only in their numbers are combined, with
 /// the text of the first.
 fn reasons(trace: &Evaluated<'_>) -> Vec<Reason> {
-    // No kind for rows before the first estimate.
+    // Rows before the first estimate have the kind `None`.
     let mut found: Vec<(Option<Discriminant<NotConvertible>>, Reason)> = Vec::new();
     let of = trace.section.trace;
     let rows = of.times_s().iter().zip(&trace.operators).enumerate();

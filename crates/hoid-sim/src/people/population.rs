@@ -162,7 +162,7 @@ hoid_model::named_choice!(Plant, "controlled element", 3, {
 });
 
 impl Plant {
-    /// Returns its denominator by descending powers of s; the numerator is one.
+    /// Returns its denominator in descending powers of s; the numerator is one.
     pub fn denominator(self) -> &'static [f64] {
         match self {
             Self::Integrator => &[1.0, 0.0],

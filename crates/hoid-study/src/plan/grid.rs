@@ -80,8 +80,8 @@ pub fn line_at(text: &str, byte: usize) -> usize {
         .count()
 }
 
-/// All combinations of the lists of a table. The lists or tables of the keys in `whole`, joined by dots, are kept
-/// unchanged.
+/// All combinations of the values in the lists of a table. The lists or tables of the keys in `whole`, joined by dots,
+/// are kept unchanged.
 pub fn variants(table: &Spanned<DeTable<'_>>, source: &str, whole: &[&str]) -> Result<Vec<Variant>, PlanProblem> {
     let mut leaves = Vec::new();
     collect(table.get_ref(), source, whole, &mut Vec::new(), &mut leaves)?;

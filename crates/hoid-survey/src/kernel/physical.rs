@@ -334,7 +334,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         self.polynomials.whole_samples + 1
     }
 
-    /// Returns the adaptation for changes from outside.
+    /// Returns the adaptation, for modification by the caller.
     pub fn adaptation_mut(&mut self) -> &mut A {
         &mut self.adaptation
     }

@@ -43,7 +43,7 @@ impl NormalEquations {
         }
     }
 
-    /// Returns the coefficients, with D added to the data (its lower triangle is used).
+    /// Returns theta. `prior` is D, of which only the lower triangle is read.
     pub fn solve(&self, method: &'static str, prior: &DMatrix<f64>) -> Result<DMatrix<f64>, ThesisError> {
         // The Cholesky factorisation reads the lower triangle only.
         let factor: Option<Cholesky<f64, Dyn>> = (&self.gram + prior).cholesky();

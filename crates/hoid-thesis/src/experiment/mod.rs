@@ -19,7 +19,7 @@
 //! | module | contents |
 //! |---|---|
 //! | `people` | [`ExperimentPlan`]: the virtual people |
-//! | `recorded` | [`RecordedPeople`]: recordings by the manifest of a group |
+//! | `recorded` | [`RecordedPeople`]: recordings listed in the manifest of a group |
 //! | [`procedure`] | what is done with one run |
 
 mod people;

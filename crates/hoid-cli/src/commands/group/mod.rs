@@ -214,7 +214,7 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
     Ok(())
 }
 
-/// Analyses the runs of a manifest into a directory, with a progress bar.
+/// Analyses the runs of a manifest, with a progress bar, and writes the results to a directory.
 pub fn analysed(manifest: &Manifest, path: &Path, out: &Path, options: &RunOptions) -> Result<Outcome, CliError> {
     let base = path.parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf);
     let runs = manifest.runs.iter().filter(|run| run.counts).count();

@@ -12,7 +12,7 @@ const SMOOTHED: f64 = 0.35;
 /// Rounds of weights.
 const ROUNDS: usize = 3;
 
-/// An element of `m` zeros and `n` poles by least squares; coefficients by descending powers of s.
+/// An element of `m` zeros and `n` poles by least squares; coefficients in descending powers of s.
 pub(super) struct Fitted {
     pub(super) num: Vec<f64>,
     pub(super) den: Vec<f64>,

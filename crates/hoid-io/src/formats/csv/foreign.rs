@@ -155,7 +155,7 @@ fn cells(line: &str, mark: Option<char>) -> Vec<&str> {
     }
 }
 
-/// True for words over a row of as many cells, most of them numbers.
+/// True if `names` can be the header of `row`: as many cells, most cells of the row numeric, and no name a number.
 fn is_header(names: &[&str], row: &[&str]) -> bool {
     let numbers = row.iter().filter(|cell| is_number(cell)).count();
     names.len() > 1

@@ -1,8 +1,8 @@
-//! Version 7.3: HDF5 in MATLAB's conventions, and HDF5 of other programs. Structures are groups, arrays of structures
-//! and cells are references to objects under `/#refs#`, dimensions are in the order of C and therefore reversed,
-//! `MATLAB_class` gives the class of a dataset and `MATLAB_object_decode` marks an object. Datasets without these
-//! attributes, as other programs write them, are numbers; in files that are not from MATLAB, dimensions remain in the
-//! order of C.
+//! Version 7.3: HDF5 with MATLAB's conventions, and HDF5 files from other programs. Structures are groups, arrays of
+//! structures and cells are references to objects under `/#refs#`, dimensions are in the order of C and therefore
+//! reversed, `MATLAB_class` gives the class of a dataset and `MATLAB_object_decode` marks an object. Datasets without
+//! these attributes, as other programs write them, are numbers; in files that are not from MATLAB, dimensions remain in
+//! the order of C.
 
 use std::rc::Rc;
 

@@ -1,4 +1,4 @@
-//! Coefficients by descending powers of s: `90/1,6,0`.
+//! Coefficients in descending powers of s: `90/1,6,0`.
 
 use super::ratio::Ratio;
 
