@@ -292,7 +292,7 @@ impl Shared {
         let long = |(name, value): (&String, &String)| name.len() > 64 || value.len() > 512;
         if browser.len() > 32 || browser.iter().any(long) {
             return Err(LabError::Message(
-                "the message of the page about its browser is too long".to_owned(),
+                "the browser information sent by the page is too long".to_owned(),
             ));
         }
         if let Some(page) = self.pages().get_mut(&id) {

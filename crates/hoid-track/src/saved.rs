@@ -82,7 +82,7 @@ impl Tracker {
             reason: "the numbers are those of a tracker with other options; save it again".to_owned(),
         };
         let numbers = opened(numbers).ok_or_else(|| IdentError::BadStart {
-            reason: "the numbers of the saved tracker were changed or truncated since; save it again".to_owned(),
+            reason: "the saved tracker was changed or truncated after it was saved; save it again".to_owned(),
         })?;
         let p = options.parameter_names().len();
         let square = p.saturating_mul(p);

@@ -79,7 +79,7 @@ impl Stage {
     ) -> Result<Self, IdentError> {
         let Some(orders) = orders else {
             let warm_up = WarmUp::restored(sample_time, numbers).ok_or_else(|| IdentError::BadStart {
-                reason: "the numbers of the saved warm-up were changed or truncated since; save it again".to_owned(),
+                reason: "the saved warm-up was changed or truncated after it was saved; save it again".to_owned(),
             })?;
             return Ok(Self::Collecting(warm_up));
         };

@@ -102,7 +102,7 @@ pub struct SimulateGroupArgs {
         default_value = "C1,C2,C3,C4,C5,C6"
     )]
     pub conditions: Vec<Condition>,
-    /// Runs of each subject and condition
+    /// Number of runs per subject and condition
     #[arg(long, value_name = "N", default_value_t = 5)]
     pub runs: u64,
     /// Spread of the parameters between subjects, 0.1 for 10 %
@@ -152,7 +152,7 @@ pub struct PeopleOptions {
         value_parser = choice_of(&RemnantKind::ALL)
     )]
     pub remnants: Vec<RemnantKind>,
-    /// With --people: range of the remnant's share in the variance of u
+    /// With --people: range of the remnant's share of the variance of u
     #[arg(long, value_name = "LO..HI", requires = "people", default_value = "0.05..0.5", value_parser = parse_span)]
     pub remnant_share: (f64, f64),
     /// With --people: sample time in s [default: 1/60]

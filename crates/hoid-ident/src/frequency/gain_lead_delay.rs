@@ -159,7 +159,7 @@ impl DescribingFunction {
                     Some(weights) => Ok(weights),
                     None => refuse(
                         "the weights of the lines",
-                        "variance, without a standard error at every line",
+                        "variance, although not every line has a standard error above zero",
                         "several runs that differ, or other weights",
                     ),
                 }

@@ -82,8 +82,8 @@ impl DescribingFunction {
         if ratios.len() < self.lines.len() {
             return refuse(
                 "the controlled element",
-                "no channel of its output",
-                "one in the options of describe",
+                "no output channel",
+                "an output channel, named in the options of describe",
             );
         }
         let per_run: Vec<Vec<Complex64>> = ratios.iter().map(|r| r.per_run()).collect();

@@ -158,7 +158,7 @@ fn tracker() -> Vec<FmuVariable> {
             "change_log_odds",
             "",
             Real(f64::NAN),
-            "logarithm of the odds of a change within the last seconds",
+            "log odds of a change in the last few seconds",
         ),
         output(
             "change_t",

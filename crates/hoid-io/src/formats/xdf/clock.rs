@@ -53,7 +53,7 @@ pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
     let nominal_hz = stream.header.nominal_hz;
     if nominal_hz <= 0.0 || stream.header.can_drop {
         notes.push(format!(
-            "stream {name}: {resets}; its time stamps are kept, because they are not even"
+            "stream {name}: {resets}; its time stamps are kept, because they are not evenly spaced"
         ));
         return times;
     }
@@ -72,7 +72,7 @@ pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
         String::new()
     };
     notes.push(format!(
-        "stream {name}: {resets}; {nominal_hz} Hz stated{found}; jitter removed by a line{breaks}"
+        "stream {name}: {resets}; {nominal_hz} Hz stated{found}; jitter removed by fitting a line to the time stamps{breaks}"
     ));
     times
 }
