@@ -72,10 +72,10 @@
 //! | [`predictor`], [`shape`] | one-step predictor of the general model with its gradient; orders of the model |
 //! | [`adaptation`], [`covariance`], [`window`] | from gradient to step: rules of forgetting; P with a guard against windup; a rectangular window |
 //! | [`ud_covariance`] | the covariance `U D U'` |
-//! | [`error_bars`], [`sensitivities`], [`innovation_variance`] | covariance of the estimate whatever the gain, errors in the filters, sigma^2 |
+//! | [`error_bars`], [`sensitivities`], [`innovation_variance`] | covariance of the estimate for any gain, errors in the filters, sigma^2 |
 //! | [`recursion`] | outcome of a step, polynomials that are kept stable |
-//! | [`guard`] | samples and spans that no tracking signal makes, before a recursion sees them |
-//! | [`held_operator`], [`divided_differences`] | exact zero-order hold of the operator with any delay, and its Jacobian; the functions that it is made of |
+//! | [`guard`] | detection of samples and spans that cannot come from tracking, before they reach a recursion |
+//! | [`held_operator`], [`divided_differences`] | exact zero-order hold of the operator with any delay, and its Jacobian; the functions of which it is composed |
 //! | [`filter`], [`delay`], [`stability`] | rational filters over slices, a delay line, the Schur-Cohn test |
 //! | [`mod@state`] | the numbers that change, to save a recursion and continue elsewhere |
 #![no_std]

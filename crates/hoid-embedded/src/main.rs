@@ -3,7 +3,7 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `run.rs` | what is the same everywhere: lines, filter, estimates |
+//! | `run.rs` | code common to all targets: lines, filter, estimates |
 //! | `board.rs` | entry, files and output of a processor without an operating system, by semihosting |
 //!
 //! On the host it is an ordinary program, so that the digits of both can be compared (`cargo xtask embedded`). No

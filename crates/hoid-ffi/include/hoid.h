@@ -114,7 +114,7 @@ typedef struct {
    */
   double seconds_ago;
   /*
-   Logarithm of the odds of a change within the last seconds.
+   Logarithm of the odds of a change within the last few seconds.
    */
   double log_odds;
   /*
@@ -166,7 +166,7 @@ typedef struct {
    */
   int32_t ready;
   /*
-   1 when e or u was a fault: not a finite number, or beyond `largest`.
+   1 when e or u was faulty: not a finite number, or beyond `largest`.
    */
   int32_t skipped;
   /*
@@ -238,7 +238,7 @@ extern "C" {
 uint32_t hoid_abi_version(void);
 
 /*
- The version of hoid, as "0.1.0".
+ The version of hoid, such as "0.1.0".
  */
 const char *hoid_version(void);
 

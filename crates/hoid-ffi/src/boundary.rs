@@ -1,4 +1,4 @@
-//! Pointers of the caller: all that this crate relies on.
+//! Pointers from the caller: all assumptions of this crate about them.
 //!
 //! A pointer that is null or not aligned is refused. Two conditions cannot be checked and are the
 //! contract of every function here: the pointer refers to an object as the header describes it, and
@@ -37,7 +37,7 @@ fn check<T>(pointer: *const T, what: &str) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A text of the caller; `None` for a null pointer.
+/// A text from the caller; `None` for a null pointer.
 ///
 /// # Safety
 /// `pointer` is null or points to a text that ends with a zero and stays as it is during the call.
@@ -51,7 +51,7 @@ pub(crate) unsafe fn text<'a>(pointer: *const c_char, what: &str) -> Result<Opti
     text.to_str().map(Some).map_err(wrong)
 }
 
-/// Bytes of the caller.
+/// Bytes from the caller.
 ///
 /// # Safety
 /// `pointer` is null or points to `length` bytes that stay as they are during the call.
@@ -109,7 +109,7 @@ pub(crate) unsafe fn put_all<T: Copy>(
     Ok(())
 }
 
-/// A tracker into the hands of the caller.
+/// Passes a tracker to the caller.
 ///
 /// # Safety
 /// `place` is null or points to room for a pointer.

@@ -20,7 +20,7 @@
 //! | `options` | options in JSON, by the keywords of Python |
 //! | `saved`, `packed` | a tracker as bytes |
 //! | `status`, `boundary` | statuses and their texts; pointers |
-//! | `types` | what is handed over |
+//! | `types` | types that cross the interface |
 //! | `making`, `stepping`, `reading` | the functions |
 //! | [`fmi`] | the functions of the Functional Mock-up Interface |
 

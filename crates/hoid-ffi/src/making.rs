@@ -17,7 +17,7 @@ pub extern "C" fn hoid_abi_version() -> u32 {
     HOID_ABI_VERSION
 }
 
-/// The version of hoid, as "0.1.0".
+/// The version of hoid, such as "0.1.0".
 #[unsafe(no_mangle)]
 pub extern "C" fn hoid_version() -> *const c_char {
     const VERSION: &CStr = match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {

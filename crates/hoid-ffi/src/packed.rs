@@ -2,7 +2,7 @@
 //!
 //! | bytes | |
 //! |---|---|
-//! | 8 | what it is, and the version of its layout |
+//! | 8 | type of the object, and the version of its layout |
 //! | 8 | length L of the description |
 //! | L | the description |
 //! | | the bytes |

@@ -178,7 +178,7 @@ impl Session {
         Ok(shown(&change))
     }
 
-    /// Logarithm of the odds of a change within the last seconds.
+    /// Logarithm of the odds of a change within the last few seconds.
     pub fn change_log_odds(&self) -> Result<f64, Failure> {
         let odds = self.tracker()?.change_odds();
         odds.ok_or_else(|| Failure::nothing("the method does not report changes; adaptive and multiple-model do"))

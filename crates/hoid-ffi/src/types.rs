@@ -12,7 +12,7 @@ pub struct HoidOutcome {
     pub innovation: f64,
     /// 1 once there is an estimate.
     pub ready: i32,
-    /// 1 when e or u was a fault: not a finite number, or beyond `largest`.
+    /// 1 when e or u was faulty: not a finite number, or beyond `largest`.
     pub skipped: i32,
     /// 1 when the guard held it back.
     pub held: i32,
@@ -77,7 +77,7 @@ pub const HOID_SHIFTS: usize = 6;
 pub struct HoidChange {
     /// How long ago the person changed when it was declared, s.
     pub seconds_ago: f64,
-    /// Logarithm of the odds of a change within the last seconds.
+    /// Logarithm of the odds of a change within the last few seconds.
     pub log_odds: f64,
     /// Its probability.
     pub probability: f64,

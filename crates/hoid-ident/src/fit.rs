@@ -264,7 +264,7 @@ impl Fit {
     }
 
     /// Returns T_n and K_n of the remnant filter that the noise model represents. A grey box has fitted them for a hold
-    /// over each sample, whatever `how` is.
+    /// over each sample, regardless of `how`.
     ///
     /// # Errors
     /// [`NotConvertible`] with the reason.

@@ -2,7 +2,7 @@
 //!
 //! **The problem.** A person tracks a target: they see the error e and move the control, u. Both are sampled with the
 //! period Ts. The dynamics from e to u, their uncertainty, and the part of u that they leave unexplained, the remnant,
-//! are to be estimated.
+//! must be estimated.
 //!
 //! **The model.** Everything here is a case of
 //!

@@ -25,16 +25,16 @@
 //! | module | contents |
 //! |---|---|
 //! | `formats` | the formats, a module each, and what they share; [`readable_endings`] |
-//! | `table` | the columns of any format; [`ColumnExpression`], [`error_among`]: which of them are meant |
-//! | `time` | [`TimeChoice`]: which column is the time; whether it is even: [`even_times`] |
+//! | `table` | the columns of any format; [`ColumnExpression`], [`error_among`]: selection of columns |
+//! | `time` | [`TimeChoice`]: choice of the time column; [`even_times`]: check that the times are evenly spaced |
 //! | `record` | [`read_record`], [`read_aligned`], [`read_segments`] by [`ReadOptions`]; [`write_record`] |
 //! | `preparation` | [`Preparation`]: scale, offset, rate, run-in and trend of channels, and the account of it |
 //! | `data_quality` | [`QualityIssue`]: the problems of the sampling and the values, where and how much |
-//! | `survey` | [`survey()`]: what is inside of a file |
+//! | `survey` | [`survey()`]: overview of the contents of a file |
 //! | `scenario` | [`read_scenario`]: scenarios in TOML |
 //! | [`fmu`] | functional mock-up units |
 //! | `results` | [`OutputTable`], [`write_table`], [`TableWriter`]: tables of results; [`read_fit`]: a fit that was printed |
-//! | `output` | [`write_atomically`], [`check_output`], [`DirectoryLock`]: what holds for all that is written |
+//! | `output` | [`write_atomically`], [`check_output`], [`DirectoryLock`]: rules for all output |
 //! | `input_file` | [`read_text`], [`read_settings`]: files that are not recordings |
 //! | `wording` | numbers and names in messages |
 //! | `error` | [`IoError`] |

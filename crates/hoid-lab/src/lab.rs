@@ -7,7 +7,7 @@
 //! | file | contents |
 //! |---|---|
 //! | `runs` | a run: sent, started, taken batch by batch, ended |
-//! | `told` | what the pages are reported |
+//! | `told` | reports to the pages |
 
 mod runs;
 mod told;
@@ -345,7 +345,7 @@ impl Shared {
         }
     }
 
-    /// Executes a message of the page of the person.
+    /// Executes a message from the person's page.
     fn obey(self: &Arc<Self>, state: &mut Current, id: u64, message: FromPage) -> Result<(), LabError> {
         match message {
             FromPage::Hello { .. } => Ok(()),

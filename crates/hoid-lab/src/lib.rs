@@ -11,15 +11,15 @@
 //! | [`order`] | the order of the runs, by Latin squares |
 //! | [`task`] | [`Task`](task::Task): a run as tables, and its recomputation |
 //! | [`plant`] | the arithmetic of a tick, twin of the page's |
-//! | [`session`] | the folder: what is appended, what is written at once, how a session continues |
+//! | [`session`] | the folder: files that are appended to, files written at once, resumption of a session |
 //! | [`verify`] | [`check`](verify::check): verified, or unverified and why |
 //! | [`record`] | a run as a record for all commands of hoid |
 //! | [`live`], [`lag`] | the estimate while the run continues, the lag of the person besides |
-//! | [`wire`] | what page and server report to each other |
+//! | [`wire`] | messages between page and server |
 //! | [`lab`] | [`Lab`]: the experiment as its pages see it |
 //! | [`server`] | [`Server`]: HTTP and sockets on 127.0.0.1 |
-//! | `experiment`, `export`, `replay`, `reports` | what is next to the sessions; archives; runs shown again; pages |
-//! | [`calibrate`] | what the loop of page and events adds to a delay |
+//! | `experiment`, `export`, `replay`, `reports` | files next to the sessions; archives; replay of runs; pages |
+//! | [`calibrate`] | the delay added by the loop of page and events |
 
 // Numbers of a page or a file are never an index, a length or a summand before they are checked.
 #![cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]

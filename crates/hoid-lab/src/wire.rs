@@ -110,7 +110,7 @@ pub struct State {
     pub live: LiveFor,
     /// True if a simulated operator replaces the person.
     pub calibrate: bool,
-    /// The session, as `sub-P01/ses-01`.
+    /// The session, such as `sub-P01/ses-01`.
     pub session: Option<String>,
     /// Sessions that can be resumed.
     pub open: Vec<String>,

@@ -134,7 +134,7 @@ pub fn check_record(record: &Bound<'_, PyAny>) -> Outcome<()> {
     arrays::check(record)
 }
 
-/// The sample time of even times in s, or the row at which they are not even.
+/// The sample time of evenly spaced times in s, or the row at which the spacing is uneven.
 #[pyfunction]
 #[pyo3(signature = (times))]
 pub fn even_times(times: PyReadonlyArray1<'_, f64>) -> (Option<f64>, usize) {

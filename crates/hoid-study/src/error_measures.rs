@@ -124,7 +124,7 @@ impl TraceErrors {
     }
 }
 
-/// Time after a change within which it is to be declared, and during which bands are evaluated separately, s.
+/// Time after a change within which a method should declare it, and during which bands are evaluated separately, s.
 const THROUGH_S: f64 = 5.0;
 /// Length of the end of a trace whose mean error is evaluated, s.
 const END_S: f64 = 10.0;

@@ -49,13 +49,13 @@
 //! | [`plan`] | [`Plan`]: scenarios and estimators as grids, read from TOML and checked |
 //! | [`plans`] | plans that come with the program |
 //! | `run`, `merge`, `join` | [`run`]: blocks over threads, parts on disk; [`merge`]: shards; the tables from the parts |
-//! | `directory`, `run_record`, `shard` | what is where in the directory of a study, `study.json`, [`Shard`] |
+//! | `directory`, `run_record`, `shard` | layout of the directory of a study, `study.json`, [`Shard`] |
 //! | `seal` | checksums of the blocks, and which are damaged |
 //! | `block`, `batch_fits`, `prepared` | the estimators of one cell on its replications |
 //! | `estimate_rows`, `error_measures` | the rows of an estimate, and its errors against the truth |
-//! | `columns`, `truth`, `true_value` | the tables of a study: fits, traces, cells; what the truth of each column is |
+//! | `columns`, `truth`, `true_value` | the tables of a study: fits, traces, cells; the true value of each column |
 //! | `summary`, [`statistics`] | statistics over the replications of a cell, with Monte Carlo errors |
-//! | `results`, `query`, `tables` | [`Results`]: a finished study read back, [`Query`]: which rows of it |
+//! | `results`, `query`, `tables` | [`Results`]: a finished study read back, [`Query`]: a selection of its rows |
 //! | [`group`] | recorded runs by subject and condition |
 
 mod batch_fits;

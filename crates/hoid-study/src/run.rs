@@ -56,7 +56,7 @@ pub struct Outcome {
     pub finished: bool,
     /// Estimates made by this run.
     pub estimates: u64,
-    /// The tables; empty for a shard, which is to be merged.
+    /// The tables; empty for a shard, which must be merged first.
     pub tables: Vec<PathBuf>,
     /// Warnings about the directory: damaged blocks that were computed again.
     pub notes: Vec<String>,

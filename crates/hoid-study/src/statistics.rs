@@ -4,11 +4,10 @@
 //!   American Statistician* 50, 1996; the default of NumPy and R).
 //! - Whiskers reach to the last value within 1.5 interquartile ranges of the box; anything beyond
 //!   is an outlier (Tukey, 1977).
-//! - Monte Carlo errors: `s / sqrt(n)` of the mean; `sqrt((m4 - s^4 (n-3)/(n-1)) / n) / (2 s)` of
-//!   the standard deviation, with the fourth central moment m4 (Rao, *Linear Statistical
-//!   Inference*, 1973); of the median half the distance between the order statistics one binomial
-//!   standard deviation to each side of the middle, whatever the distribution; of a rate
-//!   `sqrt(p (1 - p) / n)`.
+//! - Monte Carlo errors: `s / sqrt(n)` of the mean; `sqrt((m4 - s^4 (n-3)/(n-1)) / n) / (2 s)` of the standard
+//!   deviation, with the fourth central moment m4 (Rao, *Linear Statistical Inference*, 1973); of the median half the
+//!   distance between the order statistics one binomial standard deviation to each side of the middle, for any
+//!   distribution; of a rate `sqrt(p (1 - p) / n)`.
 
 use hoid_numerics::statistics::{self, finite_sorted, mean};
 

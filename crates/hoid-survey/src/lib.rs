@@ -25,7 +25,7 @@
 //! |---|---|
 //! | `registry` | [`methods()`]: all methods, those of [`hoid_track`] too, by name |
 //! | `physical` | `physical`: the prediction-error method in the operator's parameters |
-//! | `window` | `window`: a batch fit of the last seconds, again and again |
+//! | `window` | `window`: a batch fit of the last few seconds, repeated |
 //! | `rriv` | `rriv`: recursive refined instrumental variable |
 //! | `multiple_model` | `multiple-model`: a bank of hypotheses of when the person changed; its two-sided estimate |
 //! | `fused` | `fused`: least squares for B with the poles of the prediction-error method |
@@ -33,7 +33,7 @@
 //! | `joint_filter` | `ekf`, `ukf`: Kalman filters of state and parameters |
 //! | `dual_ekf` | `dual-ekf`: two Kalman filters that take turns, of state and of parameters |
 //! | `linear_network` | `linear-network`: one linear layer that learns the gains |
-//! | `known_noise` | what methods have in common that know the noise model from a batch fit |
+//! | `known_noise` | code common to methods that take the noise model from a batch fit |
 
 mod dual_ekf;
 mod fused;

@@ -22,7 +22,7 @@ macro_rules! methods {
 methods! {
     /// Recursive prediction-error method in physical parameters.
     physical = PhysicalOptions,
-    /// Batch fit of the last seconds, again and again.
+    /// Batch fit of the last few seconds, repeated.
     window = WindowOptions,
     /// Recursive refined instrumental variable: Box-Jenkins with nc = 0.
     rriv = RrivOptions,

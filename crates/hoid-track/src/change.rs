@@ -13,7 +13,7 @@ use hoid_numerics::statistics::{mean, sample_variance};
 pub struct Change {
     /// Time since the change of the person at its declaration, s; accurate to a third of a second.
     pub seconds_ago: f64,
-    /// Logarithm of the odds of a change within the last seconds.
+    /// Logarithm of the odds of a change within the last few seconds.
     pub odds: f64,
     /// K_e before and after.
     pub k_e: [Estimate; 2],

@@ -26,26 +26,26 @@
 //! | module | contents |
 //! |---|---|
 //! | `methods`, `method` | [`Method`]: the recursive methods, a file or folder each; the self-description of each |
-//! | [`building`] | what a method is made of, for those in other crates |
-//! | `options`, `shared_options`, `memory`, `forgetting` | [`TrackOptions`]: what is to be tracked, and how |
+//! | [`building`] | components of a method, for methods in other crates |
+//! | `options`, `shared_options`, `memory`, `forgetting` | [`TrackOptions`]: the options of a recursion |
 //! | `person_prior` | [`PersonPrior`]: the prior knowledge of a person before the first sample |
-//! | `request`, `plan` | [`TrackRequest`]: what is requested; [`TrackPlan`]: orders that are still open, searched on the start span |
+//! | `request`, `plan` | [`TrackRequest`]: the request; [`TrackPlan`]: orders that are still open, searched on the start span |
 //! | `setup`, `start`, `start_noise`, `gain` | components of a recursion: structure, start, forgetting |
-//! | `kernel`, `recursion` | RLS and RPEM of the real-time kernel; what every recursion does |
+//! | `kernel`, `recursion` | RLS and RPEM of the real-time kernel; the interface of every recursion |
 //! | `predictor`, `history`, `reported` | signals and reports for methods that are not of the kernel |
 //! | `response` | [`Response`]: gain and phase of an estimate at a frequency |
 //! | `open_loop` | [`OpenLoop`]: crossover and phase margin of an estimate with the controlled element |
 //! | `tracker`, `outcome`, `saved` | [`Tracker`]: one sample at a time; a tracker as numbers, to continue elsewhere |
 //! | `live`, `stage` | [`Live`]: a stream, at a lower rate if its own is high; [`Stage`]: its warm-up, then its tracker |
-//! | `guard` | samples and spans that no tracking makes, kept from the recursion |
-//! | `stationary` | what a recursion without a guard does while nothing arrives |
-//! | `idle` | what was recorded before a run started |
+//! | `guard` | samples and spans that cannot come from tracking, kept from the recursion |
+//! | `stationary` | handling of stationary signals in a recursion without a guard |
+//! | `idle` | idle samples recorded before a run started |
 //! | `over_record`, `two_sided` | [`track()`]: a record; the two-sided estimate of a recorded run |
 //! | `trace`, `columns`, `summary`, `as_text` | [`Trace`]: the estimate at every sample, as columns and as text |
-//! | `diagnostics` | what a trace, and the estimate of a moment, is worth: [`Trace::verdict`] |
+//! | `diagnostics` | reliability of a trace and of a single estimate: [`Trace::verdict`] |
 //! | `determined` | which parameters the data determine |
 //! | `delay_bank` | a delay in whole samples, followed next to any recursion |
-//! | `validation` | what a trace explains of another run; the covariance at the start that this chooses |
+//! | `validation` | how well a trace explains another run; the choice of the initial covariance by this measure |
 //! | `change` | [`Change`]: when a person changed |
 //!
 //! **A recursion starts from the available knowledge.** By default this is the batch fit of the first third of a
@@ -53,10 +53,10 @@
 //! stays constant, so that no sample counts twice and the error bars are valid. With the start of the thesis,
 //! `P_0 = 0.1 I` (eq. 38, 5.41, 5.55), the estimate is updated from the first sample on.
 //!
-//! **Faulty samples** never reach the filters. A value is a fault if it is not a finite number or is larger than
+//! **Faulty samples** never reach the filters. A value is faulty if it is not a finite number or is larger than
 //! [`TrackOptions::largest`]. A faulty error e is replaced by the last good one and a faulty output u by the one-step
 //! prediction, and the estimate stays constant at that sample. These samples are counted. With a guard (`guard`; by
-//! default for `adaptive`) the same holds for outliers and for spans that no tracking produces.
+//! default for `adaptive`) the same holds for outliers and for spans that cannot come from tracking.
 
 pub mod building;
 mod change;

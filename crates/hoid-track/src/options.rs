@@ -29,7 +29,7 @@ pub struct TrackOptions {
     pub update_from_s: Option<f64>,
     /// Limits of the search of start fits and windows.
     pub search: SearchOptions,
-    /// Magnitude of e or u beyond which a sample is a fault. Default 1e6.
+    /// Magnitude of e or u beyond which a sample counts as faulty. Default 1e6.
     pub largest: f64,
     /// Frequencies at which a trace reports gain and phase, rad/s. Default none.
     pub at_rad_s: Vec<f64>,
@@ -38,7 +38,7 @@ pub struct TrackOptions {
 }
 
 impl TrackOptions {
-    /// Default magnitude beyond which a sample is a fault.
+    /// Default magnitude beyond which a sample counts as faulty.
     pub const LARGEST: f64 = 1e6;
 
     /// Returns the default options for the given orders.

@@ -21,7 +21,7 @@ pub struct Counts {
 pub struct Outcome {
     /// A-priori innovation; `None` for a sample that was skipped or held back.
     pub innovation: Option<f64>,
-    /// True if e or u was a fault.
+    /// True if e or u was faulty.
     pub skipped: bool,
     /// True if the guard held the sample back, or kept the estimate constant.
     pub held: bool,

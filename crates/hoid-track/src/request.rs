@@ -40,7 +40,7 @@ pub struct TrackRequest {
     pub start: RequestedStart,
     /// Criterion that chooses between the searched orders.
     pub criterion: Criterion,
-    /// Magnitude of e or u beyond which a sample is a fault.
+    /// Magnitude of e or u beyond which a sample counts as faulty.
     pub largest: f64,
     /// Frequencies at which the response is reported, rad/s.
     pub at_rad_s: Vec<f64>,

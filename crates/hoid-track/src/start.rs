@@ -34,8 +34,8 @@ const LONGEST_SAMPLE_TIME_S: f64 = FASTEST_SHARE * std::f64::consts::PI / SLOWES
 /// Factor by which the roots of an unstable noise model are moved inwards until it is stable.
 const DRAWN_INSIDE: f64 = 0.99;
 
-/// Checks that an operator can be tracked at this sample time, whatever the method: memories, delays and bounds of all
-/// methods are those of people, in seconds.
+/// Checks that an operator can be tracked at this sample time, regardless of the method: memories, delays and bounds
+/// are in seconds and suit people in all methods.
 ///
 /// # Errors
 /// [`IdentError::BadOption`] above [`LONGEST_SAMPLE_TIME_S`].

@@ -149,8 +149,8 @@ impl Channel {
         self.largest = self.largest.max((x - self.first).abs());
     }
 
-    /// Number of samples of a stationary span that are to be undone, for a span of at least `least` samples: those
-    /// that repeat one value, if nearly all do, and the one before them if the signal jumped to that value.
+    /// Number of samples of a stationary span that must be undone, for a span of at least `least` samples: those that
+    /// repeat one value, if nearly all do, and the one before them if the signal jumped to that value.
     fn stood(&self, least: u64) -> (u64, bool) {
         if 4 * self.same >= 3 * least {
             (self.same, self.jumped[1])

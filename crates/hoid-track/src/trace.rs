@@ -58,7 +58,7 @@ pub struct Trace {
     pub(crate) response_doubt: Option<Finding>,
     /// Every crossing of the loop at the end with its controlled element.
     pub(crate) loop_shape: Option<LoopShape>,
-    /// True if the response at the end is determined at some frequency, whatever gain and lead are.
+    /// True if the response at the end is determined at some frequency, regardless of gain and lead.
     pub(crate) response_is_known: bool,
     /// Number of samples between two rows.
     pub(crate) every: usize,

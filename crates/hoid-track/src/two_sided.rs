@@ -9,7 +9,7 @@ use crate::setup::Setup;
 pub struct Causal {
     /// Components of the recursion.
     pub setup: Setup,
-    /// Magnitude beyond which a sample is a fault.
+    /// Magnitude beyond which a sample counts as faulty.
     pub largest: f64,
     /// The samples at which a trace has rows, ascending.
     pub rows: Vec<usize>,

@@ -15,7 +15,7 @@
 //! at the same time in both.
 //!
 //! [`track_validated`] follows the proposal literally: P is updated during the run. At regular times the current model
-//! and that of one interval before are both simulated over the last seconds of the second run; if the current one
+//! and that of one interval before are both simulated over the last few seconds of the second run; if the current one
 //! explains less,
 //!
 //! `P <- P max(least, ((1 - VAF_before)/(1 - VAF_now))^power)`,

@@ -12,7 +12,7 @@
 //! | `description` | `description`: the describing function |
 //! | `polynomials` | `polynomial`; `operator` with its remnant of order m, which is written by its polynomials |
 //! | `trace` | `trace`: a recursion over a recording |
-//! | `result` | what they share, to text and back |
+//! | `result` | the parts common to all kinds; conversion to text and back |
 
 mod change;
 mod description;

@@ -2,17 +2,17 @@
 //! the lag of the recorded control.
 //!
 //! Command line, groups and Python all use this module, and nothing is chosen silently: the findings are shown, with
-//! the evidence, as [`Advice`] on how to read the file. Requested values are not searched for.
+//! the evidence, in the form of [`Advice`] on how to read the file. Requested values are not searched for.
 //!
 //! | file | contents |
 //! |---|---|
-//! | `options` | what is known already |
-//! | `columns` | error and control by the names that people give them |
+//! | `options` | prior knowledge of the file |
+//! | `columns` | error and control, recognised by their common names |
 //! | `periods` | the excitation, its period and lines, and the longest span of whole periods |
 //! | `lag` | by how many samples the control was recorded later than the error, from the controlled element |
-//! | `file` | all of this of a file: [`Look`] |
+//! | `file` | all of these findings for one file: [`Look`] |
 //! | `other_columns` | error message for a file without the columns that were requested |
-//! | `advice` | how the file is to be read, and the command to type |
+//! | `advice` | advice on how to read the file, and the command to type |
 
 mod advice;
 mod columns;

@@ -6,12 +6,12 @@
 //! (`noise`, from the residuals) and how unevenly the innovations are distributed (`volatility`). [`super::filter`]
 //! runs one candidate after the other over the data.
 //!
-//! `evidence` is the sum of the logarithms of the predictive densities of the blocks (A. P. Dawid, *J. Royal Statistical
-//! Society* A 147 (1984) 278-292); it is the criterion by which candidates of the same data are compared. Each block is
-//! predicted from earlier blocks only, so that additional parameters give no advantage. The density is Student's with
-//! the variance of the last seconds and as many degrees of freedom as the block has samples, so that an unpredicted
-//! change does not dominate. Old evidence is forgotten, so that it measures the quality of the estimate and not the
-//! speed of its start.
+//! `evidence` is the sum of the logarithms of the predictive densities of the blocks (A. P. Dawid, *J. Royal
+//! Statistical Society* A 147 (1984) 278-292); it is the criterion by which candidates of the same data are compared.
+//! Each block is predicted from earlier blocks only, so that additional parameters give no advantage. The density is
+//! Student's with the variance of the last few seconds and as many degrees of freedom as the block has samples, so that
+//! an unpredicted change does not dominate. Old evidence is forgotten, so that it measures the quality of the estimate
+//! and not the speed of its start.
 
 use super::{
     basis::{Basis, Complex, Point, Regressors},

@@ -1,5 +1,5 @@
-//! Detector of changes of the operator: a Wald test of the last seconds against the time before, over blocks of half a
-//! second (`blocks`).
+//! Detector of changes of the operator: a Wald test of the last few seconds against the time before, over blocks of
+//! half a second (`blocks`).
 //!
 //! Least squares over the last blocks and over the earlier blocks, with gains, natural frequency, damping, delay and
 //! level free in both, give a difference d with the covariance C of the scores (`contrast`). For gains, natural

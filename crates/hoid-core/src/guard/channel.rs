@@ -11,10 +11,10 @@
 //!
 //! `q <- q (1 + g (1 - p))` where `|r| > q`, else `q <- q (1 - g p)`, with p = .01, g = .05.
 //!
-//! The size of an outlier does not enter: one sample moves q by 5 % whatever its size. A quantile in the tail is used,
-//! not a median: a person's u rests and moves in pulses, and the limit must accept the tails of its distribution. p_j
-//! is the 90 % quantile, computed in the same way with g = .02. Samples at which the signal stays constant carry no
-//! information about how it moves and enter neither quantile.
+//! The size of an outlier does not enter: one sample moves q by at most 5 %, regardless of its size. A quantile in the
+//! tail is used, not a median: a person's u rests and moves in pulses, and the limit must accept the tails of its
+//! distribution. p_j is the 90 % quantile, computed in the same way with g = .02. Samples at which the signal stays
+//! constant carry no information about its motion and enter neither quantile.
 //!
 //! **Outliers.** A sample is held back where `|r_j| > max(m_j q_j, floor)` with
 //!

@@ -6,15 +6,15 @@
 //! twice the long-run value, so that no block moves them by more than 1/60. Blocks in which a fault is found do not
 //! enter.
 //!
-//! | what | rule | why |
+//! | finding | rule | reason |
 //! |---|---|---|
 //! | frozen e | `a_e1 <= A_e1/1000` in a block | the error of a person who tracks never stays constant |
 //! | frozen u | `a_u1 <= A_u1/1000` in three blocks in a row, except for a rest ([`super::resting`]) in which `a_eps` is at most twice its long-run value | a hand may rest |
 //! | idle | e and u each within a range of `M_c/20` in two blocks in a row | silence, with noise |
-//! | larger | `a_c1 > 5 A_c1` and `a_c3 > 5 A_c3` for e and u in two blocks in a row | both signals are what they were, times a factor |
-//! | rescaled | all four `a_cj/A_cj` of one channel above 3.5 and within a factor of 1.5 of each other, those of the other below 2, in two blocks in a row | another unit, a gain that was turned |
-//! | swapped | the sum over blocks of `d(own) - d(other) - 1`, at most 4 a block and never below 0, reaches 6 | e is as u was and u as e was; d is the sum over both channels of `\|log a_1/A_1\| + \|log a_3/A_3\|` |
-//! | misfit | `R = a_eps/min_j a_uj` is above 4 times its long-run value, and above 1.5, and a_eps above twice its own, in two blocks in a row | what u has been for the last samples predicts it better than the model does, which knows e too, and did not before |
+//! | larger | `a_c1 > 5 A_c1` and `a_c3 > 5 A_c3` for e and u in two blocks in a row | both signals are scaled by a factor |
+//! | rescaled | all four `a_cj/A_cj` of one channel above 3.5 and within a factor of 1.5 of each other, those of the other below 2, in two blocks in a row | the unit or a gain setting was changed |
+//! | swapped | the sum over blocks of `d(own) - d(other) - 1`, at most 4 a block and never below 0, reaches 6 | e resembles the earlier u, and u the earlier e; d is the sum over both channels of `\|log a_1/A_1\| + \|log a_3/A_3\|` |
+//! | misfit | `R = a_eps/min_j a_uj` is above 4 times its long-run value, and above 1.5, and a_eps above twice its own, in two blocks in a row | the last samples of u predict it better than the model, which also uses e; before, the model was better |
 //!
 //! The sum for swapped channels is a one-sided CUSUM (E. S. Page, *Biometrika* 41 (1954) 100-115) of a difference that
 //! is negative for channels that are not swapped and at most the distance of the two profiles for swapped ones:
@@ -160,7 +160,7 @@ pub enum Trouble {
     RescaledInput,
     /// u is scaled by a factor.
     RescaledOutput,
-    /// e is as u was before, and u as e was.
+    /// e resembles the earlier u, and u the earlier e.
     Swapped,
     /// The model predicts u worse than the past of u does.
     Misfit,

@@ -1,4 +1,4 @@
-//! A resting stick and a frozen channel: both stay constant, and only one of them is a fault.
+//! A resting stick and a frozen channel: both signals stay constant, but only a frozen channel is a fault.
 //!
 //! A stick with a dead zone rests at its centre, and one that is pushed to its end rests there. Such values are atoms
 //! of the distribution of u: u returns to them often, and stays. The last [`ATOMS`] values at which u stayed for

@@ -9,7 +9,7 @@ use hoid_ident::family::{LEAST_WEIGHT, NO_EVIDENCE};
 use hoid_model::{Finding, Form};
 use hoid_study::group::FormEvidence;
 
-/// A form for all, with its evidence.
+/// One form for all people and conditions, with its evidence.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CommonForm {
     /// The form.
@@ -25,7 +25,8 @@ fn is_open(of: &FormEvidence) -> bool {
     of.weight == 0.0 && of.criterion < -2.0 * LEAST_WEIGHT.ln()
 }
 
-/// The simplest form within 2 of the least sum of criteria; `None` if no form has a criterion for all.
+/// The simplest form within 2 of the least sum of criteria; `None` if no form has a criterion for all people and
+/// conditions.
 pub(super) fn common_form(people: &[&[FormEvidence]]) -> Option<CommonForm> {
     let sum = |form: Form| -> Option<CommonForm> {
         let of = |forms: &&[FormEvidence]| forms.iter().find(|of| of.form == form).cloned();

@@ -12,7 +12,7 @@
 //! | [`holm`] | probabilities of several tests |
 //! | [`GroupEstimates`] | estimates of a group for each person, from its directory or its JSON |
 //! | [`Quantity`] | quantities to compare |
-//! | [`Factor`] | differences between conditions, or between people; `contrast`: the weights of conditions |
+//! | [`Factor`] | variables in which conditions or people differ; `contrast`: the weights of conditions |
 //! | [`CommonForm`] | the form in which parameters of all people are compared; `recordings`: the analysis of recordings in it |
 //! | [`Comparing`] | comparison of a group; `learning`: runs as a covariate |
 //! | [`Comparison`] | the result, its JSON and back; `sentence`: each difference for a paper |

@@ -40,7 +40,7 @@ impl Logger {
     /// Prints a message.
     ///
     /// # Safety
-    /// The function is that of the importer, and its environment is alive.
+    /// The function is supplied by the importer, and its environment is alive.
     unsafe fn tell(self, name: &CString, status: i32, message: &str) {
         let message = CString::new(message.replace('\0', " ")).unwrap_or_default();
         match self {
@@ -77,7 +77,7 @@ pub struct Component {
 /// Makes an instance; null if that fails.
 ///
 /// # Safety
-/// `logger` is that of the importer.
+/// `logger` is supplied by the importer.
 pub(super) unsafe fn made(name: &str, logger: Logger, instance: impl FnOnce() -> Done<Instance>) -> *mut Component {
     let name = CString::new(name.replace('\0', " ")).unwrap_or_default();
     let made = catch_unwind(AssertUnwindSafe(instance)).unwrap_or_else(|panic| Err(panic_message(&*panic)));
@@ -130,12 +130,12 @@ pub(super) unsafe fn with(component: *mut Component, call: impl FnOnce(&mut Inst
             (FATAL, panic_message(&*panic))
         }
     };
-    // SAFETY: the logger is that of the importer.
+    // SAFETY: the logger is supplied by the importer.
     unsafe { component.logger.tell(&component.name, status, &message) };
     status
 }
 
-/// A list of the importer; empty for no elements, whatever the pointer.
+/// A list from the importer; empty for no elements, regardless of the pointer.
 ///
 /// # Safety
 /// `pointer` has `count` elements that stay during the call.
@@ -150,7 +150,7 @@ pub(super) unsafe fn list<'a, T>(pointer: *const T, count: usize) -> Done<&'a [T
     Ok(unsafe { slice::from_raw_parts(pointer, count) })
 }
 
-/// A list of the importer to be written to.
+/// A list supplied by the importer for output.
 ///
 /// # Safety
 /// `pointer` has room for `count` initialised elements that no other code uses during the call.
@@ -165,7 +165,7 @@ pub(super) unsafe fn list_mut<'a, T>(pointer: *mut T, count: usize) -> Done<&'a 
     Ok(unsafe { slice::from_raw_parts_mut(pointer, count) })
 }
 
-/// A text of the importer; empty for null and for what is not in UTF-8.
+/// A text from the importer; empty for null and for invalid UTF-8.
 ///
 /// # Safety
 /// `pointer` is null or a text that ends with a zero and stays during the call.

@@ -54,7 +54,7 @@ pub unsafe extern "C" fn fmi2Instantiate(
         Some((function, environment)) => Logger::Two { function, environment },
         None => Logger::Nobody,
     };
-    // SAFETY: texts of the importer.
+    // SAFETY: the texts are supplied by the importer.
     let (name, guid, resources) = unsafe { three(name, guid, resources) };
     let instance = || {
         if kind != CO_SIMULATION {
@@ -62,11 +62,11 @@ pub unsafe extern "C" fn fmi2Instantiate(
         }
         Instance::new(guid, folder(resources).as_deref())
     };
-    // SAFETY: the logger is that of the importer.
+    // SAFETY: the logger is supplied by the importer.
     unsafe { made(name, logger, instance) }
 }
 
-/// Three texts of the importer.
+/// Three texts supplied by the importer.
 ///
 /// # Safety
 /// As [`words`].
@@ -220,7 +220,7 @@ pub(super) fn text(instance: &Instance, reference: u32) -> Done<*const c_char> {
     Ok(instance.text(reference)?.as_ptr())
 }
 
-/// A text of the importer as a value.
+/// Reads a text from the importer as a value.
 pub(super) fn as_text(pointer: *const c_char) -> FmuStart {
     // SAFETY: an element of a list of texts, by the contract of the interface.
     FmuStart::Text(unsafe { words(pointer) }.to_owned())

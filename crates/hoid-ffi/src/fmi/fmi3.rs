@@ -42,11 +42,11 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
         Some(function) => Logger::Three { function, environment },
         None => Logger::Nobody,
     };
-    // SAFETY: texts of the importer.
+    // SAFETY: the texts are supplied by the importer.
     let (name, token, resources) = unsafe { three(name, token, resources) };
     // A path, not a URI as in FMI 2.0.
     let folder = Some(PathBuf::from(resources)).filter(|path| !path.as_os_str().is_empty());
-    // SAFETY: the logger is that of the importer.
+    // SAFETY: the logger is supplied by the importer.
     unsafe { made(name, logger, || Instance::new(token, folder.as_deref())) }
 }
 

@@ -7,7 +7,7 @@
 //! |---|---|
 //! | `instance` | an instance: its values, its phases, when a sample is due |
 //! | `given` | parameters and inputs, by their names |
-//! | `model` | what takes samples: tracker and operator |
+//! | `model` | recipients of samples: tracker and operator |
 //! | `operator` | the operator of a scenario, of the thesis or of the family |
 //! | `component` | handles, statuses and messages of both interfaces |
 //! | `state` | its state, to go back to it or to continue elsewhere |

@@ -112,7 +112,7 @@ fn to_value(of: &FmuStart, value: &Value) -> Option<FmuStart> {
     })
 }
 
-/// A place of the importer for a state.
+/// Memory supplied by the importer for a state.
 ///
 /// # Safety
 /// `place` is null or points to null or to a state that was made here and not freed.

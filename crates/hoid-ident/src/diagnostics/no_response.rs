@@ -11,8 +11,8 @@
 //! b real, and T is the share of the power of U that this explains, maximised over delays of [`DELAYS_S`]. Records with
 //! the same spectra but without a relation have random phases of E (J. Theiler et al., *Physica D* 58 (1992) 77-94); T
 //! of [`SURROGATES`] of them is the distribution of such a search without a response. If u does not depend on e, T is
-//! one more draw: the probability that it exceeds all is 1/([`SURROGATES`] + 1), whatever the spectra are. Only the
-//! past of e counts, so that an e that responds to u is not counted as a response. Several records share b.
+//! one more draw: the probability that it exceeds all others is 1/([`SURROGATES`] + 1), for any spectra. Only the past
+//! of e counts, so that an e that responds to u is not counted as a response. Several records share b.
 
 use std::f64::consts::{PI, TAU};
 

@@ -188,7 +188,7 @@ pub fn of_family(
 }
 
 /// Second fits for an operator whose gains change once, without outlying samples. A change that only one of the fits
-/// finds counts as a difference whatever its size.
+/// finds counts as a difference regardless of its size.
 pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record]) -> Option<Finding> {
     let without = Without::SamplesThatStandOut;
     let other = SigmoidChange {

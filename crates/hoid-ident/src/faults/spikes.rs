@@ -11,7 +11,7 @@
 //! | m pushes | `S` without the m largest terms |
 //! | m faulty samples | `S` after the [interpolation](super::interpolation) of them |
 //!
-//! Both have m unknowns. The smallest number of samples is a fault if their interpolation
+//! Both have m unknowns. The smallest number of samples is faulty if their interpolation
 //!
 //! 1. reduces the sum by more than [`LARGE`]^2: for normal innovations once in 1e15 samples;
 //! 2. leaves less than m pushes do, by [`BETTER`]^2 and by [`PART`] of the reduction, or leaves less than a part in

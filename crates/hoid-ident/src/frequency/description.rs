@@ -5,7 +5,7 @@
 //! | excitation | the given channel; otherwise the first of the common names whose channel has lines |
 //! | lines | those of the options; otherwise found in that channel |
 //! | average | `sum U_i D_i* / sum E_i D_i*` with D of the channel; the mean of `U_i/E_i` without a channel |
-//! | runs | records, whatever number of periods they have, if there are three or more; otherwise their periods |
+//! | runs | records, regardless of their number of periods, if there are three or more; otherwise their periods |
 //! | delay | that of gain, lead and delay fitted to the lines: it unwraps the phase, and the margin is interpolated without it |
 //!
 //! Records are used as runs if possible: the remnant of neighbouring periods is one signal, so that periods of one run

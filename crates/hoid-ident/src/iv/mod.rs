@@ -6,7 +6,7 @@
 //!
 //! `Z' Phi theta = Z' y` (L. Ljung, *System Identification*, 1999, eq. 7.118)
 //!
-//! is consistent whatever the noise is. The methods differ in their instruments and in the filter of the equation:
+//! is consistent for any noise. The methods differ in their instruments and in the filter of the equation:
 //!
 //! | method | model | filter |
 //! |---|---|---|

@@ -17,7 +17,7 @@ pub enum Kind {
     NumberOrOff,
     /// A number, or the name of the option alone, which means this number.
     NumberOrDefault(&'static str),
-    /// A transfer function of s, as `90/(s(s+6))`.
+    /// A transfer function of s, such as `90/(s(s+6))`.
     Element,
     /// `LO..HI`, two finite numbers in order.
     Span,

@@ -9,7 +9,7 @@
 //! | file | contents |
 //! |---|---|
 //! | `variables` | the variables of a unit |
-//! | `settings` | what the library reads when it starts |
+//! | `settings` | settings that the library reads when it starts |
 //! | `description` | `modelDescription.xml` |
 //! | `archive` | the archive, with a library for each platform |
 

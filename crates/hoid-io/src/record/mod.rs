@@ -6,7 +6,7 @@
 //! | module | contents |
 //! |---|---|
 //! | `file` | [`read_record`], [`read_prepared`], [`write_record`] |
-//! | `read_options` | [`ReadOptions`], [`TrialChoice`]: what is read and how |
+//! | `read_options` | [`ReadOptions`], [`TrialChoice`]: selection of the data, and options for reading them |
 //! | `trials` | the trials of a file |
 //! | `from_table` | [`ReadRecord`]: from the columns of a file to a record |
 //! | `table_reader` | the columns on this way, one by one |

@@ -82,7 +82,7 @@ impl Default for ReadOptions {
 }
 
 impl ReadOptions {
-    /// True if a column is to be read; the time is treated separately.
+    /// True if a column must be read; the time is treated separately.
     pub(crate) fn wants(&self, name: &str) -> bool {
         let is_term = |signal: &ColumnExpression| signal.terms().contains(&name);
         self.columns.as_ref().is_none_or(|kept| {

@@ -5,7 +5,7 @@
 //! | `output_table` | [`OutputTable`]: columns of results, and how each format keeps them |
 //! | `table_file` | [`write_table`], [`read_table`]: tables of results |
 //! | `table_writer` | [`TableWriter`]: the same in bounded memory |
-//! | `fit_file` | [`read_fit`]: what `hoid identify --json` has printed |
+//! | `fit_file` | [`read_fit`]: a fit printed by `hoid identify --json` |
 
 mod fit_file;
 mod output_table;

@@ -5,10 +5,10 @@
 //! |---|---|
 //! | `columns` | [`Table`]: the columns of a file, and why a value of them cannot be used |
 //! | `cell` | [`Cell`]: numbers with a point or a comma, the words for a missing value |
-//! | `precision` | [`Precision`]: how exactly a column is printed |
-//! | `column_expression` | [`ColumnExpression`]: which columns are the input and the output |
+//! | `precision` | [`Precision`]: the number of digits with which a column is printed |
+//! | `column_expression` | [`ColumnExpression`]: choice of the input and output columns |
 //! | `selection` | the columns that are kept, if not all are |
-//! | `common_names` | error and control by the names that people give their columns |
+//! | `common_names` | error and control, recognised by common column names |
 
 mod cell;
 pub(crate) mod column_expression;

@@ -67,7 +67,7 @@ impl Moments {
         };
         *self = Self::From(first);
         column.moments = true;
-        // Fixed decimals, whatever the size.
+        // Fixed decimals, regardless of the size.
         column.precision.add_decimals(decimals);
         column.values.push(seconds(ns, first));
     }

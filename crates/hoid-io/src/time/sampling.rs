@@ -1,10 +1,9 @@
-//! The sampling given by a column t, and whether it is even.
+//! The sampling given by a column t, and whether t is evenly spaced.
 //!
-//! `Ts = (t_last - t_first) / (N - 1)`, and each t must lie on the grid `t_first + k Ts` within the
-//! larger of `1e-3 Ts` and one unit of the last printed decimal of t: files print t rounded (0.0167
-//! at 60 Hz), and a rounded t is not uneven. If `1 / Ts` is a whole number of Hz within `1e-4`, or
-//! within the rounding of t, that number is used, so that all runs of a laboratory have the same
-//! sample time.
+//! `Ts = (t_last - t_first) / (N - 1)`, and each t must lie on the grid `t_first + k Ts` within the larger of `1e-3 Ts`
+//! and one unit of the last printed decimal of t: files print t rounded (0.0167 at 60 Hz), and a rounded t still counts
+//! as evenly spaced. If `1 / Ts` is a whole number of Hz within `1e-4`, or within the rounding of t, that number is
+//! used, so that all runs of a laboratory have the same sample time.
 
 use crate::table::Precision;
 
@@ -13,7 +12,7 @@ const JITTER: f64 = 1e-3;
 /// Largest relative deviation from a whole number of Hz that is rounded to it.
 const WHOLE_HZ: f64 = 1e-4;
 
-/// Reason why the sampling is not even. Rows count from the first in use.
+/// Reason why the samples are not evenly spaced. Rows count from the first in use.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Uneven {
     TooFew,
@@ -41,11 +40,11 @@ pub(crate) struct Sampling {
     pub(crate) note: Option<String>,
 }
 
-/// Returns the sample time of even times that come from no file, in s, by the rules of files: their
-/// rounding is detected.
+/// Returns the sample time of evenly spaced times that come from no file, in s, by the rules of files: their rounding
+/// is detected.
 ///
 /// # Errors
-/// The row, counted from 0, at which they are not even.
+/// The row, counted from 0, at which the spacing is uneven.
 pub fn even_times(t: &[f64]) -> Result<f64, usize> {
     match even(t, Precision::of_times(t, false), None) {
         Ok(sampling) => Ok(sampling.sample_time_s),

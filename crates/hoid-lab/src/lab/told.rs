@@ -36,7 +36,7 @@ impl Shared {
         });
     }
 
-    /// Sessions that can be resumed, as `sub-P01/ses-01`.
+    /// Sessions that can be resumed, such as `sub-P01/ses-01`.
     pub(super) fn open_sessions(&self) -> Vec<String> {
         if self.mode != Mode::Sessions {
             return Vec::new();

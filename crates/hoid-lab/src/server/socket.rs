@@ -1,5 +1,5 @@
-//! The socket of a page: messages of the page go to the lab, and those of the lab to the page. One
-//! thread does both: it waits for the page for a hundredth of a second at a time.
+//! The socket of a page: messages from the page go to the lab, and messages from the lab to the page. One thread does
+//! both: it waits for the page for a hundredth of a second at a time.
 
 use std::{
     io::{ErrorKind, Write as _},

@@ -22,9 +22,9 @@
 //! | file | contents |
 //! |---|---|
 //! | `folder` | the names of files and folders |
-//! | `run_start` | [`RunStart`]: what is known before a run; [`Ended`]: what is known after it |
-//! | `log` | [`RunLog`]: what is appended |
-//! | `logged` | [`Logged`]: what was appended, read back |
+//! | `run_start` | [`RunStart`]: facts known before a run; [`Ended`]: facts known after it |
+//! | `log` | [`RunLog`]: the appended data |
+//! | `logged` | [`Logged`]: the appended data, read back |
 //! | `state` | [`Session`]: the session as a whole |
 
 mod folder;

@@ -2,7 +2,7 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | `report`, `tables` | what a page is made of |
+//! | `report`, `tables` | components of a page |
 //! | `people` | the verdict, what was not read, the operator of each person |
 //! | `estimates` | averages of the fits, chosen delays, what could not be estimated |
 //! | `frequency` | describing functions with the fits over them, and where they agree |

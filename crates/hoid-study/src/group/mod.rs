@@ -2,17 +2,17 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`Manifest`] | which file is which run of which subject, and what is done with it |
+//! | [`Manifest`] | assignment of files to subjects and runs, and how each run is processed |
 //! | [`ReadSettings`], [`PreparationSettings`], [`AnalysisSettings`], [`ConditionSettings`] | its tables: how runs are read, prepared and analysed, and the prior knowledge of a condition |
 //! | [`ConditionElement`] | controlled elements of conditions as one text |
 //! | [`inspect`], [`commented`] | a manifest completed by what the files state, with the evidence |
 //! | [`Pattern`] | subject, condition and run from names of files |
 //! | [`run_group`] | the analysis in a directory, part by part |
 //! | `reading` | runs from files, and the processing of them; one of them: [`RecordedRun`] |
-//! | `analysis` | what is done with the runs of a person in a condition (`block`) and with one run, in which `windows`, with which orders (`run_orders`), and the rows of it (`run_rows`) |
+//! | `analysis` | analysis of the runs of a person in a condition (`block`) and of single runs: their `windows`, orders (`run_orders`) and rows (`run_rows`) |
 //! | `family_fits`, [`Person`] | the operator of a person in a condition, and its row in the table of people |
-//! | [`RunEstimates`] | what was found in each run, read back from the tables |
-//! | [`GroupSummary`] | what failed, the people, and the verdict on the whole group |
+//! | [`RunEstimates`] | estimates of each run, read back from the tables |
+//! | [`GroupSummary`] | failures, people, and the verdict on the whole group |
 //! | `traces` | its recursive estimates as rows |
 //! | `responses` | frequency responses of the fits |
 //! | [`VirtualExperiment`] | the same from simulated subjects, with the defects of recorded data ([`SamplingDefect`]) |

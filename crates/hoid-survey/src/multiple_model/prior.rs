@@ -34,7 +34,7 @@ const CROSSOVER_RAD_S: f64 = 2.0;
 /// Memory of the innovation variance, and the part of it that remains after a change, s.
 const LEVEL_MEMORY_S: f64 = 20.0;
 const DOUBT_S: f64 = 1.0;
-/// Number of births for which a hypothesis is kept whatever it predicts.
+/// Number of births for which a hypothesis is kept regardless of its predictions.
 const PROTECTED_BIRTHS: f64 = 4.0;
 /// Age from which a hypothesis can identify the changed parameters, s.
 const SETTLED_S: f64 = 0.5;

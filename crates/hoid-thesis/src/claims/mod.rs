@@ -14,9 +14,9 @@
 //! | `remnant_order` | the order of the noise model |
 //! | `initial_conditions` | where searches start |
 //! | `recursive_arx`, `recursive_bj` | RLS, and RPEM against RLS |
-//! | `expectations` | what Part II expects of the recursion |
+//! | `expectations` | expectations of Part II for the recursion |
 //! | `noise` | noise level, remnant time constant, sample time |
-//! | `elsewhere` | what is not tested here |
+//! | `elsewhere` | claims that are not tested here |
 //!
 //! ```no_run
 //! use hoid_study::Results;

@@ -8,7 +8,7 @@
 //!
 //! | module | method |
 //! |---|---|
-//! | `comparator` | [`Comparator`]: what all of them do |
+//! | `comparator` | [`Comparator`]: the interface common to all methods |
 //! | `rls_fir` | finite impulse response by regularised recursive least squares, as a frequency response |
 //! | `fourier` | Fourier coefficients at the lines, in a window that moves |
 //! | `wavelet` | wavelet transforms at the lines |

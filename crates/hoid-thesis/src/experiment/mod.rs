@@ -20,7 +20,7 @@
 //! |---|---|
 //! | `people` | [`ExperimentPlan`]: the virtual people |
 //! | `recorded` | [`RecordedPeople`]: recordings listed in the manifest of a group |
-//! | [`procedure`] | what is done with one run |
+//! | [`procedure`] | processing of one run |
 
 mod people;
 pub mod procedure;

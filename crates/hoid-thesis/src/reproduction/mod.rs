@@ -1,6 +1,6 @@
 //! The tables and figures of the thesis, made from the results of the named plans.
 //!
-//! | module | what it makes | study |
+//! | module | output | study |
 //! |---|---|---|
 //! | `setting` | Tables 1, 2 (4.2, 4.3), 4.4, 6.1; Figs. 3, 4, A.1 | `noise-level` |
 //! | `bias` | Figs. 5, 6, 9, C.1 to C.16: box plots of relative biases | `bias` |
@@ -10,9 +10,9 @@
 //! | `traces` | Figs. 11, 12, G.1 to G.8, H.1 to H.12: recursive estimates | `recursive`, `recursive-arx` |
 //! | `averages` | Figs. H.1 to H.12 as the text draws them: averages, with medians next to | `recursive` |
 //! | `experiment` | Table 3, Figs. 13, 14, I.1 to I.18 with virtual or recorded people | its own |
-//! | `further` | what the text leaves for later | the other plans |
+//! | `further` | topics that the text leaves for later | the other plans |
 //! | `catalogue` | all of them in the order of the text | |
-//! | `item`, `table_builder`, `axes` | what they are made of | |
+//! | `item`, `table_builder`, `axes` | components of these outputs | |
 //! | `index` | the page that shows it all, with the claims | all |
 //! | `run` | all of this in a directory | |
 //!

@@ -15,24 +15,24 @@
 //! | `delay-at-bound` | the tracked delay rests at an end of its range in a quarter of the rows |
 //! | `covariance-blown-up` | a standard error 30 times its median: the data carry too little information to forget |
 //! | `steps-shortened` | more than 5 % of the steps made shorter by stability or a bound |
-//! | `faults` | more than 10 % of the samples were faults |
+//! | `faults` | more than 10 % of the samples were faulty |
 //! | `held-back` | outliers that the guard held back (a note), in more than 1 % of the samples (a doubt) |
-//! | `hostile-span` | spans that no tracking makes, at which the estimate stayed constant |
+//! | `hostile-span` | spans that cannot come from tracking, at which the estimate stayed constant |
 //! | `learnt-at-rest` | e and u stay constant for a second, and the guard that would hold the estimate there is off |
-//! | `restarted` | the guard started the estimate again |
+//! | `restarted` | the guard restarted the estimate |
 //! | `steps-in-signals` | jumps of e or u that stayed (a note) |
 //! | `gain-sign` | K_e is significantly positive in some rows and negative in others |
 //! | `negative-lead` | K_e and K_e_dot have significantly opposite signs in more than a tenth of the rows |
 //! | `idle-head` | a head in which neither e nor u moves: left out of the start span (a note), or in it (a doubt) |
-//! | `many-changes` | three changes or more, one in half a minute or oftener |
-//! | `supposed` | omega_nm, zeta_nm or tau_e of the last row are the prior before the record (a note) |
-//! | `last-row` | the estimate at the end is doubtful or no estimate, whatever the other rows are |
-//! | `not-followed` | what the last seconds of the record show against the last row |
+//! | `many-changes` | three or more changes, on average at least one per half minute |
+//! | `supposed` | omega_nm, zeta_nm or tau_e of the last row is not determined by the record: its value is that of the prior, or one of several that predict u equally well (a note) |
+//! | `last-row` | the estimate at the end is doubtful or missing, regardless of the other rows |
+//! | `not-followed` | the last few seconds of the record disagree with the last row |
 //! | `structure` | earlier errors carry more information about u than the operator at the end does |
 //! | `sign` | the response at .5 rad/s would push the error away, where no controlled element is named |
 //! | `unstable-loop`, `no-crossover` | with the controlled element, the loop of the last row could not have been held |
 //! | `undeclared-change`, `drifting`, `swaying` | the response is not the same where no change is declared |
-//! | `no-answer` | e does not answer to u |
+//! | `no-answer` | e does not respond to u |
 //! | `not-finite` | an estimate that is not a number |
 //!
 //! `operators` judges the operators of the rows, `recording` the actions of the guard and the head and end of the

@@ -1,5 +1,5 @@
 //! Findings of the recording about a trace: the actions of the guard, an idle head, and whether the last row agrees
-//! with the last seconds.
+//! with the last few seconds.
 
 use hoid_ident::diagnostics::{is_open, leads_backwards, operator_step};
 use hoid_model::{Finding, Record};
@@ -93,9 +93,9 @@ impl Trace {
         })
     }
 
-    /// Compares the last seconds of the record with the last row: the delay may have changed, or the estimate may not
-    /// have returned. A finding is a step of [`operator_step`] that is [`UNLIKELY`], given its own error and that of
-    /// the row; for a delay in whole samples, a step beyond one and a half samples.
+    /// Compares the last few seconds of the record with the last row: the delay may have changed, or the estimate may
+    /// not have returned. A finding is a step of [`operator_step`] that is [`UNLIKELY`], given its own error and that
+    /// of the row; for a delay in whole samples, a step beyond one and a half samples.
     pub(super) fn not_followed(&self, record: &Record) -> Option<Finding> {
         let row = self.len().checked_sub(1)?;
         let operator = self.operator(row).ok()?;
@@ -142,7 +142,7 @@ impl Trace {
         worst.map(|(_, words)| Finding::doubt("not-followed", words))
     }
 
-    /// Finding of an estimate that is not valid at the end, whatever it was before.
+    /// Finding of an estimate that is not valid at the end, regardless of its earlier values.
     pub(super) fn last_row_finding(&self) -> Option<Finding> {
         let operator = self.operator(self.len().checked_sub(1)?).ok()?;
         let nothing = is_open(&operator.k_e) && is_open(&operator.k_e_dot) && !self.response_is_known;

@@ -1,7 +1,7 @@
 //! A guard in front of a recursion: treatment of samples and spans that no tracking produces. [`hoid_core::guard`]
 //! detects them.
 //!
-//! | found | what reaches the recursion | estimate | afterwards |
+//! | found | input of the recursion | estimate | afterwards |
 //! |---|---|---|---|
 //! | outlier of up to [`LONGEST_S`] | the prediction of e; the recursion's own prediction of u | stays | the recursion is put back to before it and takes the samples again, those that were held back interpolated |
 //! | a jump that stays, a pulse of the hand | the same | stays | the recursion is put back to before it and takes the samples as they came: the result is that without a guard |
@@ -33,11 +33,11 @@
 //! |---|---|
 //! | `holding` | samples that are held back, and the treatment of them |
 //! | `pausing` | pauses, from their start to their end |
-//! | `blocks` | what is judged, learnt and kept once a second |
+//! | `blocks` | checks, learning and snapshots once a second |
 //! | `prime` | the default, from the record of the start span |
 //! | `compared` | the model of the start next to the signals |
 //! | `snapshot` | the numbers of a recursion, kept and put back |
-//! | `event`, `options` | what is reported of it, what is chosen |
+//! | `event`, `options` | events for reports; options |
 
 mod blocks;
 mod compared;

@@ -5,7 +5,7 @@
 //! | file | contents |
 //! |---|---|
 //! | `session` | the samples in their order, and the state of the recursion |
-//! | `lines`, `clock` | what a line means, and its time |
+//! | `lines`, `clock` | the meaning of a line, and its time |
 //! | `line` | one line of the output |
 //! | `datagram`, `udp` | binary samples and estimates; the socket |
 

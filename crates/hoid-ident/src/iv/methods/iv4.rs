@@ -6,10 +6,10 @@
 //! 3. Autoregression `L v = eps` of the residual.
 //! 4. Instruments simulated with the second A and B; IV estimate of the equation filtered with L.
 //!
-//! Consistent whatever v is; of the smallest variance if L makes v white. In the closed-loop form the simulations start
-//! from the noise-free input. The book uses the order na + nb for L, as an example; here it is four times as high,
-//! because v of a process that is sampled fast (`A = F`, `v = F n` with noise n) has zeros near the unit circle, for
-//! which an autoregression needs many terms.
+//! The estimate is consistent for any v, and has the smallest variance if L makes v white. In the closed-loop form the
+//! simulations start from the noise-free input. The book uses the order na + nb for L, as an example; here it is four
+//! times as high, because v of a process that is sampled fast (`A = F`, `v = F n` with noise n) has zeros near the unit
+//! circle, for which an autoregression needs many terms.
 
 use hoid_model::Structure;
 

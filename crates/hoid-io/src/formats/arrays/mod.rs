@@ -6,7 +6,7 @@
 //! |---|---|
 //! | `numbers` | [`Numbers`]: bytes with a type |
 //! | `array` | [`Array`]: numbers with dimensions |
-//! | `contents` | [`Contents`]: what is in a file |
+//! | `contents` | [`Contents`]: the contents of a file |
 //! | `column_path` | [`ColumnPath`]: arrays as columns, matrices line by line |
 //! | `selection` | [`table_of`]: the columns of a record, and those next to them |
 //! | `clocks` | columns at the times of another |

@@ -2,11 +2,11 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | `foreign` | what other programs write, made plain |
+//! | `foreign` | files from other programs, converted to plain CSV |
 //! | `text` | encoding, comments, separator, lines |
 //! | `table`, `plain` | the columns of a record; its rows of plain numbers, fast |
 //! | `long` | a long text of plain numbers, block by block |
-//! | `span_end` | where it ends being read, for a span |
+//! | `span_end` | the row at which reading stops if only a span is needed |
 //! | `record` | a record into CSV |
 //! | `columns` | tables of results, out and in |
 

@@ -8,7 +8,7 @@
 //! | `version4` | version 4: matrices |
 //! | `version73` | version 7.3, which is HDF5; any HDF5 |
 //! | `records` | tables of records in HDF5 |
-//! | `objects` | what to do with a timetable, a table, a timeseries |
+//! | `objects` | instructions to convert a timetable, a table or a timeseries |
 //! | `names` | names of columns and names of variables |
 //! | `write` | version 7, one variable a column |
 //!

@@ -2,7 +2,7 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | `header` | what numpy writes in front of the numbers, a Python literal |
+//! | `header` | header that numpy writes before the numbers, a Python literal |
 //! | `npy` | one array, in and out |
 //! | `archive` | NPZ: the zip around them |
 //! | `single` | NPY: one array in a file of its own |

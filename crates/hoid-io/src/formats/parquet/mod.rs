@@ -4,7 +4,7 @@
 //! | module | contents |
 //! |---|---|
 //! | `columns` | columns as they were read |
-//! | `pages` | what the pages of a column unpack to |
+//! | `pages` | decoded pages of a column |
 //! | `read` | the columns of a file of any program |
 //! | `record` | the table that a record is made of |
 //! | `results` | a table of results |

@@ -7,7 +7,7 @@
 //! `delta << 4 | type`, numbers are zigzag varints, and a struct ends with a 0. From `PageHeader`
 //! (<https://github.com/apache/parquet-format>, `parquet.thrift`) are read
 //!
-//! | field | what |
+//! | field | contents |
 //! |---|---|
 //! | 2, 3 | bytes unpacked and packed |
 //! | 5.1, 8.1 | values of a data page |

@@ -3,7 +3,7 @@
 //!
 //! | file | contents |
 //! |---|---|
-//! | `evidence` | what was found |
+//! | `evidence` | findings in the files |
 //! | `first_fit` | form and order of the noise model of the first run |
 
 mod evidence;

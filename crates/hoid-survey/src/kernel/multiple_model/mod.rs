@@ -30,7 +30,7 @@
 //! and reads the signals of that delay ([`signal_ring`]). The delay of the mixture is the mean over the hypotheses;
 //! its variance includes that of rounding to whole samples, 1/12.
 //!
-//! **A change** ([`change`]) is detected from the odds of the hypotheses born within the last seconds against those
+//! **A change** ([`change`]) is detected from the odds of the hypotheses born within the last few seconds against those
 //! that are older.
 //!
 //! In the order of their dependence: [`prior`], [`response`], [`signal_ring`], [`hypothesis`], [`change`],
