@@ -59,13 +59,12 @@ pub fn divide_from(d: &[f64], x: &mut [f64], from: usize) {
     }
 }
 
-/// The same for a short D, with the past output in registers. The oldest output is subtracted first, so that only the
-/// last difference waits for the sample before.
+/// The same for a short D, with the past output in registers.
 fn divide_in_registers<const N: usize>(d: [f64; N], x: &mut [f64], from: usize) {
     let mut past: [f64; N] = core::array::from_fn(|i| from.checked_sub(i + 1).map_or(0.0, |t| x[t]));
     for value in &mut x[from..] {
         let mut y = *value;
-        for i in (0..N).rev() {
+        for i in 0..N {
             y -= d[i] * past[i];
         }
         for i in (1..N).rev() {

@@ -6,11 +6,7 @@
 //! autoregression of any order, and the operator's bias depends on how well the order predicts (R. Shibata, *Annals of
 //! Statistics* 8 (1980) 147-164).
 
-use crate::linalg::{
-    gram::Gram,
-    least_squares::solve_symmetric,
-    products::{Lagged, gram},
-};
+use crate::linalg::{gram::Gram, least_squares::solve_symmetric};
 
 /// Largest modulus of a root of C in a start.
 const LARGEST_ROOT: f64 = 0.999;
@@ -44,13 +40,9 @@ impl NoiseProducts {
     pub fn new(series: &[Vec<f64>], highest: usize) -> Self {
         let mut products = Gram::new(highest + 1);
         let mut count = 0;
-        for v in series.iter().filter(|v| v.len() > highest) {
-            count += v.len() - highest;
-            let lagged = (0..=highest).map(|lag| Lagged {
-                values: &v[highest - lag..v.len() - lag],
-                follows: lag > 0,
-            });
-            products.add_all(&gram(&lagged.collect::<Vec<_>>()));
+        for v in series {
+            count += v.len().saturating_sub(highest);
+            (highest..v.len()).for_each(|t| products.add(|i| v[t - i]));
         }
         Self {
             highest,

@@ -13,7 +13,7 @@ use crate::{
         Criterion, Data, Workspace,
         further_input::{FurtherInput, InputOrders},
     },
-    linalg::least_squares::{add_scaled, dot},
+    linalg::least_squares::dot,
     optimize::Linearisation,
     optimize::{Minimum, Objective, SearchOptions, minimise},
 };
@@ -346,25 +346,21 @@ impl<P: Parametrisation> Objective for PhysicalCriterion<'_, P> {
                 return total;
             };
             let n = polynomials.theta.len();
-            let mut of_theta = Linearisation::empty(n);
-            for record in records.clone() {
-                let own = self
-                    .of_record(&polynomials, record)
-                    .linearise(&polynomials.theta, workspace);
-                of_theta.sum_of_squares += own.sum_of_squares;
-                add_scaled(&mut of_theta.descent, 1.0, &own.descent);
-                add_scaled(&mut of_theta.gram, 1.0, &own.gram);
-            }
-            total.sum_of_squares += of_theta.sum_of_squares;
             let positions = self.layout.positions(records.start);
             let columns = &polynomials.columns;
-            for (i, &place) in positions.iter().enumerate() {
-                total.descent[place] += dot(&columns[i], &of_theta.descent);
-                let product: Vec<f64> = (0..n)
-                    .map(|k| dot(&of_theta.gram[k * n..(k + 1) * n], &columns[i]))
-                    .collect();
-                for (j, &other) in positions.iter().enumerate() {
-                    total.gram[other * p + place] += dot(&columns[j], &product);
+            for record in records {
+                let of_theta = self
+                    .of_record(&polynomials, record)
+                    .linearise(&polynomials.theta, workspace);
+                total.sum_of_squares += of_theta.sum_of_squares;
+                for (i, &place) in positions.iter().enumerate() {
+                    total.descent[place] += dot(&columns[i], &of_theta.descent);
+                    let product: Vec<f64> = (0..n)
+                        .map(|k| dot(&of_theta.gram[k * n..(k + 1) * n], &columns[i]))
+                        .collect();
+                    for (j, &other) in positions.iter().enumerate() {
+                        total.gram[other * p + place] += dot(&columns[j], &product);
+                    }
                 }
             }
         }

@@ -2,8 +2,6 @@
 
 use std::ops::Range;
 
-use super::least_squares::add_scaled;
-
 /// Sum `sum x x'` over rows x; its lower triangle is stored.
 pub(crate) struct Gram {
     size: usize,
@@ -27,11 +25,6 @@ impl Gram {
                 *sum += x * row(j);
             }
         }
-    }
-
-    /// Adds the products of many rows, a matrix by rows.
-    pub fn add_all(&mut self, products: &[f64]) {
-        add_scaled(&mut self.sums, 1.0, products);
     }
 
     /// Returns the sum of the products of two columns.

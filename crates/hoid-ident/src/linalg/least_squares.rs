@@ -4,20 +4,12 @@
 //! so that the decision about the rank does not depend on units; at each step the column with the largest remainder is
 //! chosen. The rank is the number of diagonal elements of R above `tolerance |R_11|`. Source: P. Businger and G. H.
 //! Golub, *Numer. Math.* 7 (1965) 269-276.
-//!
-//! A tall X is first reduced to its triangle, a block of rows after the other, without pivoting (J. Demmel, L. Grigori,
-//! M. Hoemmen and J. Langou, *SIAM J. Sci. Comput.* 34 (2012) A206-A239, the sequential case): each block stays in the
-//! cache, where all of X does not. `R' R = X' X`, so that the pivoted factorisation of the triangle takes the same
-//! decisions on the rank.
 
 use nalgebra::{DMatrix, DVector};
 
 /// Relative size of a diagonal element of R below which a column counts as dependent on previous ones. Rounding alone
 /// leaves about 1e-15; regressors that determine their coefficients to a few digits are above 1e-10.
 pub(crate) const RANK_TOLERANCE: f64 = 1e-12;
-
-/// Number of rows of a block. Larger blocks leave the cache, smaller ones repeat the steps along the triangle.
-const BLOCK: usize = 128;
 
 /// `X P = Q R` and `Q' y`, which contain all necessary information of the data.
 #[derive(Debug)]
@@ -47,18 +39,6 @@ impl LeastSquares {
                 column.iter_mut().for_each(|v| *v /= norm);
             }
         }
-        if rows < 2 * (p + BLOCK) {
-            return Self::pivoted(columns, y, scales);
-        }
-        let Triangle { mut r, mut qty, rest } = Triangle::of(columns, y);
-        let mut factored = Self::pivoted(&mut r, &mut qty, scales);
-        factored.residual_sum_of_squares += rest;
-        factored
-    }
-
-    /// Factors columns of unit length (or zero) with column pivoting.
-    fn pivoted(columns: &mut [f64], y: &mut [f64], scales: Vec<f64>) -> Self {
-        let (rows, p) = (y.len(), scales.len());
         let mut pivots: Vec<usize> = (0..p).collect();
         let mut r = vec![0.0; p * p];
         let mut rank = 0;
@@ -204,55 +184,6 @@ impl LeastSquares {
     }
 }
 
-/// The triangle of an unpivoted factorisation, by columns with zeros below the diagonal.
-struct Triangle {
-    r: Vec<f64>,
-    qty: Vec<f64>,
-    /// Sum of squares of the residuals.
-    rest: f64,
-}
-
-impl Triangle {
-    /// Reduces the rows of X and y block by block. The reflection of column k has its elements in row k of R and in the
-    /// rows of the block, because all others below row k are zero.
-    fn of(columns: &[f64], y: &[f64]) -> Self {
-        let rows = y.len();
-        let p = columns.len() / rows;
-        let (mut r, mut qty, mut rest) = (vec![0.0_f64; p * p], vec![0.0; p], 0.0);
-        let mut block = vec![0.0_f64; (p + 1) * BLOCK];
-        for from in (0..rows).step_by(BLOCK) {
-            let here = BLOCK.min(rows - from);
-            let all = columns.chunks_exact(rows).chain([y]);
-            for (row, column) in block.chunks_exact_mut(here).zip(all) {
-                row.copy_from_slice(&column[from..from + here]);
-            }
-            for k in 0..p {
-                let (head, tail) = block[..(p + 1) * here].split_at_mut((k + 1) * here);
-                let v = &head[k * here..];
-                let top = r[k * p + k];
-                let squares = dot(v, v);
-                if squares == 0.0 {
-                    continue;
-                }
-                let norm = top.hypot(squares.sqrt());
-                let alpha = -norm.copysign(top);
-                let first = top - alpha;
-                let half_square = norm * first.abs();
-                for (column, j) in tail.chunks_exact_mut(here).zip(k + 1..) {
-                    let above = if j < p { &mut r[j * p + k] } else { &mut qty[k] };
-                    let factor = (first * *above + dot(v, column)) / half_square;
-                    *above -= factor * first;
-                    add_scaled(column, -factor, v);
-                }
-                r[k * p + k] = alpha;
-            }
-            let residual = &block[p * here..(p + 1) * here];
-            rest += dot(residual, residual);
-        }
-        Self { r, qty, rest }
-    }
-}
-
 /// Solves the positive definite system `gram x = rhs` (gram by rows) by Cholesky, scaled to a unit diagonal. `None` if
 /// it is not positive definite.
 pub(crate) fn solve_symmetric(gram: &[f64], rhs: &[f64]) -> Option<Vec<f64>> {
@@ -364,44 +295,6 @@ mod tests {
             text.contains("b2 is a combination of a1") || text.contains("a1 is a combination of b2"),
             "{text}"
         );
-    }
-
-    #[test]
-    fn a_tall_matrix_by_blocks_is_that_by_columns() {
-        // The last block is not full, and a column depends on others.
-        let rows = 5 * BLOCK + 17;
-        let column = |f: &dyn Fn(f64) -> f64| (0..rows).map(|t| f(t as f64)).collect::<Vec<f64>>();
-        let independent = [
-            column(&|t| 1e3 * (0.3 * t).sin()),
-            column(&|t| 1e-3 * (0.11 * t).cos()),
-            column(&|t| if t < 200.0 { 0.0 } else { 1.0 }),
-        ]
-        .concat();
-        let y = column(&|t| (0.3 * t).sin() - 5.0 * (0.11 * t).cos() + (1.7 * t * t).sin());
-        let factored = |x: &[f64], whole: bool| {
-            let (mut x, mut y) = (x.to_vec(), y.clone());
-            if !whole {
-                return LeastSquares::factor(&mut x, &mut y);
-            }
-            let scales: Vec<f64> = x.chunks_exact(rows).map(|c| dot(c, c).sqrt()).collect();
-            for (column, scale) in x.chunks_exact_mut(rows).zip(&scales) {
-                column.iter_mut().for_each(|v| *v /= scale);
-            }
-            LeastSquares::pivoted(&mut x, &mut y, scales)
-        };
-        let (blocks, whole) = (factored(&independent, false), factored(&independent, true));
-        for (a, b) in blocks.solution().iter().zip(whole.solution()) {
-            assert!((a - b).abs() < 1e-12 * b.abs(), "{a} {b}");
-        }
-        for (a, b) in blocks.inverse_gram().iter().zip(whole.inverse_gram()) {
-            assert!((a - b).abs() < 1e-11 * b.abs(), "{a} {b}");
-        }
-        let (a, b) = (blocks.residual_sum_of_squares, whole.residual_sum_of_squares);
-        assert!((a - b).abs() < 1e-12 * b, "{a} {b}");
-        let double: Vec<f64> = independent[..rows].iter().map(|v| -2.0 * v).collect();
-        let (blocks, whole) = ([&independent[..], &double].concat(), true);
-        let (blocks, whole) = (factored(&blocks, false), factored(&blocks, whole));
-        assert_eq!((blocks.rank, whole.rank), (3, 3));
     }
 
     #[test]
