@@ -18,12 +18,12 @@
 #define HOID_ABI_VERSION 1
 
 /*
- Nothing speaks against the estimate.
+ No check found a problem with the estimate.
  */
 #define HOID_TRUSTWORTHY 0
 
 /*
- Something speaks against the estimate.
+ A check found a problem with the estimate.
  */
 #define HOID_DOUBTFUL 1
 
@@ -33,7 +33,7 @@
 #define HOID_NOT_DETERMINED 2
 
 /*
- Quantities of a change.
+ Number of quantities of a change.
  */
 #define HOID_SHIFTS 6
 
@@ -44,8 +44,7 @@
 typedef struct hoid_tracker hoid_tracker;
 
 /*
- Return code of a function: zero for done, positive where there is no value, negative for an
- error.
+ Return code of a function: zero for done, positive if there is no value, negative for an error.
  */
 typedef int32_t hoid_status;
 
@@ -54,11 +53,11 @@ typedef int32_t hoid_status;
  */
 typedef struct {
   /*
-   Its name; it stays as long as the tracker.
+   Its name; valid as long as the tracker.
    */
   const char *name;
   /*
-   Its unit, empty if there is none; it stays.
+   Its unit, empty if there is none; always valid.
    */
   const char *unit;
   /*
@@ -70,7 +69,7 @@ typedef struct {
    */
   double standard_error;
   /*
-   1 where the data determine it, 0 where they do not, -1 where that is not judged.
+   1 if the data determine it, 0 if they do not, -1 if that is not judged.
    */
   int32_t determined;
 } hoid_estimate;
@@ -80,7 +79,7 @@ typedef struct {
  */
 typedef struct {
   /*
-   Its name; it stays.
+   Its name; always valid.
    */
   const char *name;
   /*
@@ -100,25 +99,26 @@ typedef struct {
    */
   double after_standard_error;
   /*
-   The change over its standard error; for the remnant that of the logarithm.
+   The change divided by its standard error; for the remnant, the change of the logarithm.
    */
   double z;
 } hoid_shift;
 
 /*
- A change of the person that was declared.
+ A declared change of the person.
  */
 typedef struct {
   /*
-   How long ago the person changed when it was declared, s.
+   Time from the change to its declaration, s.
    */
   double seconds_ago;
   /*
-   Logarithm of the odds of a change within the last few seconds.
+   `adaptive`: -ln of the p-value of the change test; `multiple-model`: logarithm of the odds of
+   a change within the last four seconds.
    */
   double log_odds;
   /*
-   Its probability.
+   1/(1 + exp(-log_odds)); with `multiple-model` the probability of the change.
    */
   double probability;
   /*
@@ -128,11 +128,11 @@ typedef struct {
 } hoid_change;
 
 /*
- Samples so far.
+ Counts since the start.
  */
 typedef struct {
   /*
-   Samples given.
+   Samples.
    */
   uint64_t samples;
   /*
@@ -144,11 +144,11 @@ typedef struct {
    */
   uint64_t held;
   /*
-   How often the guard started the estimate again.
+   Restarts of the estimate by the guard.
    */
   uint64_t restarts;
   /*
-   Steps that stability or a bound made shorter.
+   Steps shortened to keep stability or a bound.
    */
   uint64_t steps_shortened;
 } hoid_counts;
@@ -162,23 +162,23 @@ typedef struct {
    */
   double innovation;
   /*
-   1 once there is an estimate.
+   1 after the warm-up; always 1 for a method without one.
    */
   int32_t ready;
   /*
-   1 when e or u was faulty: not a finite number, or beyond `largest`.
+   1 if e or u was faulty: not a finite number, or beyond `largest`.
    */
   int32_t skipped;
   /*
-   1 when the guard held it back.
+   1 if the guard held back the sample.
    */
   int32_t held;
   /*
-   1 when stability or a bound made the step shorter.
+   1 if the step was shortened to keep stability or a bound.
    */
   int32_t shortened;
   /*
-   1 when a change of the person was declared at this sample.
+   1 if a change of the person was declared at this sample.
    */
   int32_t changed;
 } hoid_outcome;
@@ -209,22 +209,22 @@ typedef struct {
 #define HOID_BAD_OPTION -3
 
 /*
- A list or buffer has not the room for what there is.
+ A list or buffer is too short.
  */
 #define HOID_TOO_SMALL -4
 
 /*
- Bytes that are not a saved tracker of this version, or were changed since.
+ Bytes that are not a saved tracker of this version, or were changed.
  */
 #define HOID_BAD_STATE -5
 
 /*
- A fault of hoid itself was caught.
+ An internal error of hoid was caught.
  */
 #define HOID_PANIC -6
 
 /*
- A fault was caught in this tracker before: free it.
+ An internal error was caught in this tracker before: free it.
  */
 #define HOID_BROKEN -7
 
@@ -233,7 +233,7 @@ extern "C" {
 #endif // __cplusplus
 
 /*
- The version of the library that is loaded: compare it with HOID_ABI_VERSION of the header.
+ Version of the interface of the loaded library: compare it with HOID_ABI_VERSION of the header.
  */
 uint32_t hoid_abi_version(void);
 
@@ -243,9 +243,9 @@ uint32_t hoid_abi_version(void);
 const char *hoid_version(void);
 
 /*
- Makes a tracker: by the name of the method (NULL: "adaptive", which speaks from the second second
- on), the sample time in s, and options as one object in JSON by the keywords of pyhoid.Tracker
- (NULL: none), as "{\"controlled_element\": \"90/(s(s+6))\", \"prior\": \"fit.json\"}".
+ Makes a tracker from the name of the method (NULL: "adaptive", whose first estimate comes after one
+ second), the sample time in s, and options as one JSON object with the keywords of pyhoid.Tracker
+ (NULL: none), such as "{\"controlled_element\": \"90/(s(s+6))\", \"prior\": \"fit.json\"}".
 
  # Safety
  Texts are NULL or end with a zero; `tracker` points to room for a pointer.
@@ -256,7 +256,7 @@ hoid_status hoid_tracker_new(const char *method,
                              hoid_tracker **tracker);
 
 /*
- Makes a tracker that starts with an earlier fit of the person: the text that hoid identify --json
+ Makes a tracker that starts with an earlier fit of the person, the text that hoid identify --json
  prints. Sample time in s and options as in hoid_tracker_new.
 
  # Safety
@@ -268,7 +268,7 @@ hoid_status hoid_tracker_from_fit(const char *fit,
                                   hoid_tracker **tracker);
 
 /*
- Frees a tracker. NULL is nothing to be freed.
+ Frees a tracker; does nothing for NULL.
 
  # Safety
  `tracker` is NULL or was made here and not freed.
@@ -288,7 +288,7 @@ hoid_status hoid_tracker_save(hoid_tracker *tracker,
                               size_t *length);
 
 /*
- Makes the tracker that was saved.
+ Restores a saved tracker.
 
  # Safety
  `buffer` has `length` bytes; `tracker` points to room for a pointer.
@@ -296,8 +296,8 @@ hoid_status hoid_tracker_save(hoid_tracker *tracker,
 hoid_status hoid_tracker_restore(const uint8_t *buffer, size_t length, hoid_tracker **tracker);
 
 /*
- HOID_OK once there is an estimate, HOID_NOTHING before; hoid_last_error then reports how far the
- warm-up is.
+ HOID_OK after the warm-up, and always for a method without one; HOID_NOTHING during it:
+ hoid_last_error then reports how far it is.
 
  # Safety
  `tracker` was made here.
@@ -327,7 +327,7 @@ hoid_status hoid_tracker_parameters(const hoid_tracker *tracker,
                                     size_t *count);
 
 /*
- The covariance of the coefficients by rows.
+ The covariance of the coefficients, row by row.
 
  # Safety
  As hoid_tracker_operator.
@@ -362,7 +362,7 @@ hoid_status hoid_tracker_response(const hoid_tracker *tracker,
                                   size_t *count);
 
 /*
- The change that was declared at the last sample; HOID_NOTHING where none was.
+ The change that was declared at the last sample; HOID_NOTHING if there was none.
 
  # Safety
  `tracker` was made here; `change` has room for one.
@@ -370,8 +370,8 @@ hoid_status hoid_tracker_response(const hoid_tracker *tracker,
 hoid_status hoid_tracker_change(const hoid_tracker *tracker, hoid_change *change);
 
 /*
- Logarithm of the odds that the person changed within the last four seconds; -inf before the first
- estimate. HOID_NOTHING for a method that does not report changes.
+ Evidence of a change now, as log_odds of hoid_change; before the first estimate 0 (`adaptive`) or
+ -inf (`multiple-model`). HOID_NOTHING for a method that does not report changes.
 
  # Safety
  `tracker` was made here; `log_odds` has room for a number.
@@ -379,7 +379,7 @@ hoid_status hoid_tracker_change(const hoid_tracker *tracker, hoid_change *change
 hoid_status hoid_tracker_change_log_odds(const hoid_tracker *tracker, double *log_odds);
 
 /*
- Verdict on the estimate now: HOID_TRUSTWORTHY, HOID_DOUBTFUL or HOID_NOT_DETERMINED.
+ Verdict on the current estimate: HOID_TRUSTWORTHY, HOID_DOUBTFUL or HOID_NOT_DETERMINED.
 
  # Safety
  `tracker` was made here; `level` has room for a number.
@@ -387,12 +387,12 @@ hoid_status hoid_tracker_change_log_odds(const hoid_tracker *tracker, double *lo
 hoid_status hoid_tracker_level(const hoid_tracker *tracker, int32_t *level);
 
 /*
- A level as text, as "trustworthy"; empty for what is none.
+ A level as text, such as "trustworthy"; empty for any other number.
  */
 const char *hoid_level_name(int32_t level);
 
 /*
- Samples so far.
+ Counts of samples since the start.
 
  # Safety
  `tracker` was made here; `counts` has room for one.
@@ -408,7 +408,7 @@ hoid_status hoid_tracker_counts(const hoid_tracker *tracker, hoid_counts *counts
 hoid_status hoid_tracker_sample_time(const hoid_tracker *tracker, double *sample_time);
 
 /*
- The text after the last status of this thread that was not HOID_OK, empty before the first. The
+ The text of the last status of this thread that was not HOID_OK, empty before the first. The
  pointer stays valid until the next status of this thread that is not HOID_OK.
  */
 const char *hoid_last_error(void);
@@ -423,7 +423,7 @@ hoid_status hoid_tracker_step(hoid_tracker *tracker, double e, double u, hoid_ou
 
 /*
  As hoid_tracker_step, with the external signal f_t (NaN: not known). With `moves` 0 the filters
- follow and the estimate stays.
+ are updated, but not the estimate.
 
  # Safety
  As hoid_tracker_step.

@@ -1,16 +1,16 @@
-//! The tracker of `hoid track` and `hoid stream` after a C ABI.
+//! The tracker of `hoid track` and `hoid stream` behind a C ABI.
 //!
 //! The one crate of the workspace with unsafe code. What is unsafe about a C boundary is that pointers are trusted, so
 //! that is all the unsafe code does: `boundary` reads texts and writes results through pointers of the caller, and
-//! nothing else dereferences one. After it comes the safe `session`, which has no information about C.
+//! nothing else dereferences one. Behind it is the safe `session`, which does not depend on C.
 //!
 //! Three rules hold for every function:
 //!
-//! - **It answers with a status**, zero for done, positive where there is no value now, negative for an error. What is
-//!   after it is in [`hoid_last_error`] of the calling thread.
+//! - **It returns a status**, zero for done, positive if there is no value now, negative for an error. The reason is in
+//!   [`hoid_last_error`] of the calling thread.
 //! - **No panic crosses.** A panic is caught, becomes [`HOID_PANIC`], and the tracker that was at work
-//!   answers [`HOID_BROKEN`] from then on: its state may be half moved.
-//! - **A null pointer is an error**, not a crash, and a list that is too short is left as it was.
+//!   answers [`HOID_BROKEN`] from then on: its state may be half updated.
+//! - **A null pointer is an error**, not a crash, and a list that is too short is not written.
 //!
 //! Names, order and units are those of Rust and Python.
 //!

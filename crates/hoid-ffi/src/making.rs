@@ -11,7 +11,7 @@ use crate::{
 /// Version of this interface. Functions and constants are added within a version, and never changed.
 pub const HOID_ABI_VERSION: u32 = 1;
 
-/// The version of the library that is loaded: compare it with HOID_ABI_VERSION of the header.
+/// Version of the interface of the loaded library: compare it with HOID_ABI_VERSION of the header.
 #[unsafe(no_mangle)]
 pub extern "C" fn hoid_abi_version() -> u32 {
     HOID_ABI_VERSION
@@ -27,9 +27,9 @@ pub extern "C" fn hoid_version() -> *const c_char {
     VERSION.as_ptr()
 }
 
-/// Makes a tracker: by the name of the method (NULL: "adaptive", which speaks from the second second
-/// on), the sample time in s, and options as one object in JSON by the keywords of pyhoid.Tracker
-/// (NULL: none), as "{\"controlled_element\": \"90/(s(s+6))\", \"prior\": \"fit.json\"}".
+/// Makes a tracker from the name of the method (NULL: "adaptive", whose first estimate comes after one
+/// second), the sample time in s, and options as one JSON object with the keywords of pyhoid.Tracker
+/// (NULL: none), such as "{\"controlled_element\": \"90/(s(s+6))\", \"prior\": \"fit.json\"}".
 ///
 /// # Safety
 /// Texts are NULL or end with a zero; `tracker` points to room for a pointer.
@@ -51,7 +51,7 @@ pub unsafe extern "C" fn hoid_tracker_new(
     })
 }
 
-/// Makes a tracker that starts with an earlier fit of the person: the text that hoid identify --json
+/// Makes a tracker that starts with an earlier fit of the person, the text that hoid identify --json
 /// prints. Sample time in s and options as in hoid_tracker_new.
 ///
 /// # Safety
@@ -75,7 +75,7 @@ pub unsafe extern "C" fn hoid_tracker_from_fit(
     })
 }
 
-/// Frees a tracker. NULL is nothing to be freed.
+/// Frees a tracker; does nothing for NULL.
 ///
 /// # Safety
 /// `tracker` is NULL or was made here and not freed.
@@ -108,7 +108,7 @@ pub unsafe extern "C" fn hoid_tracker_save(
     unsafe { move_tracker(tracker, save) }
 }
 
-/// Makes the tracker that was saved.
+/// Restores a saved tracker.
 ///
 /// # Safety
 /// `buffer` has `length` bytes; `tracker` points to room for a pointer.

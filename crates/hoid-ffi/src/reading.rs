@@ -14,9 +14,9 @@ use crate::{
     types::{HoidChange, HoidCounts, HoidEstimate},
 };
 
-/// Nothing speaks against the estimate.
+/// No check found a problem with the estimate.
 pub const HOID_TRUSTWORTHY: i32 = 0;
-/// Something speaks against the estimate.
+/// A check found a problem with the estimate.
 pub const HOID_DOUBTFUL: i32 = 1;
 /// The data do not determine the estimate, or there is none.
 pub const HOID_NOT_DETERMINED: i32 = 2;
@@ -40,8 +40,8 @@ unsafe fn list<T: Copy>(
     unsafe { with_tracker(tracker, hand) }
 }
 
-/// HOID_OK once there is an estimate, HOID_NOTHING before; hoid_last_error then reports how far the
-/// warm-up is.
+/// HOID_OK after the warm-up, and always for a method without one; HOID_NOTHING during it:
+/// hoid_last_error then reports how far it is.
 ///
 /// # Safety
 /// `tracker` was made here.
@@ -81,7 +81,7 @@ pub unsafe extern "C" fn hoid_tracker_parameters(
     unsafe { list(tracker, Session::parameters, estimates, room, count) }
 }
 
-/// The covariance of the coefficients by rows.
+/// The covariance of the coefficients, row by row.
 ///
 /// # Safety
 /// As hoid_tracker_operator.
@@ -128,7 +128,7 @@ pub unsafe extern "C" fn hoid_tracker_response(
     unsafe { list(tracker, |session| session.response(omega), estimates, room, count) }
 }
 
-/// The change that was declared at the last sample; HOID_NOTHING where none was.
+/// The change that was declared at the last sample; HOID_NOTHING if there was none.
 ///
 /// # Safety
 /// `tracker` was made here; `change` has room for one.
@@ -142,8 +142,8 @@ pub unsafe extern "C" fn hoid_tracker_change(tracker: *const HoidTracker, change
     unsafe { with_tracker(tracker, tell) }
 }
 
-/// Logarithm of the odds that the person changed within the last four seconds; -inf before the first
-/// estimate. HOID_NOTHING for a method that does not report changes.
+/// Evidence of a change now, as log_odds of hoid_change; before the first estimate 0 (`adaptive`) or
+/// -inf (`multiple-model`). HOID_NOTHING for a method that does not report changes.
 ///
 /// # Safety
 /// `tracker` was made here; `log_odds` has room for a number.
@@ -157,7 +157,7 @@ pub unsafe extern "C" fn hoid_tracker_change_log_odds(tracker: *const HoidTracke
     unsafe { with_tracker(tracker, tell) }
 }
 
-/// Verdict on the estimate now: HOID_TRUSTWORTHY, HOID_DOUBTFUL or HOID_NOT_DETERMINED.
+/// Verdict on the current estimate: HOID_TRUSTWORTHY, HOID_DOUBTFUL or HOID_NOT_DETERMINED.
 ///
 /// # Safety
 /// `tracker` was made here; `level` has room for a number.
@@ -180,7 +180,7 @@ pub(crate) fn number_of(level: VerdictLevel) -> i32 {
     }
 }
 
-/// A level as text, as "trustworthy"; empty for what is none.
+/// A level as text, such as "trustworthy"; empty for any other number.
 #[unsafe(no_mangle)]
 pub extern "C" fn hoid_level_name(level: i32) -> *const c_char {
     let name = match level {
@@ -192,7 +192,7 @@ pub extern "C" fn hoid_level_name(level: i32) -> *const c_char {
     name.as_ptr()
 }
 
-/// Samples so far.
+/// Counts of samples since the start.
 ///
 /// # Safety
 /// `tracker` was made here; `counts` has room for one.

@@ -1,4 +1,4 @@
-//! Statuses, and the text after the last one.
+//! Statuses, and the text of the last one.
 //!
 //! The text belongs to the thread: two threads with a tracker each do not mix theirs up.
 
@@ -13,8 +13,7 @@ use hoid_ident::IdentError;
 use hoid_io::IoError;
 use hoid_model::ModelError;
 
-/// Return code of a function: zero for done, positive where there is no value, negative for an
-/// error.
+/// Return code of a function: zero for done, positive if there is no value, negative for an error.
 pub type HoidStatus = i32;
 
 /// Done.
@@ -27,13 +26,13 @@ pub const HOID_BAD_POINTER: HoidStatus = -1;
 pub const HOID_BAD_TEXT: HoidStatus = -2;
 /// A method, an option, a sample time or a fit that cannot be used.
 pub const HOID_BAD_OPTION: HoidStatus = -3;
-/// A list or buffer has not the room for what there is.
+/// A list or buffer is too short.
 pub const HOID_TOO_SMALL: HoidStatus = -4;
-/// Bytes that are not a saved tracker of this version, or were changed since.
+/// Bytes that are not a saved tracker of this version, or were changed.
 pub const HOID_BAD_STATE: HoidStatus = -5;
-/// A fault of hoid itself was caught.
+/// An internal error of hoid was caught.
 pub const HOID_PANIC: HoidStatus = -6;
-/// A fault was caught in this tracker before: free it.
+/// An internal error was caught in this tracker before: free it.
 pub const HOID_BROKEN: HoidStatus = -7;
 
 /// A status that is not [`HOID_OK`], with its text.
@@ -107,7 +106,7 @@ fn remember(text: &str) {
     let _ = LAST.try_with(|last| *last.borrow_mut() = text);
 }
 
-/// The text after the last status of this thread that was not HOID_OK, empty before the first. The
+/// The text of the last status of this thread that was not HOID_OK, empty before the first. The
 /// pointer stays valid until the next status of this thread that is not HOID_OK.
 #[unsafe(no_mangle)]
 pub extern "C" fn hoid_last_error() -> *const c_char {

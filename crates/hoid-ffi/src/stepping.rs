@@ -25,7 +25,7 @@ pub unsafe extern "C" fn hoid_tracker_step(
 }
 
 /// As hoid_tracker_step, with the external signal f_t (NaN: not known). With `moves` 0 the filters
-/// follow and the estimate stays.
+/// are updated, but not the estimate.
 ///
 /// # Safety
 /// As hoid_tracker_step.

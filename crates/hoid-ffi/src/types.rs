@@ -10,15 +10,15 @@ use hoid_model::uncertainty::Estimate;
 pub struct HoidOutcome {
     /// A-priori innovation; NaN at a sample that was skipped or held back, and during a warm-up.
     pub innovation: f64,
-    /// 1 once there is an estimate.
+    /// 1 after the warm-up; always 1 for a method without one.
     pub ready: i32,
-    /// 1 when e or u was faulty: not a finite number, or beyond `largest`.
+    /// 1 if e or u was faulty: not a finite number, or beyond `largest`.
     pub skipped: i32,
-    /// 1 when the guard held it back.
+    /// 1 if the guard held back the sample.
     pub held: i32,
-    /// 1 when stability or a bound made the step shorter.
+    /// 1 if the step was shortened to keep stability or a bound.
     pub shortened: i32,
-    /// 1 when a change of the person was declared at this sample.
+    /// 1 if a change of the person was declared at this sample.
     pub changed: i32,
 }
 
@@ -26,15 +26,15 @@ pub struct HoidOutcome {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HoidEstimate {
-    /// Its name; it stays as long as the tracker.
+    /// Its name; valid as long as the tracker.
     pub name: *const c_char,
-    /// Its unit, empty if there is none; it stays.
+    /// Its unit, empty if there is none; always valid.
     pub unit: *const c_char,
     /// The value.
     pub value: f64,
     /// Its standard error; NaN if there is none.
     pub standard_error: f64,
-    /// 1 where the data determine it, 0 where they do not, -1 where that is not judged.
+    /// 1 if the data determine it, 0 if they do not, -1 if that is not judged.
     pub determined: i32,
 }
 
@@ -54,7 +54,7 @@ impl HoidEstimate {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HoidShift {
-    /// Its name; it stays.
+    /// Its name; always valid.
     pub name: *const c_char,
     /// Value before the change.
     pub before: f64,
@@ -64,22 +64,23 @@ pub struct HoidShift {
     pub after: f64,
     /// Its standard error; NaN if there is none.
     pub after_standard_error: f64,
-    /// The change over its standard error; for the remnant that of the logarithm.
+    /// The change divided by its standard error; for the remnant, the change of the logarithm.
     pub z: f64,
 }
 
-/// Quantities of a change.
+/// Number of quantities of a change.
 pub const HOID_SHIFTS: usize = 6;
 
-/// A change of the person that was declared.
+/// A declared change of the person.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HoidChange {
-    /// How long ago the person changed when it was declared, s.
+    /// Time from the change to its declaration, s.
     pub seconds_ago: f64,
-    /// Logarithm of the odds of a change within the last few seconds.
+    /// `adaptive`: -ln of the p-value of the change test; `multiple-model`: logarithm of the odds of
+    /// a change within the last four seconds.
     pub log_odds: f64,
-    /// Its probability.
+    /// 1/(1 + exp(-log_odds)); with `multiple-model` the probability of the change.
     pub probability: f64,
     /// K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm, remnant (innovation variance), tau_e (s).
     pub shifts: [HoidShift; HOID_SHIFTS],
@@ -98,18 +99,18 @@ impl Default for HoidShift {
     }
 }
 
-/// Samples so far.
+/// Counts since the start.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HoidCounts {
-    /// Samples given.
+    /// Samples.
     pub samples: u64,
     /// Samples with a fault in e or u.
     pub skipped: u64,
     /// Samples that the guard held back.
     pub held: u64,
-    /// How often the guard started the estimate again.
+    /// Restarts of the estimate by the guard.
     pub restarts: u64,
-    /// Steps that stability or a bound made shorter.
+    /// Steps shortened to keep stability or a bound.
     pub steps_shortened: u64,
 }
