@@ -29,13 +29,7 @@ pub fn divide_from(d: &[f64], x: &mut [f64], from: usize) {
     let before = |lag: usize, x: &[f64]| from.checked_sub(lag).map_or(0.0, |t| x[t]);
     match *d {
         [] => {}
-        [d1] => {
-            let mut y1 = before(1, x);
-            for value in &mut x[from..] {
-                y1 = *value - d1 * y1;
-                *value = y1;
-            }
-        }
+        [d1] => divide_in_registers([d1], x, from),
         [d1, d2] => {
             let filter = SecondOrder {
                 y1: before(1, x),

@@ -18,8 +18,8 @@ const FEWEST: usize = 4;
 pub(super) const MOST_GAINS: usize = 60;
 /// Share of the innovations in the power of u below which there may be no noise.
 const PROMISING: f64 = 1e-3;
-/// Ratio of two innovation variances above which a difference of their degrees of freedom and first samples is excluded.
-const OF_DEGREES: f64 = 4.0;
+/// Ratio of two innovation variances that their degrees of freedom and first samples alone cannot explain.
+const SAFETY_FACTOR: f64 = 4.0;
 /// Orders of A of an operator: the neuromuscular system, and up to two lags.
 const OWN_ORDERS: (usize, usize) = (2, 4);
 /// Number of coefficients of B beyond the order of A: as many as that, one for a part of a sample of the delay, one for
@@ -59,22 +59,23 @@ impl ArxResponse {
             return None;
         }
         // A model whose regressors are among those of the high order leaves at least as much as that.
-        let hopeless = |orders: &Orders| {
+        let is_noise = high.innovations > SAFETY_FACTOR * NONE;
+        let contained = |orders: &Orders| {
             let last = |orders: &Orders| orders.nk + orders.nb;
-            let contained = orders.na <= of_high.na && orders.nk >= of_high.nk && last(orders) <= last(&of_high);
-            contained && high.innovations > OF_DEGREES * NONE
+            orders.na <= of_high.na && orders.nk >= of_high.nk && last(orders) <= last(&of_high)
         };
         let longest = (longest_delay_s / records[0].sample_time().s()).ceil() as usize;
         let own = (OWN_ORDERS.0..=OWN_ORDERS.1)
             .flat_map(|na| (0..=longest).map(move |nk| (na, nk)))
-            .filter_map(|(na, nk)| {
+            .map(|(na, nk)| {
                 let mut orders = Structure::Arx.operator_orders(nk);
                 (orders.na, orders.nb) = (na, na + FURTHER_GAINS);
-                (!hopeless(&orders)).then_some(orders)
+                orders
             })
+            .filter(|orders| !(is_noise && contained(orders)))
             .filter_map(|orders| with_level(orders).fit(records).ok())
             .map(|fit| Self::of_fit(records, &fit));
-        let least = own.fold(high.clone(), |least, own| {
+        let least = own.fold(high, |least, own| {
             if own.innovations < least.innovations {
                 own
             } else {
