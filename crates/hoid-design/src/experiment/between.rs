@@ -113,7 +113,7 @@ fn of_file(path: &Path, (name, value): (&str, f64)) -> Result<Spread, DesignErro
             let spread = in_population(&object, name).ok_or_else(|| none("its parameters are different".to_owned()))?;
             return Ok(Spread {
                 value: spread * value,
-                source: format!("upper limit: the spread between people within one condition, from {shown}"),
+                source: format!("at most the spread between people within one condition, from {shown}"),
             });
         }
         if object["kind"] == "comparison" {
